@@ -224,10 +224,10 @@ class ElementFields:
         place = choice(at, f"the place of the field {name}", field.where)
         if "gauss" not in field.where or place == "node":
             return self.u if name == "displacement" else field.at(self)
-        found = [GaussPoints(self.mesh.points, group, self.u, self._strained) for group in self.groups]
+        placed = [GaussPoints(self.mesh.points, group, self.u, self._strained) for group in self.groups]
         if place == "gauss":
-            return in_order(self.groups, [field.at(values) for values in found])
-        return in_order(self.groups, [values.mean(field.at(values)) for values in found])
+            return in_order(self.groups, [field.at(values) for values in placed])
+        return in_order(self.groups, [values.mean(field.at(values)) for values in placed])
 
     def von_mises(self, at: str = "gauss") -> Any:
         """Return von Mises stresses.

@@ -33,33 +33,19 @@ EVERYWHERE = ("gauss", "element", "node", "averaged", "raw", "point")
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """A field of results.
+    """A field of results."""
 
-    Attributes
-    ----------
-    name : in headings and legends.
-    kratos : its variable in Kratos and in files for ParaView, which hold it if there is one.
-    unit : in SI.
-    kind : a key of `PARTS`.
-    where : places that have it: those of `ElementFields.stress`, ``point`` for any point of the mesh,
-        ``state`` for the nodes in a state in time.
-    function : of the values at a place, such as `PointValues`; or of the tensor `of`.
-    of : key of the tensor whose invariant it is.
-    symbol : before the names of its parts, as in ``sxx``; pictures show no parts without it.
-    listed : whether files and tables hold it.
-    log : whether pictures show it on a logarithmic scale.
-    """
-
-    name: str
-    kratos: str
-    unit: str
-    kind: str
+    name: str  # in headings and legends
+    kratos: str  # its variable in Kratos and in files for ParaView, which hold it if there is one
+    unit: str  # in SI
+    kind: str  # a key of `PARTS`
+    # ``point`` is any point of the mesh, ``state`` the nodes in a state; others as of `ElementFields.stress`
     where: tuple[str, ...]
-    function: Callable[[Any], Array]
-    of: str = ""
-    symbol: str = ""
-    listed: bool = True
-    log: bool = False
+    function: Callable[[Any], Array]  # of the values at a place, such as `PointValues`; or of the tensor `of`
+    of: str = ""  # key of the tensor whose invariant it is
+    symbol: str = ""  # before the names of its parts, as in ``sxx``; pictures show no parts without it
+    listed: bool = True  # whether files and tables hold it
+    log: bool = False  # whether pictures show it on a logarithmic scale
 
     @property
     def nodal_place(self) -> str:

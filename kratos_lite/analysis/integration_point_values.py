@@ -18,20 +18,12 @@ from kratos_lite.typing import Array
 
 @dataclass(eq=False)
 class GaussPoints:
-    """The g Gauss points of m elements.
+    """The g Gauss points of m elements."""
 
-    Attributes
-    ----------
-    points : (n, 3) in m, the nodes of the mesh.
-    group : the elements.
-    u : (n, 3) in m, the displacement.
-    strained : (n, 3) in m, the displacement without its stress-free part.
-    """
-
-    points: Array
-    group: ElementGroup
-    u: Array
-    strained: Array
+    points: Array  # (n, 3) in m, the nodes of the mesh
+    group: ElementGroup  # the elements
+    u: Array  # (n, 3) in m, the displacement
+    strained: Array  # (n, 3) in m, the displacement without its stress-free part
 
     @cached_property
     def element(self) -> KinematicLinear:

@@ -79,8 +79,8 @@ class LineValues(PointValues):
     @property
     def linear(self) -> Array:
         """Membrane and bending stress σ_m + σ_b (1 - 2 x / t) together, (n, 6) in Pa."""
-        share = self.distance[:, None] / self.distance[-1]
-        return self.membrane + self.bending * (1 - 2 * share)
+        fraction = self.distance[:, None] / self.distance[-1]
+        return self.membrane + self.bending * (1 - 2 * fraction)
 
     @property
     def peak(self) -> Array:
@@ -127,7 +127,7 @@ class LineValues(PointValues):
         """
         from kratos_lite.analysis.named_values import NAMES, named_values  # pictures alone need these
         from kratos_lite.view.canvas import checked_size, save
-        from kratos_lite.view.curves import curves_figure
+        from kratos_lite.view.curves import line_figure
 
         choice(values, "values", [n for n, (field, _) in NAMES.items() if "point" in FIELDS[field].where])
         shown = named_values(values, lambda name: getattr(self, name))
@@ -139,9 +139,7 @@ class LineValues(PointValues):
             i = COMPONENTS.index(values[1:])
             curves["membrane and bending"] = self.linear[:, i]
             curves["membrane"] = np.full(len(self.distance), self.membrane[i])
-        figure = curves_figure(
-            self.distance, curves, unit=shown.unit, title=title, size=checked_size(size) or (6, 4)
-        )
+        figure = line_figure(self.distance, curves, shown.unit, title, checked_size(size) or (6, 4))
         if path is not None:
             save(figure, path)
         return figure

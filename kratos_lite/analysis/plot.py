@@ -20,8 +20,8 @@ from kratos_lite.shapes import Shape
 from kratos_lite.validation import number, short, whole_number
 from kratos_lite.view import canvas
 from kratos_lite.view.camera import View
+from kratos_lite.view.curves import convergence_figure
 from kratos_lite.view.figure import figure_of
-from kratos_lite.view.history import history_figure
 from kratos_lite.view.reference_cell import element_figure
 
 OF_STATES = 120
@@ -222,9 +222,7 @@ def _history(report: Report, given: dict[str, Any]) -> Any:
         np.array([getattr(s, name) for s in report.history]) for name in ("unknowns", "error")
     )
     title, size = given["title"] or "", given["size"] or (6, 4)
-    return history_figure(
-        unknowns, errors, goal=report.error_asked, of=report.error_of, title=title, size=size
-    )
+    return convergence_figure(unknowns, errors, report.error_asked, report.error_of, title, size)
 
 
 def _element(kind: type, points: ArrayLike | None) -> Any:

@@ -34,7 +34,7 @@ from kratos_lite.model import checks
 from kratos_lite.model.equal import equal_loads
 from kratos_lite.model.loads import Load
 from kratos_lite.model.structure import Structure
-from kratos_lite.solvers.constrained_system import ConstrainedSystem, among
+from kratos_lite.solvers.constrained_system import ConstrainedSystem, select
 from kratos_lite.solvers.linear_solver import Solution
 from kratos_lite.typing import Array, Mask, Progress
 from kratos_lite.validation import finite
@@ -198,7 +198,10 @@ class StaticAnalysis:
         if known is None or (moving & ~known.components).any():
             components = moving if known is None else moving | known.components
             nodes = components[state.component] & state.used
-            every, groups = among(state.groups, nodes), among(state.groups, nodes & ~self._dirichlet.at_rest)
+            every, groups = (
+                select(state.groups, nodes),
+                select(state.groups, nodes & ~self._dirichlet.at_rest),
+            )
             how = state.free.held, self.solver, self.tolerance, self.progress, self.engine, self.petsc
             system = system_of(self.model, groups, *how)  # which may be refused; the one before stays then
             self.release()

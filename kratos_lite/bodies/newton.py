@@ -59,12 +59,10 @@ def _eliminated(
 
 
 def _less(K: BlockMatrix, tangent: Entries) -> BlockMatrix:
-    from scipy.sparse import bsr_array, csr_array
+    from scipy.sparse import csr_array
 
     row, column, value = tangent
-    A = bsr_array(K.scipy().tocsr() - csr_array((value, (row, column)), shape=K.shape), blocksize=(3, 3))
-    A.sort_indices()
-    return BlockMatrix(A.data, A.indices.astype(np.int32), A.indptr.astype(np.int32))
+    return BlockMatrix.of(K.scipy().tocsr() - csr_array((value, (row, column)), shape=K.shape))
 
 
 def _with_multipliers(K: BlockMatrix, residual: Array, entries: Entries, gap: Array) -> tuple[Array, Array]:

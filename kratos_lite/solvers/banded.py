@@ -37,32 +37,7 @@ class BandFactors:
 
 
 class Factorizer:
-    """Factorizes matrices (3n, 3n) of 3x3 node blocks that share a sparsity pattern.
-
-    Parameters
-    ----------
-    pattern : sparsity of the nodes.
-    symmetric : whether the matrices are symmetric positive definite; otherwise rows are exchanged.
-
-    Attributes
-    ----------
-    plan : ``band`` or ``sparse``, and why.
-    width : largest distance of an entry from the diagonal in the band.
-
-    Examples
-    --------
-    >>> import kratos_lite as kl
-    >>> from kratos_lite.assembly.sparsity_pattern import Pattern
-    >>> from kratos_lite.assembly.stiffness import assemble_stiffness
-    >>> model = kl.Model(kl.box((0.1, 0.1, 1.0), (1, 1, 9)), kl.Isotropic3D(E=1.0, nu=0.3))
-    >>> points, groups = model.mesh.points, model.element_groups()
-    >>> pattern = Pattern(len(points), [group.nodes for group in groups])
-    >>> A = assemble_stiffness(points, groups, pattern)
-    >>> A.add_scalar(np.full(len(points), 2.0), A.diagonal_blocks())
-    >>> b = np.arange(120.0)
-    >>> bool(np.allclose(A @ Factorizer(pattern).factorize(A).solve(b), b))
-    True
-    """
+    """Factorizes matrices (3n, 3n) of one sparsity pattern; rows are exchanged unless they are symmetric."""
 
     def __init__(self, pattern: Pattern, symmetric: bool = True) -> None:
         self.symmetric = symmetric
@@ -89,14 +64,7 @@ class Factorizer:
         self._to = to[self._from]
 
     def factorize(self, A: BlockMatrix) -> BandFactors | direct.Factorization:
-        """Return the factors of a matrix with the pattern; their `solve` gives x of A x = b.
-
-        Raises
-        ------
-        SolveError
-            If the matrix is singular, or not positive definite though it should be; a sparse
-            factorization may notice singular ones alone.
-        """
+        """Return the factors of a matrix with the pattern; their `solve` gives x of A x = b."""
         if self.plan.method == "sparse":
             return direct.factorize(A.scipy().tocsr(), symmetric=self.symmetric)
         band = np.zeros(len(self._dofs) * self._height)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from kratos_lite.mesh.hanging import HangingNodes
-    from kratos_lite.solvers.coarse_level import LinearLevel
+    from kratos_lite.solvers.coarse_level import PCoarseLevel
 
 NO_MATRIX = "the stiffness matrix, as its products are computed element by element"
 """What is skipped with linear elements inside the quadratic ones."""
@@ -34,40 +34,6 @@ class ConstrainedSystem:
 
     Pattern, matrix and whatever the solver prepares (factors, multigrid) are made when they are first
     needed and kept.  Nodes that no element uses carry no equations.
-
-    Parameters
-    ----------
-    points : (n, 3) m.
-    groups : the elements, by rows of the points.
-    constraints : gives the constraint map of the nodes that carry equations, by their rows (a,), such as
-        ``model.supports.constraint_map``.
-    solver : ``auto``, ``dense``, ``direct`` or ``amg``.
-    tolerance : relative residual at which the iterative solver stops.
-    patterns : where sparsity patterns are kept from one system to the next.
-    progress : called with the phase and the share done, 0 … 1.
-    hanging : the nodes of the mesh that hang on larger neighbors, which the constraints hold, too.
-
-    Attributes
-    ----------
-    points, groups : the nodes that carry equations, and the elements by rows of these.
-    nodes : (a,) int, rows of these nodes among all n.
-    reduced : the constraint map, from the free degrees of freedom to all 3a.
-    plan : how the equations are solved, and why.
-    skipped, warnings : what assembly left out, and what is to be said, in words.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import kratos_lite as kl
-    >>> model = kl.Model(kl.box(), kl.Isotropic3D(E=1e9, nu=0.0))
-    >>> model.fix("z-")
-    >>> constraints = model.supports.constraint_map
-    >>> system = ConstrainedSystem(model.mesh.points, model.element_groups(), constraints)
-    >>> f = np.zeros((8, 3))
-    >>> f[model.mesh.nodes("z+"), 2] = 1.0
-    >>> u, solution = system.solve(f)
-    >>> print(f"{u[:, 2].max():.3e} m, {solution.method}")
-    4.000e-09 m, dense
     """
 
     def __init__(
@@ -85,7 +51,7 @@ class ConstrainedSystem:
         self.n_nodes = len(points)
         self.nodes, self.groups = renumber(self.n_nodes, groups)
         self.points = points[self.nodes]
-        self.reduced = constraints(self.nodes)
+        self.constraint_map = constraints(self.nodes)
         self.tolerance, self.progress = tolerance, progress
         self._hanging = hanging if hanging is None else hanging.among(self.nodes, self.n_nodes)
         self.skipped: list[str] = []
@@ -98,7 +64,7 @@ class ConstrainedSystem:
 
     def _facts(self) -> Facts:
         return Facts(
-            len(self.reduced.free),
+            len(self.constraint_map.free),
             3 * len(self.nodes),
             bulk_over_shear=lambda: largest_bulk_over_shear(self.groups),
             bandwidth=self._bandwidth,
@@ -112,12 +78,12 @@ class ConstrainedSystem:
         from kratos_lite.solvers.banded import cuthill_mckee, nodal_width  # rarely needed
 
         width = nodal_width(self.pattern, self.pattern.rows(), cuthill_mckee(self.pattern)[1])
-        return width * len(self.reduced.free) / len(self.nodes)
+        return width * len(self.constraint_map.free) / len(self.nodes)
 
     def _has_product(self) -> bool:
         from kratos_lite.assembly.matrix_free import MatrixFree  # a quick start for small models
 
-        tied = self.reduced.T is not None or self._hanging is not None
+        tied = self.constraint_map.T is not None or self._hanging is not None
         return not tied and all(map(MatrixFree.takes, self.groups))
 
     def _is_stretched(self) -> bool:
@@ -129,7 +95,7 @@ class ConstrainedSystem:
         from kratos_lite.solvers.plate_level import plate_axes  # a quick start for small models
 
         free = np.zeros(3 * len(self.points), dtype=bool)
-        free[self.reduced.free] = True
+        free[self.constraint_map.free] = True
         return plate_axes(self.points, free) is not None
 
     @cached_property
@@ -155,10 +121,9 @@ class ConstrainedSystem:
 
     def _assembled(self, split: bool = False) -> Any:
         skipped: set[str] = set()
+        assemble: Callable[..., Any] = assemble_stiffness
         if split:
             from kratos_lite.solvers.dilatation import assemble  # a quick start for small models
-        else:
-            assemble = assemble_stiffness
         K = assemble(self.points, self.groups, self.pattern, self.progress, skipped)
         self.skipped += sorted(skipped)
         return K
@@ -170,13 +135,13 @@ class ConstrainedSystem:
 
     @cached_property
     def _equations(self) -> LinearSolver:
-        return LinearSolver(self.K, self.reduced, self.points, self.plan, self._linear_level)
+        return LinearSolver(self.K, self.constraint_map, self.points, self.plan, self._p_coarse_level)
 
-    def _linear_level(self) -> LinearLevel | None:
-        from kratos_lite.solvers.coarse_level import linear_level  # a quick start for small models
+    def _p_coarse_level(self) -> PCoarseLevel | None:
+        from kratos_lite.solvers.coarse_level import p_coarse_level  # a quick start for small models
 
         groups = getattr(self.K, "groups", self.groups)  # those of a split matrix have other materials
-        return linear_level(self.points, groups, self._hanging)
+        return p_coarse_level(self.points, groups, self._hanging)
 
     def solve(
         self,
@@ -185,20 +150,7 @@ class ConstrainedSystem:
         tolerance: float | None = None,
         start: Array | None = None,
     ) -> tuple[Array, Solution]:
-        """Return the displacements (n, 3) under nodal forces (n, 3), and how they were found.
-
-        Parameters
-        ----------
-        forces : (n, 3) N.
-        prescribed : (3a,) m, in place of c of the constraint map.
-        tolerance : in place of that of the system.
-        start : (n, 3) m, near the solution; an iteration begins there.
-
-        Raises
-        ------
-        SolveError
-            If the matrix is singular or the accuracy asked for cannot be reached.
-        """
+        """Return the displacements (n, 3) under nodal forces (n, 3), and the Solution."""
         tolerance = self.tolerance if tolerance is None else tolerance
         near = None if start is None else self.gather(start)
         solution = self._equations.solve(self.gather(forces), tolerance, self.progress, prescribed, near)
@@ -219,11 +171,11 @@ class ConstrainedSystem:
 
     def reduce(self, forces: Array) -> Array:
         """Return what nodal forces (n, 3) do on the free degrees of freedom, (q,)."""
-        return self.reduced.reduce(self.gather(forces))
+        return self.constraint_map.reduce(self.gather(forces))
 
     def expand(self, q: Array) -> Array:
         """Return the displacements (n, 3) of the free degrees of freedom (q,)."""
-        return self.scatter(self.reduced.expand(q))
+        return self.scatter(self.constraint_map.expand(q))
 
     def gather(self, values: Array) -> Array:
         """Return nodal values (n, 3) as those of the equations, (3a,)."""
@@ -267,7 +219,7 @@ def renumber(n_nodes: int, groups: Sequence[ElementGroup]) -> tuple[Ints, list[E
     return nodes, [replace(group, nodes=local[group.nodes]) for group in groups]
 
 
-def among(groups: Sequence[ElementGroup], moving: NDArray[np.bool_]) -> list[ElementGroup]:
+def select(groups: Sequence[ElementGroup], moving: NDArray[np.bool_]) -> list[ElementGroup]:
     """Return the elements that have a node in `moving` (n,), group by group."""
     if moving.all():
         return list(groups)

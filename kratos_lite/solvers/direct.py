@@ -30,20 +30,7 @@ class Unsuitable(Exception):
 
 
 class Factorization:
-    """A factorized matrix A.
-
-    Attributes
-    ----------
-    method : ``dense``, ``pardiso`` or ``superlu``.
-    A : the matrix, for one step of iterative refinement.
-    apply : function of b that returns x without refinement.
-
-    Examples
-    --------
-    >>> factors = factorize_dense(np.array([[2.0, 0.0], [0.0, 4.0]]))
-    >>> factors.method, factors.solve(np.array([1.0, 1.0]))
-    ('dense', array([0.5 , 0.25]))
-    """
+    """A factorized matrix A, by ``dense``, ``pardiso`` or ``superlu``; `apply` solves without refinement."""
 
     def __init__(self, method: str, A: Any, apply: Callable[[Array], Array]) -> None:
         self.method, self.A, self.apply = method, A, apply
@@ -58,13 +45,7 @@ class Factorization:
 
 
 def factorize_dense(A: Array) -> Factorization:
-    """Return a full matrix (n, n) factorized: its inverse, as NumPy alone keeps no other factors.
-
-    Raises
-    ------
-    SolveError
-        If the matrix is singular.
-    """
+    """Return a full matrix (n, n) factorized: its inverse, as NumPy keeps no other factors."""
     try:
         inverse = np.linalg.inv(A)
     except np.linalg.LinAlgError:
@@ -73,18 +54,7 @@ def factorize_dense(A: Array) -> Factorization:
 
 
 def factorize(A: csr_array, symmetric: bool = True) -> Factorization:
-    """Return a sparse matrix (n, n) factorized, by the fastest of `BACKENDS` that does.
-
-    Parameters
-    ----------
-    A : the matrix.
-    symmetric : whether A is symmetric positive definite.
-
-    Raises
-    ------
-    SolveError
-        If the matrix is singular, or its factors do not fit into memory.
-    """
+    """Return a sparse matrix (n, n) factorized, by the fastest of `BACKENDS` that does."""
     for backend in BACKENDS:
         try:
             return Factorization(backend.__name__, A, backend(A, symmetric))

@@ -12,57 +12,38 @@ import numpy as np
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.solvers import direct
 from kratos_lite.solvers.constraint_map import ConstraintMap
-from kratos_lite.solvers.plan import METHODS as METHODS  # noqa: PLC0414
 from kratos_lite.solvers.plan import Plan, after, is_quick_to_factorize, tolerance_of
 from kratos_lite.typing import Array, Ints, Mask, Progress
 
 if TYPE_CHECKING:
-    from kratos_lite.solvers.coarse_level import LinearLevel
+    from kratos_lite.solvers.coarse_level import PCoarseLevel
     from kratos_lite.solvers.multigrid import Solver
 
 
 @dataclass(frozen=True)
 class Solution:
-    """The solution of A x = b and how it was found.
+    """The solution of A x = b and how it was computed."""
 
-    Attributes
-    ----------
-    x : (n,) float.
-    method, reason : ``dense``, ``direct``, ``amg`` or ``displacement-pressure``, and why.
-    iterations : 0 for a factorization.
-    backward_error : |b - A x| / (|A| |x| + |b|) in the maximum norm.
-    """
-
-    x: Array
-    method: str
+    x: Array  # (n,) float
+    method: str  # ``dense``, ``direct``, ``amg`` or ``displacement-pressure``, and why
     reason: str
-    iterations: int
-    backward_error: float
+    iterations: int  # 0 for a factorization
+    backward_error: float  # |b - A x| / (|A| |x| + |b|) in the maximum norm
 
 
 @dataclass(eq=False)
 class LinearSolver:
     """K u = f + reactions with u = T q + c, solved as T^T K T q = T^T (f - K c).
 
-    Attributes
-    ----------
-    K : full array for the method ``dense``, split for ``displacement-pressure``, else blocks or a product;
-        (3n, 3n) in N/m.
-    reduced : the supports.
-    points : (n, 3) m, from which multigrid knows the rigid modes.
-    plan : how it is solved.
-    linear_level : makes the linear elements within quadratic ones, for multigrid.
-    symmetric : whether K is symmetric positive definite; otherwise the method is ``dense`` or ``direct``.
-
     What a method prepares (the reduced matrix, its factors, the multigrid hierarchy) is made once and kept.
     """
 
-    K: Any
-    reduced: ConstraintMap
-    points: Array
-    plan: Plan
-    linear_level: Callable[[], LinearLevel | None] | None = None
-    symmetric: bool = True
+    K: Any  # full for ``dense``, split for ``displacement-pressure``, else blocks or a product; (3n, 3n) N/m
+    constraint_map: ConstraintMap  # the supports
+    points: Array  # (n, 3) m, from which multigrid knows the rigid modes
+    plan: Plan  # how it is solved
+    p_coarse_level: Callable[[], PCoarseLevel | None] | None = None
+    symmetric: bool = True  # positive definite, too; otherwise the plan is ``dense`` or ``direct``
 
     def solve(
         self,
@@ -76,22 +57,17 @@ class LinearSolver:
 
         `prescribed` displacements (3n,) take the place of c of the constraint map.  An iteration begins at
         `start` (3n,), of which the free components count, if that is nearer than 0.
-
-        Raises
-        ------
-        SolveError
-            If the matrix is singular, or the iteration stalls where no factorization fits.
         """
-        c = self.reduced.c if prescribed is None else prescribed
-        b = self.reduced.reduce(f - self.K @ c)
+        c = self.constraint_map.c if prescribed is None else prescribed
+        b = self.constraint_map.reduce(f - self.K @ c)
         tolerance *= self._fraction(f, c, b)
         if start is not None and self.plan.iterates:
-            start = self.reduced.expand((start - c)[self.reduced.free], c)
-            residual, size = self.reduced.reduce(f - self.K @ start), float(np.linalg.norm(b))
+            start = self.constraint_map.expand((start - c)[self.constraint_map.free], c)
+            residual, size = self.constraint_map.reduce(f - self.K @ start), float(np.linalg.norm(b))
             if np.linalg.norm(residual) <= size:
                 return self._continue(f, start, residual, size, tolerance, progress)
         solution = self._solve(b, tolerance, progress) if len(b) else self._solution(b, 0, 0.0)
-        return replace(solution, x=self.reduced.expand(solution.x, c))
+        return replace(solution, x=self.constraint_map.expand(solution.x, c))
 
     def _solution(self, x: Array, iterations: int, error: float, plan: Plan | None = None) -> Solution:
         plan = self.plan if plan is None else plan
@@ -101,12 +77,12 @@ class LinearSolver:
         """Return the fraction of |b| that tolerances refer to.
 
         Where prescribed displacements of nearly incompressible bodies are large forces in K, these are no
-        measure of what has to be in equilibrium: the bulk modulus is left out.
+        measure of what has to be in equilibrium: the bulk modulus does not count.
         """
         soft = getattr(self.K, "A", None)
         if soft is None or not c.any():
             return 1.0
-        size = float(np.linalg.norm(self.reduced.reduce(f - soft @ c)))
+        size = float(np.linalg.norm(self.constraint_map.reduce(f - soft @ c)))
         return min(1.0, size / (float(np.linalg.norm(b)) or 1.0))
 
     def _continue(
@@ -125,8 +101,8 @@ class LinearSolver:
             change = self._solve(residual, aim / norm, progress, continued=True)
         else:
             change = self._solution(np.zeros(len(residual)), 0, 0.0)
-        u = self.reduced.expand(change.x, start)
-        error = backward_error(self.reduced.reduce(f - self.K @ u), self.norm, u, f)
+        u = self.constraint_map.expand(change.x, start)
+        error = backward_error(self.constraint_map.reduce(f - self.K @ u), self.norm, u, f)
         return replace(change, x=u, backward_error=error)
 
     def _solve(
@@ -152,9 +128,9 @@ class LinearSolver:
     @cached_property
     def _matrix(self) -> Any:
         """The reduced matrix: a full array for the method ``dense``, else CSR."""
-        T, free = self.reduced.T, self.reduced.free
+        T, free = self.constraint_map.T, self.constraint_map.free
         if self.plan.method != "dense":
-            return self.reduced.reduce_matrix(self.K.scipy().tocsr())
+            return self.constraint_map.reduce_matrix(self.K.scipy().tocsr())
         return self.K[np.ix_(free, free)] if T is None else T.T @ self.K @ T
 
     @cached_property
@@ -170,7 +146,7 @@ class LinearSolver:
 
         It is a BlockMatrix, a MatrixFree or a SplitMatrix, as K is.
         """
-        T, free = self.reduced.T, self.reduced.free
+        T, free = self.constraint_map.T, self.constraint_map.free
         if T is None:
             return self.K
         if isinstance(self.K, BlockMatrix):
@@ -180,17 +156,17 @@ class LinearSolver:
 
     @cached_property
     def _free(self) -> Mask:
-        free = np.zeros(len(self.reduced.c), dtype=bool)
-        free[self.reduced.free] = True
+        free = np.zeros(len(self.constraint_map.c), dtype=bool)
+        free[self.constraint_map.free] = True
         return free
 
     @cached_property
     def _multigrid(self) -> Solver:
-        linear, matrix = self.linear_level() if self.linear_level else None, self._blocks
-        if linear is not None and self.reduced.T is not None:
-            from kratos_lite.solvers.coarse_level import tied  # rarely needed
+        linear, matrix = self.p_coarse_level() if self.p_coarse_level else None, self._blocks
+        if linear is not None and self.constraint_map.T is not None:
+            from kratos_lite.solvers.coarse_level import apply_ties  # rarely needed
 
-            linear = tied(linear, self.reduced.T, self.reduced.free)
+            linear = apply_ties(linear, self.constraint_map.T, self.constraint_map.free)
         if self.plan.method == "amg":
             from kratos_lite.solvers.multigrid import multigrid  # a quick start for small models
 
@@ -214,7 +190,7 @@ class LinearSolver:
         """Solve by multigrid; return also how it is solved, in another way if that did not converge."""
         from kratos_lite.solvers.iteration import ConvergenceForecast  # as for multigrid
 
-        free, rhs = self.reduced.free, np.zeros(len(self._free))
+        free, rhs = self.constraint_map.free, np.zeros(len(self._free))
         rhs[free] = b
         aim = tolerance if continued else tolerance_of(tolerance, len(b))
         forecast = ConvergenceForecast(tolerance) if is_quick_to_factorize(len(b)) else None
@@ -229,9 +205,7 @@ class LinearSolver:
 def constrained(K: BlockMatrix, T: Any, free: Ints) -> BlockMatrix:
     """Return T^T K T in the numbering of all components, in 3x3 blocks; u = T q with q = u[free]."""
     full = on_all(T, free)
-    A = (full.T @ K.scipy().tocsr() @ full).tobsr((3, 3))
-    A.sort_indices()
-    return BlockMatrix(np.ascontiguousarray(A.data), A.indices.astype(np.int32), A.indptr.astype(np.int32))
+    return BlockMatrix.of(full.T @ K.scipy().tocsr() @ full)
 
 
 def on_all(T: Any, free: Ints) -> Any:

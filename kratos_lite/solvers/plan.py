@@ -47,18 +47,11 @@ REQUESTED = "requested"
 
 @dataclass(frozen=True)
 class Plan:
-    """How a system is solved, and why.
+    """How a system is solved, and why."""
 
-    Attributes
-    ----------
-    method : ``dense``, ``direct``, ``amg``, ``displacement-pressure``; of bands ``band`` or ``sparse``.
-    reason : in words.
-    matrix_free : whether products with K are enough, so that it is not assembled.
-    """
-
-    method: str
-    reason: str = ""
-    matrix_free: bool = False
+    method: str  # ``dense``, ``direct``, ``amg``, ``displacement-pressure``; of bands ``band`` or ``sparse``
+    reason: str = ""  # in words
+    matrix_free: bool = False  # whether products with K are enough, so that it is not assembled
 
     @property
     def iterates(self) -> bool:
@@ -68,46 +61,24 @@ class Plan:
 
 @dataclass(frozen=True)
 class Facts:
-    """Facts of a system; those that take time to find are functions, called where the choice depends on them.
+    """Facts of a system; those that take time to find are functions, called where a choice needs them."""
 
-    Attributes
-    ----------
-    unknowns, dofs : free degrees of freedom, and all.
-    symmetric : whether the matrix is symmetric positive definite.
-    compiled : whether there are kernels of multigrid.
-    bulk_over_shear : largest ratio of elements that can have pressures of their own, and of plain ones.
-    bandwidth : of the unknowns in the order of Cuthill and McKee.
-    has_product : whether kernels multiply with K, and nodes are not tied.
-    contrast : largest modulus of the stiffest material to that of the softest.
-    is_stretched : whether many cells are long or flat, or some extremely.
-    is_plate : whether the body is thin and flat, and free to bend.
-    """
-
-    unknowns: int
-    dofs: int = 0
-    symmetric: bool = True
+    unknowns: int  # free degrees of freedom
+    dofs: int = 0  # all degrees of freedom
+    symmetric: bool = True  # whether the matrix is symmetric positive definite
+    # whether there are kernels of multigrid
     compiled: Callable[[], bool] = lambda: kernels("multigrid") is not None
+    # largest ratio among elements that can have pressures of their own, and among plain ones
     bulk_over_shear: Callable[[], tuple[float, float]] = lambda: (0.0, 0.0)
-    bandwidth: Callable[[], float] = lambda: 0.0
-    has_product: Callable[[], bool] = lambda: False
-    contrast: Callable[[], float] = lambda: 1.0
-    is_stretched: Callable[[], bool] = lambda: False
-    is_plate: Callable[[], bool] = lambda: False
+    bandwidth: Callable[[], float] = lambda: 0.0  # of the unknowns in the order of Cuthill and McKee
+    has_product: Callable[[], bool] = lambda: False  # whether kernels multiply with K, and no nodes are tied
+    contrast: Callable[[], float] = lambda: 1.0  # largest to smallest modulus of materials
+    is_stretched: Callable[[], bool] = lambda: False  # whether many cells are long or flat, or some extremely
+    is_plate: Callable[[], bool] = lambda: False  # whether the body is thin and flat, and free to bend
 
 
 def choose(solver: str, facts: Facts) -> Plan:
-    """Return how to solve a system.
-
-    Raises
-    ------
-    InputError
-        If there is no such solver, or it would need too large a matrix.
-
-    Examples
-    --------
-    >>> choose("auto", Facts(24)).method
-    'dense'
-    """
+    """Return how to solve a system."""
     plan = _by_size(facts) if choice(solver, "solver", METHODS) == "auto" else Plan(solver, REQUESTED)
     if plan.method == "dense" and facts.dofs > DENSE_MAX:
         raise InputError(f"solver='dense' is for up to {DENSE_MAX} degrees of freedom; got {facts.dofs}")
@@ -171,13 +142,7 @@ def tolerance_of(tolerance: float, unknowns: int) -> float:
 
 
 def after(iterations: int, tolerance: float, unknowns: int, slow: bool) -> Plan:
-    """Return how to solve a system instead whose iterations did not converge, or were too `slow`.
-
-    Raises
-    ------
-    SolveError
-        If there are too many unknowns for a factorization.
-    """
+    """Return how to solve a system instead whose iterations did not converge, or were too `slow`."""
     why = f"multigrid stopped after {iterations} iterations short of {tolerance:g}"
     if slow:
         why += f", at a rate that takes more than {PATIENCE}: a factorization is faster"
@@ -216,19 +181,7 @@ def of_band(unknowns: int, width: int, height: int) -> Plan:
 
 
 def over_ranks(solver: str, facts: Facts, mumps: bool, options: bool) -> Plan:
-    """Return how PETSc solves a system over ranks: ``direct`` or ``amg``.
-
-    Parameters
-    ----------
-    solver, facts : see `choose`; the facts are those of all ranks.
-    mumps : whether PETSc can factorize by MUMPS.
-    options : whether the user's options say which method PETSc takes.
-
-    Examples
-    --------
-    >>> [over_ranks(solver, Facts(1000), True, False).method for solver in ("auto", "dense", "amg")]
-    ['direct', 'direct', 'amg']
-    """
+    """Return how PETSc solves a system over ranks: ``direct`` or ``amg``."""
     if choice(solver, "solver", METHODS) != "auto":
         return Plan("direct" if solver == "dense" else solver, REQUESTED)
     if options:

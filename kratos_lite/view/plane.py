@@ -43,18 +43,11 @@ CUT_TETRAHEDRA: Corners = {
 
 @dataclass(frozen=True, eq=False)
 class Plane:
-    """The plane n·X = offset of the undeformed body; what lies on one side is taken away.
+    """The plane n·X = offset of the undeformed body; what lies on one side is taken away."""
 
-    Attributes
-    ----------
-    normal : (3,) unit vector.
-    offset : m.
-    side : 1 if n·X > offset is taken away, else -1.
-    """
-
-    normal: Array
-    offset: float
-    side: float
+    normal: Array  # (3,) unit vector
+    offset: float  # m
+    side: float  # 1 if n·X > offset is taken away, else -1
 
     def distance(self, X: Array) -> Array:
         """Return how far points (n, 3) lie beyond the plane, (n,) m."""

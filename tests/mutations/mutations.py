@@ -32,6 +32,7 @@ MASS = "tests/assembly/test_exact_mass.py"
 QUANTITIES = "tests/analysis/test_quantities.py"
 PRESTRESS = "tests/io/kratos/test_initial_state.py -k prestress"
 VOIGT = "tests/test_voigt.py"
+FIELDS = "tests/analysis/test_fields.py"
 LINES = "tests/analysis/test_line_values.py"
 COMPARED = "tests/analysis/test_comparison.py"
 
@@ -576,6 +577,11 @@ MUTATIONS = [
     Mutation("voigt.py", "np.sin(angle + np.pi / 3)", "np.sin(angle + np.pi / 6)", VOIGT),
     Mutation("voigt.py", "r * (yz * zx - dz * xy)", "r * (yz * zx + dz * xy)", VOIGT),
     Mutation("voigt.py", "dy * dy + xy * xy + yz * yz", "dy * dy + xy * xy + zx * zx", VOIGT),
+    Mutation(
+        "analysis/fields.py", "(strain * stress).sum(axis=-1) / 2", "(strain * stress).sum(axis=-1)", FIELDS
+    ),
+    Mutation("analysis/integration_point_values.py", "volume.sum(axis=1, keepdims=True)", "volume", FIELDS),
+    Mutation("analysis/element_fields.py", "self.without_prestress.stress", "self.stress", FIELDS),
     Mutation("analysis/line_values.py", "6 * (0.5 - t)", "3 * (0.5 - t)", LINES),
     Mutation("analysis/line_values.py", "half * weights", "weights / len(half) / 2", LINES),
     Mutation("mesh/crossings.py", "np.diff(t) > SHORT", "np.diff(t) > 1e-3", "tests/mesh/test_crossings.py"),

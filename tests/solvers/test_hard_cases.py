@@ -167,7 +167,7 @@ def test_lines_of_a_plate_interpolate_constant_curvature(element):
     groups = kl.Model(mesh, STEEL).element_groups()
     lines = np.unique(np.round(mesh.points[:, :2], 9), axis=0, return_inverse=True)[1].ravel()
     axes = plate_axes(points, free)
-    level = plate_level(points, free, axes, lines, coarse_level.linear_level(points, groups))
+    level = plate_level(points, free, axes, lines, coarse_level.p_coarse_level(points, groups))
     nodes = np.repeat(np.arange(len(points)), np.diff(level.indptr))
     found = np.zeros((len(points), 3, 9))
     modes = level.modes.reshape(-1, 6, 12)[level.indices, :, :9]
@@ -215,7 +215,7 @@ def test_modes_of_a_shell_hold_its_rigid_motions():
     points, groups = model.mesh.points, model.element_groups()
     flat = kl.box((1.5, 1.0, 0.01), (12, 12, 1), "KinematicLinear3D20N").points
     lines = np.unique(np.round(flat[:, :2], 9), axis=0, return_inverse=True)[1].ravel()
-    linear = coarse_level.linear_level(points, groups)
+    linear = coarse_level.p_coarse_level(points, groups)
     level = plate_level(points, np.ones(points.size, dtype=bool), None, lines, linear)
     own = level.indptr[linear.nodes]  # each corner belongs to one line
     modes = level.modes.reshape(-1, 6, 12)[level.indices[own], :, :6]
@@ -235,7 +235,7 @@ def test_lines_that_are_no_shell_are_left(case):
         lines = np.arange(len(mesh.points))
     free = np.ones((len(mesh.points), 3), dtype=bool)
     free[:, 2] = case != "plane strain"
-    linear = coarse_level.linear_level(mesh.points, kl.Model(mesh, STEEL).element_groups())
+    linear = coarse_level.p_coarse_level(mesh.points, kl.Model(mesh, STEEL).element_groups())
     assert plate_level(mesh.points, free.ravel(), None, lines, linear) is None
 
 
@@ -299,8 +299,8 @@ def hierarchy(model):
     module = kernels("multigrid")
     system = ConstrainedSystem(model.mesh.points, model.element_groups(), model.supports.constraint_map)
     free = np.zeros(3 * len(system.points), dtype=bool)
-    free[system.reduced.free] = True
-    linear = coarse_level.linear_level(system.points, system.groups)
+    free[system.constraint_map.free] = True
+    linear = coarse_level.p_coarse_level(system.points, system.groups)
     b = np.random.default_rng(1).standard_normal(len(free)) * free
     return Compiled(module, system.K, free, system.points, linear), b
 

@@ -52,7 +52,7 @@ def write_modes(
     check_modes(path)
     instance(mesh, "the mesh of modes", Mesh, "model.mesh")
     forms = _numbers(shapes, "shapes of modes", ("k", mesh.n_nodes, 3))
-    found = _numbers(values, "values of modes, one for each shape,", (len(forms),))
+    numbers = _numbers(values, "values of modes, one for each shape,", (len(forms),))
     if not len(forms):
         raise InputError(f"{path}: not written: there are no modes")
     if path.suffix.lower() == ".pvd":
@@ -60,7 +60,7 @@ def write_modes(
         return
     from kratos_lite.io.writers.page.write import write_modes_page  # rarely needed
 
-    write_modes_page(path, mesh, names_of_modes(found.tolist()), forms)
+    write_modes_page(path, mesh, names_of_modes(numbers.tolist()), forms)
 
 
 def _numbers(value: ArrayLike, what: str, shape: tuple[int | str, ...]) -> Array | Complexes:

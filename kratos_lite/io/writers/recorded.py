@@ -174,5 +174,5 @@ def check_single(body: Body, path: str | Path) -> None:
 
 def arrays_of(subject: Recorded, states: Sequence[Any]) -> dict[str, Array]:
     """Return the numbers of states as arrays, one row for each state."""
-    found = {name: np.array([getattr(state, name) for state in states]) for name in subject.names}
-    return {**subject.extra(), **found}
+    arrays = {name: np.array([getattr(state, name) for state in states]) for name in subject.names}
+    return {**subject.extra(), **arrays}

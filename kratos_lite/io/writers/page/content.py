@@ -34,40 +34,24 @@ QUANTUM = 30_000
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """One state or mode of a page.
+    """One state or mode of a page."""
 
-    Attributes
-    ----------
-    name : such as ``t = 0.1 s``.
-    values : of each field, displacements first: (n,), (n, 3), (n, 6), or those of elements.
-    """
-
-    name: str
-    values: Sequence[Array]
+    name: str  # such as ``t = 0.1 s``
+    values: Sequence[Array]  # of each field, displacements first: (n,), (n, 3), (n, 6), or those of elements
 
 
 @dataclass(frozen=True, eq=False)
 class Content:
-    """All that a page shows.
+    """All that a page shows."""
 
-    Attributes
-    ----------
-    title : heading.
-    kind : ``result``, ``modes`` or ``states``; animated are the deformation, its oscillation, the states.
-    mesh : with a surface.
-    fields : the first is the displacement.
-    frames : states or modes; one of a result.
-    shown : number of the field and component at the start, as ``1:von Mises``.
-    about : labels and texts of the summary.
-    """
-
-    title: str
+    title: str  # heading
+    # ``result``, ``modes`` or ``states``; animated are the deformation, its oscillation, the states
     kind: str
-    mesh: Mesh
-    fields: Sequence[Field]
-    frames: Sequence[Frame]
-    shown: str = "0:magnitude"
-    about: Sequence[tuple[str, str]] = ()
+    mesh: Mesh  # with a surface
+    fields: Sequence[Field]  # the first is the displacement
+    frames: Sequence[Frame]  # states or modes; one of a result
+    shown: str = "0:magnitude"  # number of the field and component at the start, as ``1:von Mises``
+    about: Sequence[tuple[str, str]] = ()  # labels and texts of the summary
 
     def packed(self) -> str:
         """Return all of it as one text."""
