@@ -536,6 +536,12 @@ MUTATIONS = [
     ),
     Mutation("native/stiffness.cpp", "- (i == j) * k / 2;", "- (i == j) * k;", CONDENSED),
     Mutation(
+        "assembly/gauss_point_fields.py",
+        "return forces + element.internal_force(stress, C)",
+        "return forces - element.internal_force(stress, C)",
+        "tests/elements/test_custom_elements.py -k prestress",
+    ),
+    Mutation(
         "elements/custom.py",
         "return frozenset(custom & set(CUSTOM))",
         "return frozenset()",
