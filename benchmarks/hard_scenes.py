@@ -7,7 +7,6 @@ between nodes, and tetrahedra without any order: bodies under their weight, each
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from pathlib import Path
 
 import numpy as np
 
@@ -166,24 +165,19 @@ def _scene(name: str) -> Callable[[str, int], Scene]:
 
 
 HARD = {name: _scene(name) for name in MAKERS}
-"""Every scene of this module by name."""
 
 
-def write_system(scene: Scene, path: Path) -> None:
-    """Write the matrix of the free components of a scene in 3 × 3 blocks, its load, and its nodes."""
+def system(scene: Scene) -> dict[str, Array]:
+    """Return the matrix of the free components of a scene in 3 × 3 blocks, its load, and its nodes."""
     model = scene.model
     constraints = model.supports.constraint_map
     system = ConstrainedSystem(model.mesh.points, model.element_groups(), constraints, solver="direct")
     free, K = system.reduced.free.reshape(-1, 3), system.K
-    assert (free == 3 * (free[:, :1] // 3) + np.arange(3)).all(), "a node is held along some axes alone"
-    load = system.gather(scene.forces()) - K @ system.reduced.c
+    assert (free == 3 * (free[:, :1] // 3) + np.arange(3)).all(), (
+        "a node is constrained along some axes alone"
+    )
+    load = system.reduced.reduce(system.gather(scene.forces()) - K @ system.reduced.c)
     A = system.reduced.reduce_matrix(K.scipy().tocsr()).tobsr((3, 3))
     A.sort_indices()
-    np.savez(
-        path,
-        data=A.data,
-        indices=A.indices,
-        indptr=A.indptr,
-        load=system.reduced.reduce(load),
-        points=system.points[free[:, 0] // 3],
-    )
+    arrays = {"data": A.data, "indices": A.indices, "indptr": A.indptr}
+    return arrays | {"load": load, "points": system.points[free[:, 0] // 3]}

@@ -7,17 +7,15 @@ Python 2.7 and a build of its own, so it does not take turns with us.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from time import perf_counter
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 MANY = 10_000
 
 
-@dataclass(frozen=True)
-class Motion:
+class Motion(NamedTuple):
     """A body, or many, and how it moves.
 
     Attributes
@@ -26,7 +24,6 @@ class Motion:
     make : gives the body, or a list of bodies, from the library.
     dt, steps, every : as `integrate` takes them.
     bodies : number of bodies, by which the time is divided.
-    solfec : seconds per step of Solfec-1.0, from and to.
     """
 
     what: str
@@ -35,7 +32,6 @@ class Motion:
     steps: int
     every: int = 1
     bodies: int = 1
-    solfec: tuple[float, ...] = field(default=())
 
 
 def top(kl: Any) -> Any:
@@ -95,84 +91,25 @@ def many(make: Callable[[Any], Any]) -> Callable[[Any], Sequence[Any]]:
     return lambda kl: [make(kl) for _ in range(MANY)]
 
 
+TL, BC, LONG = "total_lagrangian", "corotational", 200_000
+PYTHON, CHUNK = "torque by a Python function", "a state every 1000 steps"
 MOTIONS = {
-    "rigid": Motion("rigid body, free, a state every step", top, 1e-3, 5000, solfec=(7e-6, 9e-6)),
-    "rigid_chunk": Motion(
-        "the same, a state every 1000 steps", top, 1e-3, 200_000, 1000, solfec=(7e-6, 9e-6)
-    ),
-    "rigid_callback": Motion(
-        "rigid heavy top, RIG_NEG, torque by a Python function",
-        heavy_top("RIG_NEG"),
-        1e-3,
-        5000,
-        solfec=(7e-6, 9e-6),
-    ),
-    "rigid_implicit": Motion(
-        "rigid heavy top, RIG_IMP, torque by a Python function",
-        heavy_top("RIG_IMP"),
-        1e-3,
-        5000,
-        solfec=(12e-6, 12e-6),
-    ),
-    "pseudo_lim": Motion(
-        "pseudo-rigid box, DEF_LIM, a state every step",
-        soft_box("DEF_LIM"),
-        1e-3,
-        5000,
-        solfec=(4.8e-6, 4.8e-6),
-    ),
-    "pseudo_lim_chunk": Motion(
-        "the same, a state every 1000 steps",
-        soft_box("DEF_LIM"),
-        1e-3,
-        200_000,
-        1000,
-        solfec=(4.8e-6, 4.8e-6),
-    ),
-    "pseudo_exp_chunk": Motion(
-        "pseudo-rigid box, DEF_EXP, a state every 1000 steps",
-        soft_box("DEF_EXP"),
-        1e-3,
-        200_000,
-        1000,
-        solfec=(57e-6, 57e-6),
-    ),
+    "rigid": Motion("rigid body, free, a state every step", top, 1e-3, 5000),
+    "rigid_chunk": Motion(f"the same, {CHUNK}", top, 1e-3, LONG, 1000),
+    "rigid_callback": Motion(f"rigid heavy top, RIG_NEG, {PYTHON}", heavy_top("RIG_NEG"), 1e-3, 5000),
+    "rigid_implicit": Motion(f"rigid heavy top, RIG_IMP, {PYTHON}", heavy_top("RIG_IMP"), 1e-3, 5000),
+    "pseudo_lim": Motion("pseudo-rigid box, DEF_LIM, a state every step", soft_box("DEF_LIM"), 1e-3, 5000),
+    "pseudo_lim_chunk": Motion(f"the same, {CHUNK}", soft_box("DEF_LIM"), 1e-3, LONG, 1000),
+    "pseudo_exp_chunk": Motion(f"pseudo-rigid box, DEF_EXP, {CHUNK}", soft_box("DEF_EXP"), 1e-3, LONG, 1000),
     "pseudo_em_chunk": Motion(
-        "pseudo-rigid box, ENERGY_MOMENTUM, a state every 1000 steps",
-        soft_box("ENERGY_MOMENTUM"),
-        1e-3,
-        100_000,
-        1000,
+        f"pseudo-rigid box, ENERGY_MOMENTUM, {CHUNK}", soft_box("ENERGY_MOMENTUM"), 1e-3, LONG // 2, 1000
     ),
-    "bar_tl": Motion(
-        "bar of 567 dofs, TL, DEF_LIM",
-        bar("total_lagrangian", "DEF_LIM"),
-        1 / 256,
-        256,
-        solfec=(2.0e-3, 2.2e-3),
-    ),
-    "bar_bc": Motion(
-        "bar of 567 dofs, BC, DEF_LIM",
-        bar("corotational", "DEF_LIM"),
-        1 / 256,
-        512,
-        solfec=(0.31e-3, 0.45e-3),
-    ),
-    "bar_exp": Motion(
-        "bar of 567 dofs, TL, DEF_EXP",
-        bar("total_lagrangian", "DEF_EXP"),
-        1e-3,
-        512,
-        solfec=(0.99e-3, 0.99e-3),
-    ),
-    "bar_em": Motion(
-        "bar of 567 dofs, TL, ENERGY_MOMENTUM", bar("total_lagrangian", "ENERGY_MOMENTUM"), 1 / 256, 256
-    ),
+    "bar_tl": Motion("bar of 567 dofs, TL, DEF_LIM", bar(TL, "DEF_LIM"), 1 / 256, 256),
+    "bar_bc": Motion("bar of 567 dofs, BC, DEF_LIM", bar(BC, "DEF_LIM"), 1 / 256, 512),
+    "bar_exp": Motion("bar of 567 dofs, TL, DEF_EXP", bar(TL, "DEF_EXP"), 1e-3, 512),
+    "bar_em": Motion("bar of 567 dofs, TL, ENERGY_MOMENTUM", bar(TL, "ENERGY_MOMENTUM"), 1 / 256, 256),
     "bar_consistent": Motion(
-        "bar of 567 dofs, TL, DEF_LIM, consistent mass",
-        bar("total_lagrangian", "DEF_LIM", lumped=False),
-        1 / 256,
-        256,
+        "bar of 567 dofs, TL, DEF_LIM, consistent mass", bar(TL, "DEF_LIM", lumped=False), 1 / 256, 256
     ),
     "many_rigid": Motion("10,000 rigid bodies, RIG_NEG, a state every step", many(top), 1e-3, 100, 1, MANY),
     "many_rigid_chunk": Motion(
@@ -188,6 +125,16 @@ MOTIONS = {
     ),
 }
 """Every motion that is timed, by its name."""
+SOLFEC = {
+    **dict.fromkeys(("rigid", "rigid_chunk", "rigid_callback"), (7e-6, 9e-6)),
+    "rigid_implicit": (12e-6, 12e-6),
+    **dict.fromkeys(("pseudo_lim", "pseudo_lim_chunk"), (4.8e-6, 4.8e-6)),
+    "pseudo_exp_chunk": (57e-6, 57e-6),
+    "bar_tl": (2.0e-3, 2.2e-3),
+    "bar_bc": (0.31e-3, 0.45e-3),
+    "bar_exp": (0.99e-3, 0.99e-3),
+}
+"""Seconds per step of Solfec-1.0, from and to."""
 SLOW = 50
 """Of the steps, those that NumPy alone is given."""
 

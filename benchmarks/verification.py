@@ -108,7 +108,7 @@ def solved(program: str, python: str, jobs: list[dict[str, str]], folder: Path) 
     """Let a program do its jobs; return its version, or "" where it is absent."""
     path = folder / f"{PROGRAMS[program].module}.json"
     path.write_text(json.dumps(jobs))
-    words = [python, "-m", "benchmarks.programs.batch", PROGRAMS[program].module, str(path)]
+    words = [python, "-m", "benchmarks.programs", PROGRAMS[program].module, str(path)]
     variables = os.environ | {"PYTHONPATH": str(ROOT)} | PROGRAMS[program].environment
     with (folder / f"{PROGRAMS[program].module}.log").open("w") as log:
         subprocess.run(words, env=variables, cwd=folder, check=True, stdout=log, stderr=subprocess.STDOUT)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.programs.common import Array, Job, run
+from benchmarks.programs.common import Array, Job
 
 ELEMENTS = {"4N": "C3D4", "6N": "C3D6", "8N": "C3D8", "10N": "C3D10", "15N": "C3D15", "20N": "C3D20"}
 ELEMENTS["20N reduced"] = "C3D20R"
@@ -85,7 +85,3 @@ def displacements(job: Job, path: Path) -> Array:
     u = np.zeros_like(job.points)
     u[table[:, 0].astype(int) - 1] = table[:, 1:]
     return u
-
-
-if __name__ == "__main__":
-    run(work)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.programs import linear
-from benchmarks.programs.common import Array, Job, run
+from benchmarks.programs.common import Array, Job
 
 AXES = "XYZ"
 SOLVERS = {
@@ -157,7 +157,3 @@ def write(job: Job, KM: Any, part: Any) -> None:
         "gauss_point_variables_extrapolated_to_nodes": ["CAUCHY_STRESS_VECTOR", "VON_MISES_STRESS"],
     }
     KM.VtkOutput(part, KM.Parameters(json.dumps(settings))).PrintOutput()
-
-
-if __name__ == "__main__":
-    run(work)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.programs.common import Array, Job, run
+from benchmarks.programs.common import Array, Job
 
 WORDS = {"tolerance", "solver"}
 ARRAYS = ("points", "nodes", "fixed", "values", "forces", "elasticity", "element")
@@ -21,7 +21,7 @@ def work(job: Job) -> Array | None:
         from benchmarks.motion import SLOW, measured
         from kratos_lite.native import kernels
 
-        found = measured(kl, job.given["motion"], 1 if kernels("motion") else SLOW)
+        found = measured(kl, job.given["scene"], 1 if kernels("motion") else SLOW)
         job.answer["phases"]["step"] = found.pop("step")
         job.answer["drift"] = found
         return None
@@ -89,7 +89,3 @@ def assembly(job: Job, model: Any) -> None:
 
     made = job.fastest("pattern", pattern)
     job.fastest("matrix", lambda: assemble_stiffness(points, groups, made))
-
-
-if __name__ == "__main__":
-    run(work)

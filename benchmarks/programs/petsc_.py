@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 from benchmarks.programs import linear
-from benchmarks.programs.common import Array, Job, rigid_modes, run
+from benchmarks.programs.common import Array, Job, rigid_modes
 
 OPTIONS = {
     "PETSc GAMG": {"pc_type": "gamg", "pc_gamg_threshold": "0.01"},
@@ -92,7 +92,3 @@ def orthonormal(points: Array) -> Array:
     import numpy as np
 
     return np.linalg.qr(rigid_modes(points))[0]
-
-
-if __name__ == "__main__":
-    run(work)
