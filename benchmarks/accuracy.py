@@ -204,8 +204,8 @@ def at_error(rows: Sequence[Row], true: float, key: str = "seconds") -> float:
     for coarse, fine in pairwise(rows):
         if fine["true"] <= true <= coarse["true"]:
             a, b, t = (np.log(x) for x in (coarse["true"], fine["true"], max(true, 1e-300)))
-            share = (a - t) / (a - b)
-            return float(np.exp((1 - share) * np.log(coarse[key]) + share * np.log(fine[key])).round(9))
+            fraction = (a - t) / (a - b)
+            return float(np.exp((1 - fraction) * np.log(coarse[key]) + fraction * np.log(fine[key])).round(9))
     return float(rows[0][key]) if rows and rows[0]["true"] <= true else float("inf")
 
 

@@ -60,8 +60,8 @@ def time_to(level: float, times: np.ndarray, found: np.ndarray) -> tuple[float, 
     if i == 0:
         return float(times[0]), True
     t, e = np.log(times[i - 1 : i + 1]), np.log(found[i - 1 : i + 1])
-    share = (np.log(level) - e[0]) / (e[1] - e[0])
-    return float(np.exp(t[0] + share * (t[1] - t[0]))), False
+    fraction = (np.log(level) - e[0]) / (e[1] - e[0])
+    return float(np.exp(t[0] + fraction * (t[1] - t[0]))), False
 
 
 def fastest(rows: Iterable[Row], clock: str) -> dict[tuple[str, float, str], Reached]:

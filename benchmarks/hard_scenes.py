@@ -93,21 +93,23 @@ def bonded(kind: str, n: int) -> kl.Model:
     points = np.vstack([lower.points, upper.points])
     model = weighty(kl.Mesh(points, [kl.Block(element(kind), nodes)]), ())
     model.fix(lower.nodes("z-"))
-    slaves = upper.nodes("z-")
-    W = lower.locate(upper.points[slaves]).weights()
+    dependent = upper.nodes("z-")
+    W = lower.locate(upper.points[dependent]).weights()
     rows = zip(np.split(W.indices, W.indptr[1:-1]), np.split(W.data, W.indptr[1:-1]), strict=True)
-    _link(model, slaves + start, rows)
+    _link(model, dependent + start, rows)
     return model
 
 
-def _link(model: kl.Model, slaves: Ints, masters: Iterable[tuple[Iterable[int], Iterable[float]]]) -> None:
+def _link(
+    model: kl.Model, dependent: Ints, independent: Iterable[tuple[Iterable[int], Iterable[float]]]
+) -> None:
     """Let nodes that nothing holds follow others, given with their weights."""
     held = model.supports.fixed.any(axis=1)
-    for slave, (nodes, weights) in zip(slaves.tolist(), masters, strict=True):
-        if not held[slave]:
+    for node, (nodes, weights) in zip(dependent.tolist(), independent, strict=True):
+        if not held[node]:
             terms = [(int(k), float(w)) for k, w in zip(nodes, weights, strict=True) if abs(w) > 1e-12]
             for axis in "xyz":
-                model.constrain((slave, axis), {(k, axis): w for k, w in terms})
+                model.constrain((node, axis), {(k, axis): w for k, w in terms})
 
 
 def unordered(kind: str, n: int, jitter: float = 0.25) -> kl.Model:

@@ -133,8 +133,8 @@ def scaling(rows: Sequence[Row]) -> str:
         for row in chosen(rows, kind=kind, n=n, engine="petsc"):
             weak, efficiency, serial = row["cells"] != cube(n), "", ""
             if ones and row is not ones[0]:
-                share = time_of(ones[0]) / time_of(row) / (1 if weak else row["ranks"])
-                efficiency = f"{share:.2f} {'weak' if weak else 'strong'}"
+                fraction = time_of(ones[0]) / time_of(row) / (1 if weak else row["ranks"])
+                efficiency = f"{fraction:.2f} {'weak' if weak else 'strong'}"
             if own and not weak:
                 serial = f"{row['seconds'] / own[0]['seconds']:.2f}"
             line = [f"{kind} {'×'.join(map(str, row['cells']))}", f"{row['unknowns']}", f"{row['ranks']}"]
@@ -185,12 +185,12 @@ def plan(found: Row) -> str:
         largest = max(two, key=lambda row: row["unknowns"])
         slope, base, size = iterations_by_tenfold(two), largest["iterations"], largest["unknowns"]
         files = [file["bytes"] / file["unknowns"] for file in found["files"] if file["kind"] == kind]
-        share = PER_RANK * MOST_RANKS / size  # of the work of a rank that was measured
-        solve = largest["phases"]["solve"] * share
+        fraction = PER_RANK * MOST_RANKS / size  # of the work of a rank that was measured
+        solve = largest["phases"]["solve"] * fraction
         for unknowns in PLANNED:
             ranks = math.ceil(unknowns / PER_RANK)
             count = base + slope * math.log10(unknowns / size)
-            seconds = time_of(largest) * share - solve + solve * count / base
+            seconds = time_of(largest) * fraction - solve + solve * count / base
             memory = per_unknown(largest) * 1e3 * unknowns + ranks * largest["imports"]
             bytes_ = (*files, math.nan)[0], largest.get("bytes written", math.nan) / size
             lines.append(

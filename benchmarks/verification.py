@@ -114,7 +114,8 @@ def solved(program: str, python: str, jobs: list[dict[str, str]], folder: Path) 
     if "absent" in told:
         print(f"{program} is left out: {told['absent']}")
         return ""
-    print(*(f"{program}: {line}" for line in told["failed"]), sep="\n")
+    for line in told["failed"]:
+        print(f"{program}: {line}")
     return str(told["version"])
 
 

@@ -209,7 +209,7 @@ def test_real_scenes_are_written_whole(shared, tmp_path):
 
 @pytest.mark.parametrize("name", [name for name in motion.MOTIONS if not name.startswith("many")])
 def test_motions_keep_what_they_should(name):
-    found = motion.measured(kl, name, share=100)
+    found = motion.measured(kl, name, divisor=100)
     exact = 1e-12 if "em" in name else 1e-4
     assert found["step"] > 0
     assert found["energy"] < exact

@@ -23,7 +23,7 @@ def work(job: Job) -> None:
         rows = sp.triu(A, format="csr") if program == "PARDISO" else A.tocsc()
     with linear.measured(job):
         x = (pardiso if program == "PARDISO" else cholmod)(job, library, rows, b)
-    linear.judge(job, A, b, x)
+    linear.check_solution(job, A, b, x)
 
 
 def pardiso(job: Job, pypardiso: Any, rows: Any, b: Array) -> Array:

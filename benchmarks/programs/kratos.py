@@ -136,7 +136,7 @@ def system(job: Job, KM: Any) -> None:
     with linear.measured(job), job.phase("solve"):
         solver.Initialize(K, x, load)
         solver.Solve(K, x, load)
-    linear.judge(job, A, b, np.array(x), solver.GetIterationsNumber())
+    linear.check_solution(job, A, b, np.array(x), solver.GetIterationsNumber())
 
 
 def write(job: Job, KM: Any, part: Any) -> None:

@@ -67,7 +67,7 @@ def work(job: Job) -> None:
     if comm.rank:
         raise SystemExit  # the first process answers for all
     job.answer["version"] = ".".join(map(str, PETSc.Sys.getVersion()))
-    linear.judge(job, whole, b, everything.getArray(), ksp.getIterationNumber())
+    linear.check_solution(job, whole, b, everything.getArray(), ksp.getIterationNumber())
 
 
 def distributed(PETSc: Any, rows: Any, size: int) -> Any:

@@ -41,4 +41,4 @@ def system(job: Job, pyamg: Any) -> None:
         with job.phase("solve"):
             words = {"accel": "cg", "maxiter": linear.MAX_ITERATIONS, "residuals": residuals}
             x = hierarchy.solve(b, tol=job.tolerance, **words)
-    linear.judge(job, A, b, x, len(residuals) - 1)
+    linear.check_solution(job, A, b, x, len(residuals) - 1)
