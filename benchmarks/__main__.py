@@ -17,8 +17,9 @@ from typing import Any
 
 from benchmarks import accuracy, curves, report, scaling, scenes, sets, stall
 from benchmarks.driver import ROOT, Driver, Run, load, results, save, scratch
+from benchmarks.motion import MOTIONS
 from benchmarks.programs import HELPERS, PROGRAMS
-from benchmarks.tables import Row
+from benchmarks.tables import NUMPY, OURS, THEIRS, Row
 
 RESULTS = Path(__file__).with_name("results")
 PAGE, PICTURES = ROOT / "docs" / "about" / "benchmarks.md", ROOT / "docs" / "images" / "benchmarks"
@@ -29,13 +30,20 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], list[Run]]] = {
     "error": lambda o: sets.error_runs(
         o.programs, o.scenes or sets.ERROR_SCENES, sizes(o.cells), o.elements or ()
     ),
-    "growth": lambda o: sets.growth_runs(o.programs, o.cells or sets.GROWTH, o.elements or ("8N",)),
+    "growth": lambda o: sets.runs(
+        "growth",
+        (OURS, THEIRS),
+        o.programs,
+        [("block", kind, n) for kind in o.elements or ("8N",) for n in o.cells or sets.GROWTH],
+    ),
     "stall": lambda o: stall.runs(o.programs, o.unknowns, o.scenes),
     "assembly": lambda o: sets.assembly_runs(o.programs, sizes((o.cells or [None])[0])),
     "parse": lambda o: sets.parse_runs(o.programs, o.cells or (20, 50)),
     "skips": lambda o: sets.skip_runs(o.programs, (o.cells or (32,))[0]),
     "cube1": lambda o: sets.cube1_runs(o.programs),
-    "motion": lambda o: sets.motion_runs(o.programs),
+    "motion": lambda o: sets.runs(
+        "motion", (OURS, NUMPY), o.programs, [(name, "", 0) for name in MOTIONS], "motion"
+    ),
     "ale": lambda o: sets.ale_runs(o.programs),
     "distributed": lambda o: scaling.runs(o.cells),
 }

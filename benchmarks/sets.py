@@ -8,38 +8,29 @@ from typing import Any
 
 from benchmarks import ale, cases
 from benchmarks.driver import Run
-from benchmarks.motion import MOTIONS
 from benchmarks.programs import PROGRAMS
 from benchmarks.scenes import KINDS
 from benchmarks.tables import ADAPTIVE, NUMPY, OURS, THEIRS
 
+Place = tuple[str, str, int]
 CURVED = ("sphere", "cavity", "hole_incompressible")
 """Scenes where quadratic elements have curved edges."""
-LINEAR = {
-    "manufactured": (6, 12, 36),
-    "sphere": (4, 8, 24),
-    "bending": (4, 8, 24),
-    "l_domain": (6, 12, 48),
-    "cavity": (2, 6, 16, 32),
-    "hole_incompressible": (2, 6, 14, 40),
-    "cantilever": (2, 6, 12),
-    "cook": (6, 20, 60),
-    "block": (6, 16, 28),
+CELLS = {
+    "manufactured": ((6, 12, 36), (2, 4, 8, 16)),
+    "sphere": ((4, 8, 24), (1, 2, 5, 10)),
+    "bending": ((4, 8, 24), (1, 2)),
+    "l_domain": ((6, 12, 48), (2, 6, 28, 42)),
+    "cavity": ((2, 6, 16, 32), (1, 2, 6, 18)),
+    "hole_incompressible": ((2, 6, 14, 40), (1, 3, 6, 14, 30)),
+    "cantilever": ((2, 6, 12), (1, 3, 5, 10)),
+    "cook": ((6, 20, 60), (2, 6, 20, 30)),
+    "block": ((6, 16, 28), (2, 6, 18, 28)),
 }
-"""Cells along an edge of the error scenes, for linear elements."""
-QUADRATIC = {
-    "manufactured": (2, 4, 8, 16),
-    "sphere": (1, 2, 5, 10),
-    "bending": (1, 2),
-    "l_domain": (2, 6, 28, 42),
-    "cavity": (1, 2, 6, 18),
-    "hole_incompressible": (1, 3, 6, 14, 30),
-    "cantilever": (1, 3, 5, 10),
-    "cook": (2, 6, 20, 30),
-    "block": (2, 6, 18, 28),
-}
-"""The same for quadratic ones: errors of 1 %, 0.1 % and 0.01 % lie between two of them where they can."""
-ERROR_SCENES = tuple(QUADRATIC)
+"""Cells along an edge of the error scenes for linear elements, and for quadratic ones.
+
+Errors of 1 %, 0.1 % and 0.01 % lie between two of them where they can.
+"""
+ERROR_SCENES = tuple(CELLS)
 GOALS_OF_ERROR = (0.1, 0.05, 0.02, 0.01, 3e-3, 1e-3, 3e-4, 1e-4)
 """Relative errors in the energy norm that the adaptive solution is asked for."""
 START = ("20N", 2)
@@ -103,27 +94,23 @@ def quick(programs: Sequence[str]) -> list[Run]:
 
 def kratos(programs: Sequence[str], cells: Sequence[int] | None, folder: Path, target: Path) -> list[Run]:
     """Return the goal rows, with other cells if some are given, and the real scenes of a folder."""
-    goals: Iterable[tuple[str, str, int]] = GOALS
+    goals: Iterable[Place] = GOALS
     if cells:
         goals = [(*kind, n) for kind in dict.fromkeys(goal[:2] for goal in GOALS) for n in cells]
-    files = cases.prepared(folder, target) if folder.is_dir() else []
-    return goal_runs(programs, goals) + case_runs(programs, files)
+    files = [(str(path), "", 0) for path in cases.prepared(folder, target)] if folder.is_dir() else []
+    return goal_runs(programs, goals) + runs("case", FROM_FILES, programs, files, "solve", WRITTEN)
 
 
-def goal_runs(programs: Sequence[str], goals: Iterable[tuple[str, str, int]] = GOALS) -> list[Run]:
+def runs(
+    group: str, names: Sequence[str], programs: Sequence[str], places: Iterable[Place], *words: Any
+) -> list[Run]:
+    """Return runs of those of the programs named that are wanted on each scene, kind and size."""
+    return [Run(group, name, *place, *words) for place in places for name in names if name in programs]
+
+
+def goal_runs(programs: Sequence[str], goals: Iterable[Place] = GOALS) -> list[Run]:
     """Return whole processes from `.mdpa` to VTK files, and pyamg as it comes for its solver alone."""
-    return [
-        Run("goal", program, *goal, options=WRITTEN)
-        for goal in goals
-        for program in (*FROM_FILES, "pyamg")
-        if program in programs
-    ]
-
-
-def case_runs(programs: Sequence[str], files: Iterable[Path]) -> list[Run]:
-    """Return the same for real scenes, whole in `.mdpa` files."""
-    names = [program for program in FROM_FILES if program in programs]
-    return [Run("case", name, str(file), "", 0, options=WRITTEN) for file in files for name in names]
+    return runs("goal", (*FROM_FILES, "pyamg"), programs, goals, "solve", WRITTEN)
 
 
 def error_runs(
@@ -179,16 +166,8 @@ def sizes_of(scene: str, kind: str) -> tuple[int, ...]:
     >>> sizes_of("bending", "8N enhanced"), sizes_of("bending", "20N")
     ((4, 8, 24), (1, 2))
     """
-    sizes = (LINEAR if kind.split(maxsplit=1)[0] in ("4N", "8N") else QUADRATIC)[scene]
+    sizes = CELLS[scene][kind.split(maxsplit=1)[0] not in ("4N", "8N")]
     return sizes[sizes[0] == 1 :] if kind == "20N reduced" else sizes
-
-
-def growth_runs(
-    programs: Sequence[str], sizes: Sequence[int] = GROWTH, kinds: Sequence[str] = ("8N",)
-) -> list[Run]:
-    """Return the clamped block from small to as large as memory takes."""
-    names = [p for p in (OURS, THEIRS) if p in programs]
-    return [Run("growth", name, "block", kind, n) for kind in kinds for n in sizes for name in names]
 
 
 def assembly_runs(programs: Sequence[str], sizes: dict[str, int] | None = None) -> list[Run]:
@@ -203,35 +182,23 @@ def assembly_runs(programs: Sequence[str], sizes: dict[str, int] | None = None) 
 
 def parse_runs(programs: Sequence[str], sizes: Sequence[int] = (20, 50)) -> list[Run]:
     """Return reading a `.mdpa` file: kratos_lite, Kratos and meshio."""
-    names = [p for p in (*FROM_FILES, "meshio") if p in programs]
-    return [Run("parse", name, "block", "8N", n, "parse") for n in sizes for name in names]
+    return runs("parse", (*FROM_FILES, "meshio"), programs, [("block", "8N", n) for n in sizes], "parse")
 
 
-def motion_runs(programs: Sequence[str]) -> list[Run]:
-    """Return bodies in motion: seconds per step."""
-    names = [p for p in (OURS, NUMPY) if p in programs]
-    return [Run("motion", name, motion, "", 0, "motion") for motion in MOTIONS for name in names]
-
-
-def ale_runs(
-    programs: Sequence[str], sizes: Sequence[tuple[str, int]] = ale.MESHES, repeat: int = 4
-) -> list[Run]:
+def ale_runs(programs: Sequence[str], sizes: Iterable[Any] = ale.MESHES, repeat: int = 4) -> list[Run]:
     """Return the matrices of a wheel in flow, beside GetFEM."""
-    names = [p for p in (OURS, NUMPY, "GetFEM") if p in programs]
-    return [
-        Run("ale", name, ale.SCENE, *size, "ale", (("repeat", repeat),)) for size in sizes for name in names
-    ]
+    places = [(ale.SCENE, *size) for size in sizes]
+    return runs("ale", (OURS, NUMPY, "GetFEM"), programs, places, "ale", (("repeat", repeat),))
 
 
 def cube1_runs(programs: Sequence[str]) -> list[Run]:
     """Return the whole process for one element, beside a process that imports NumPy alone."""
-    return [Run("cube1", p, "cube", "8N", 1) for p in ("import numpy", *FROM_FILES) if p in programs]
+    return runs("cube1", ("import numpy", *FROM_FILES), programs, [("cube", "8N", 1)])
 
 
 def skip_runs(programs: Sequence[str], n: int = 32) -> list[Run]:
     """Return pairs with and without work that can be skipped."""
+    pairs = [((scene, "8N", n), options, variant) for scene, variant, options in SKIPS]
     return [
-        Run("skips", OURS, scene, "8N", n, options=options, variant=variant)
-        for scene, variant, options in SKIPS
-        if OURS in programs
+        run for place, *words in pairs for run in runs("skips", (OURS,), programs, [place], "solve", *words)
     ]

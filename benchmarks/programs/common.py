@@ -43,9 +43,10 @@ class Job:
     stem : path of the scene without ending.
     kind : element kind such as ``8N``.
     tolerance : relative residual for iterative solvers.
-    points, nodes, fixed, values, forces, elasticity, reference : the problem as `read` leaves it.
+    element, points, nodes, fixed, values, forces, elasticity, reference : the problem as `read` leaves it.
     """
 
+    element: NDArray[np.str_]
     points: Array
     nodes: NDArray[np.int32]
     vtk_order: NDArray[np.int64]
