@@ -267,9 +267,10 @@ def row_of(run: Run, answers: Sequence[Row]) -> Row:
     good = [answer for answer in answers if "failed" not in answer]
     if not good:
         return run.labels | answers[-1]
-    row: Row = run.labels | {k: v for k, v in medians(good).items() if v not in (None, "", {})}
+    row: Row = run.labels | {"phases": {}}
+    row |= {name: value for name, value in medians(good).items() if value not in (None, "", {})}
     row["spread"] = [pick(answer["process"] for answer in good) for pick in (min, max)]
-    row["work"] = sum(s for name, s in row.get("phases", {}).items() if name not in OVERHEAD)
+    row["work"] = sum(s for name, s in row["phases"].items() if name not in OVERHEAD)
     return row
 
 

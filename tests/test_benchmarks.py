@@ -185,6 +185,16 @@ def test_a_program_that_fails_is_a_row_that_says_so(tmp_path, monkeypatch):
     assert str(ROOT) not in rows[0]["failed"]
 
 
+def test_one_element_stands_beside_a_process_that_imports_numpy(tmp_path):
+    rows = driver.Driver(tmp_path, 1, tell=lambda line: None).measure(
+        sets.cube1_runs((tables.OURS, "import numpy"))
+    )
+    lines = report.text(rows).splitlines()
+    assert [line.split(" | ")[:2] for line in lines[-2:]] == [
+        ["| cube 8N n = 1", name] for name in ("import numpy", "kratos_lite")
+    ]
+
+
 def test_a_run_is_stopped_at_its_limit(tmp_path):
     short = driver.Driver(tmp_path, 1, limit=0.01, tell=lambda line: None)
     (row,) = short.measure([driver.Run("goal", "kratos_lite", "block", "8N", 1)])
