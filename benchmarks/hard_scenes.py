@@ -174,12 +174,12 @@ def system(scene: Scene) -> dict[str, Array]:
     model = scene.model
     constraints = model.supports.constraint_map
     system = ConstrainedSystem(model.mesh.points, model.element_groups(), constraints, solver="direct")
-    free, K = system.reduced.free.reshape(-1, 3), system.K
-    assert (free == 3 * (free[:, :1] // 3) + np.arange(3)).all(), (
-        "a node is constrained along some axes alone"
-    )
-    load = system.reduced.reduce(system.gather(scene.forces()) - K @ system.reduced.c)
-    A = system.reduced.reduce_matrix(K.scipy().tocsr()).tobsr((3, 3))
+    reduction, K = system.constraint_map, system.K
+    free = reduction.free.reshape(-1, 3)
+    if not (free == 3 * (free[:, :1] // 3) + np.arange(3)).all():
+        raise ValueError(f"{scene.name}: a node is constrained along some axes alone")
+    load = reduction.reduce(system.gather(scene.forces()) - K @ reduction.c)
+    A = reduction.reduce_matrix(K.scipy().tocsr()).tobsr((3, 3))
     A.sort_indices()
     arrays = {"data": A.data, "indices": A.indices, "indptr": A.indptr}
     return arrays | {"load": load, "points": system.points[free[:, 0] // 3]}

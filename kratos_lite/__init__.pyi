@@ -37,10 +37,10 @@ from kratos_lite.bodies import Body as Body
 from kratos_lite.bodies import Callback as Callback
 from kratos_lite.bodies import FiniteElementBody as FiniteElementBody
 from kratos_lite.bodies import FixDirection as FixDirection
+from kratos_lite.bodies import FixedBody as FixedBody
 from kratos_lite.bodies import FixPoint as FixPoint
 from kratos_lite.bodies import FollowerPressure as FollowerPressure
 from kratos_lite.bodies import Force as Force
-from kratos_lite.bodies import Obstacle as Obstacle
 from kratos_lite.bodies import PrescribedAcceleration as PrescribedAcceleration
 from kratos_lite.bodies import PrescribedDisplacement as PrescribedDisplacement
 from kratos_lite.bodies import PrescribedVelocity as PrescribedVelocity

@@ -85,9 +85,7 @@ class Problems:
 
 
 RENAMED = {
-    **{"scheme": "integrator", "form": "formulation", "factor": "amplitude", "factors": "values"},
-    **{"ends": "boundaries", "march": "time", "characteristics": "mass_properties", "link": "constrain"},
-    **{f"set_{what}": f"prescribed_{what}" for what in ("displacement", "velocity", "acceleration")},
+    **{"scheme": "integrator", "ends": "boundaries", "march": "time"},
     **{"pvd": "output", "csv": "output", "npz": "output", "generalised_alpha": "generalized_alpha"},
 }
 """Words that other programs, or earlier versions, have for what is known here by another word."""

@@ -85,8 +85,9 @@ def test_elements_of_the_guide_conform(tmp_path):
     pages = [(DOCS / "howto" / f"own-{what}.md").read_text() for what in ("element", "material")]
     script.write_text("\n".join(python_blocks("".join(pages))))
     out = run(sys.executable, "-m", "kratos_lite", "check", script)
-    assert "MyWedge3D6N conforms: 33 checks passed" in out
-    assert "MeanDilatation3D8N conforms: 33 checks passed" in out
+    assert "MyWedge3D6N conforms: 32 checks passed" in out
+    assert "MeanDilatation3D8N conforms: 32 checks passed" in out
+    assert "Blended3D8N conforms: 32 checks passed" in out
     assert "slate (TransverseIsotropic3D) conforms: 6 checks passed" in out
 
 
@@ -103,7 +104,7 @@ def test_cantilever_folder_of_kratos_bends_as_a_beam(tmp_path):
 
 
 def test_the_gust_bends_the_tower_twice_as_far_as_the_steady_wind(tmp_path):
-    gust, table = EXAMPLES / "tower" / "gust.json", tmp_path / "swing.csv"
+    gust, table = EXAMPLES / "tower" / "gust.py", tmp_path / "swing.csv"
     out = run(sys.executable, "-m", "kratos_lite", "solve", gust, "-o", table)
     rows = np.array([line.split(",") for line in table.read_text().splitlines()[1:]], dtype=float)
     assert len(rows) == 201
@@ -115,9 +116,7 @@ def test_the_gust_bends_the_tower_twice_as_far_as_the_steady_wind(tmp_path):
     assert largest == pytest.approx(still * (1 + np.exp(-np.pi * ratio)), rel=0.03)
     assert time == pytest.approx(np.pi / omega, abs=0.02)
     assert f"{largest:.6e} m at node" in out
-    assert json.loads(gust.read_text()) == json.loads(
-        re.findall(r"```json\n(.*?)```", (DOCS / "howto" / "models-in-time.md").read_text(), re.DOTALL)[0]
-    )
+    assert gust.read_text().partition("\n\n")[2] in (DOCS / "howto" / "models-in-time.md").read_text()
 
 
 def test_own_element_passes_its_conformance_kit():
@@ -144,13 +143,6 @@ def test_a_thrown_box_falls_and_tumbles_the_same_whatever_its_kind(kind, tmp_pat
     assert (tmp_path / "box.png").stat().st_size > 10_000
 
 
-def test_the_scene_of_the_box_is_its_script():
-    solve = (sys.executable, "-m", "kratos_lite", "solve", BODIES / "tumbling_box.json")
-    strain = number(r"internal energy +(\S+) J", run(*solve))
-    script = run(sys.executable, BODIES / "tumbling_box.py")
-    assert strain == pytest.approx(number(r"strain energy (\S+) J", script), abs=1e-3)
-
-
 def test_the_top_nutates_as_elliptic_integrals_say():
     out = run(sys.executable, BODIES / "heavy_top.py")
     assert number(r"tilt from (\S+)", out) == pytest.approx(0.5, abs=1e-5)
@@ -160,7 +152,7 @@ def test_the_top_nutates_as_elliptic_integrals_say():
 
 
 def test_the_pendulum_is_back_after_its_period(tmp_path):
-    solve = (sys.executable, "-m", "kratos_lite", "solve", BODIES / "pendulum.json", "-o", "p.csv")
+    solve = (sys.executable, "-m", "kratos_lite", "solve", BODIES / "pendulum.py", "-o", "p.csv")
     out = run(*solve, cwd=tmp_path)
     rows = [list(map(float, row.split(","))) for row in (tmp_path / "p.csv").read_text().splitlines()[1:]]
     assert rows[-1][6:9] == pytest.approx([1.0, 0.0, 0.0], abs=1e-8)
@@ -206,30 +198,8 @@ def test_a_stiff_box_keeps_its_energy_by_energy_momentum_alone():
     assert number(r"ENERGY_MOMENTUM: .* momentum drift (\S+)", out) < 1e-12
 
 
-def test_the_scene_of_the_guide_is_sound(tmp_path):
-    page = (DOCS / "reference" / "body-files.md").read_text()
-    (scene,) = re.findall(r"```json\n(.*?)```", page, flags=re.DOTALL)
-    (tmp_path / "scene.json").write_text(scene)
-    run(sys.executable, "-m", "kratos_lite", "solve", tmp_path / "scene.json", "-q")
-    assert len((tmp_path / "out.csv").read_text().splitlines()) == 12
-    assert len(list(tmp_path.glob("out_*.vtu"))) == 11
-
-
-def test_the_guide_names_every_type_and_key():
-    from kratos_lite.io.readers.body_file import KEYS, MESHES, OPTIONS, OUTPUTS
-    from kratos_lite.io.readers.body_loads import CONSTRAINTS, LOADS
-
-    page = (DOCS / "reference" / "body-files.md").read_text()
-    table = page[page.index("| key | value |") :]
-    for name in (*KEYS, *OUTPUTS, *LOADS, *CONSTRAINTS):
-        assert f"`{name}`" in table, name
-    kinds = [*LOADS.values(), *CONSTRAINTS.values()]
-    for name in (*OPTIONS, *MESHES, *(key for kind in kinds for key in (*kind.needs, *kind.takes))):
-        assert re.search(rf"\b{name}\b", table), name
-
-
 def test_soft_box_is_pulled_wide_by_its_spin(tmp_path):
-    solve = (sys.executable, "-m", "kratos_lite", "solve", BODIES / "soft_box.json", "-o", "s.npz", "-q")
+    solve = (sys.executable, "-m", "kratos_lite", "solve", BODIES / "soft_box.py", "-o", "s.npz", "-q")
     subprocess.run(solve, cwd=tmp_path, check=True)
     with np.load(tmp_path / "s.npz") as file:
         F = file["q"][:, :9].reshape(-1, 3, 3)
@@ -241,7 +211,7 @@ def test_soft_box_is_pulled_wide_by_its_spin(tmp_path):
 
 
 def test_turntable_moves_as_it_is_told(tmp_path):
-    solve = (sys.executable, "-m", "kratos_lite", "solve", BODIES / "turntable.json", "-o", "t.npz", "-q")
+    solve = (sys.executable, "-m", "kratos_lite", "solve", BODIES / "turntable.py", "-o", "t.npz", "-q")
     subprocess.run(solve, cwd=tmp_path, check=True)
     with np.load(tmp_path / "t.npz") as file:
         end = file["q"][-1]

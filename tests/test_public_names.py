@@ -4,7 +4,8 @@ import ast
 import inspect
 import re
 import textwrap
-from functools import cached_property
+from functools import cached_property, lru_cache
+from pathlib import Path
 
 import kratos_lite as kl
 
@@ -18,9 +19,16 @@ def public_things():
             yield thing
 
 
+@lru_cache
+def signs():
+    """Return the signs of classes in the reference: ``+`` shows inherited members, ``-`` none."""
+    pages = (Path(__file__).parents[1] / "docs" / "reference").glob("*.md")
+    return dict(re.findall(r"^(\w+) ([+-])$", "\n".join(page.read_text() for page in pages), re.MULTILINE))
+
+
 def members(cls):
-    """Yield the public methods and getters of a class, inherited ones from the class that defines them."""
-    for base in cls.__mro__:
+    """Yield the public methods and getters of a class that the reference shows."""
+    for base in {"+": cls.__mro__, "-": ()}.get(signs().get(cls.__name__), [cls]):
         if not base.__module__.startswith("kratos_lite"):
             continue
         for name, member in vars(base).items():
@@ -85,11 +93,10 @@ def lacks_of_class(cls):
 
 
 def lacks_of_function(function, is_getter=False, overrides=False):
-    """Say what the docstring of a function lacks; an override needs a line and its own errors."""
+    """Say what a docstring of a function lacks; overrides and what takes nothing need a line, and errors."""
     nothing = inspect.signature(function).return_annotation in (None, "None", "NoReturn", "Never")
-    simple = is_getter or overrides
-    takes = set() if simple else arguments(function)
-    return list(lacks(function.__doc__, takes, raised(function), not (simple or nothing)))
+    takes = set() if is_getter or overrides else arguments(function)
+    return list(lacks(function.__doc__, takes, raised(function), bool(takes) and not nothing))
 
 
 def all_lacks():

@@ -7,18 +7,19 @@ from typing import Any
 
 from sphinx.util.docutils import SphinxDirective
 
-from kratos_lite.bodies import BODIES
+from kratos_lite.analysis.fields import FIELDS
+from kratos_lite.analysis.named_values import NAMES
 from kratos_lite.io.formats.mdpa.scan import LISTS, TOP
 from kratos_lite.io.kratos import (
     expected_values,
     expressions,
+    motion,
     processes,
     properties,
     run_file,
     time_integration,
 )
 from kratos_lite.io.kratos.variables import LOADING
-from kratos_lite.io.readers import body_loads, motion
 from kratos_lite.materials import MATERIALS
 
 
@@ -63,23 +64,25 @@ def _processes() -> list[str]:
     return _table(*rows, head="| process | keys of its `Parameters` |")
 
 
-def _of_body(kinds: Any) -> list[str]:
-    rows = [(f"`{name}`", _code(kind.needs), _code(kind.takes)) for name, kind in kinds.items()]
-    return _table(*rows, head="| type | needs | takes |")
+def _fields() -> list[str]:
+    rows = []
+    for key, field in FIELDS.items():
+        variable = [field.kratos] if field.listed and field.kratos else []
+        pictures = [name for name, (of, _) in NAMES.items() if of == key]
+        rows.append((f"`{key}`", field.unit or "–", _code(variable), ", ".join(field.where), _code(pictures)))
+    return _table(*rows, head="| field | unit | in files | where | in pictures |")
 
 
 TABLES: dict[str, Callable[[], list[str]]] = {
     "blocks": lambda: [_code(TOP)],
     "lists": lambda: [_code(LISTS)],
     "laws": lambda: _of_registry(MATERIALS, "law"),
-    "bodies": lambda: _of_registry(BODIES, "body"),
     "properties": lambda: [_code(sorted(properties.USED))],
     "loading": lambda: [_code(sorted(LOADING))],
     "processes": _processes,
     "functions": lambda: [_code(sorted(expressions._FUNCTIONS))],
     "solver_settings": lambda: [_code(sorted(run_file.HARMLESS))],
     "dynamic": lambda: [_code(time_integration.DYNAMIC_KEYS)],
+    "fields": _fields,
     "ale": lambda: _table(*((f"`{k}`", _code(v)) for k, v in motion.KEYS.items()), head="| motion | keys |"),
-    "body_loads": lambda: _of_body(body_loads.LOADS),
-    "body_constraints": lambda: _of_body(body_loads.CONSTRAINTS),
 }

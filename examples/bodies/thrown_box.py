@@ -2,7 +2,7 @@
 #
 #     kratos-lite solve examples/bodies/thrown_box.py --picture out/thrown_box.png
 #
-# Python can do what JSON cannot: this box is slowed by drag in a wind.
+# The box is slowed by drag in a wind.
 
 import numpy as np
 

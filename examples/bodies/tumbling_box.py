@@ -2,8 +2,7 @@
 # # A tumbling box
 #
 # A box is thrown and tumbles about its middle axis of inertia, which is unstable.  One word makes it rigid,
-# pseudo-rigid or finite-element; everything else stays.  `tumbling_box.json` is the same scene for the
-# command line.
+# pseudo-rigid or finite-element; everything else stays.
 
 # %%
 import sys

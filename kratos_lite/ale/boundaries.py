@@ -16,7 +16,7 @@ from kratos_lite.typing import Array, Ints, Mask
 from kratos_lite.voigt import acoustic_tensor
 
 FLAT = 1e-6
-"""Share of the length of the frame by which a cut face may be uneven."""
+"""Fraction of the length of the frame by which a cut face may be uneven."""
 
 
 def cut_nodes(mesh: Mesh, direction: Array, moving: Mask) -> tuple[Ints, Ints]:
@@ -30,15 +30,7 @@ def cut_nodes(mesh: Mesh, direction: Array, moving: Mask) -> tuple[Ints, Ints]:
 def leak(
     mesh: Mesh, velocity: Callable[[Array], Array], moving: Mask, open_faces: Sequence[Ints] = ()
 ) -> float:
-    """Return the largest normal velocity at the boundary as a share of the largest velocity there.
-
-    Parameters
-    ----------
-    mesh : the elements.
-    velocity : of the material through the mesh at points (..., 3).
-    moving : (n,) nodes of the elements that move; they share none with others.
-    open_faces : nodes of each plane face that the material may pass through.
-    """
+    """Return the largest normal velocity at closed boundaries as a fraction of the largest there."""
     normal, largest, is_open = 0.0, 0.0, np.zeros((len(open_faces) + 1, mesh.n_nodes), dtype=bool)
     for mask, nodes in zip(is_open, open_faces, strict=False):
         mask[nodes] = True
@@ -58,10 +50,8 @@ def leak(
 
 
 def dashpots(mesh: Mesh, direction: Array, system: ConstrainedSystem, moving: Mask) -> BlockMatrix:
-    """Return the damping of absorbing boundaries of moving nodes, (3a, 3a) in N s/m; see `impedance`.
-
-    Source: Lysmer & Kuhlemeyer, J. Eng. Mech. Div. ASCE 95 (1969) 859-877.
-    """
+    """Return the damping (3a, 3a) in N s/m of absorbing boundaries of moving nodes."""
+    # Source: Lysmer & Kuhlemeyer, J. Eng. Mech. Div. ASCE 95 (1969) 859-877.
     pattern = system.pattern
     data = np.zeros((len(pattern.indices), 3, 3))
     rows = np.repeat(np.arange(pattern.n_nodes, dtype=np.int64), np.diff(pattern.indptr))
@@ -89,28 +79,13 @@ def dashpots(mesh: Mesh, direction: Array, system: ConstrainedSystem, moving: Ma
 
 
 def impedance(material: LinearMaterial, direction: Array) -> Array:
-    """Return √(ρ Γ) (3, 3) in N s/m³ with the acoustic tensor Γ of plane waves along a unit direction.
-
-    Of an isotropic material it is ρ c_p along the direction and ρ c_s across it.
-
-    Examples
-    --------
-    >>> from kratos_lite.materials.isotropic3d import Isotropic3D
-    >>> impedance(Isotropic3D(E=4.0, nu=0.0, density=1.0), np.array([1.0, 0, 0])).round(9).diagonal().tolist()
-    [2.0, 1.414213562, 1.414213562]
-    """
+    """Return √(ρ Γ) (3, 3) in N s/m³, Γ the acoustic tensor of plane waves along a unit direction."""
     squares, ways = np.linalg.eigh(acoustic_tensor(material.C, direction))
     return np.asarray((ways * np.sqrt(material.density * squares)) @ ways.T)
 
 
 def periodic_pairs(mesh: Mesh, direction: Array, moving: Mask) -> tuple[Ints, Ints]:
-    """Return the moving nodes of the upper cut face and the opposite ones of the lower.
-
-    Raises
-    ------
-    ModelError
-        If the nodes of the two faces do not lie opposite one another.
-    """
+    """Return moving nodes of the upper cut face and the opposite ones of the lower; ModelError if none."""
     low, high = cut_nodes(mesh, direction, moving)
     across = np.eye(3) - np.outer(direction, direction)
     a, b = mesh.points[low] @ across, mesh.points[high] @ across

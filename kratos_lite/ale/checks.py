@@ -9,7 +9,7 @@ from kratos_lite.ale.motion import Motion
 from kratos_lite.voigt import acoustic_tensor
 
 NEAR_CRITICAL = 0.9
-"""Share of the critical rate from which a warning is given."""
+"""Fraction of the critical rate from which a warning is given."""
 
 
 def wave_speeds(terms: MotionMatrices) -> tuple[float, float, float]:
@@ -24,15 +24,8 @@ def wave_speeds(terms: MotionMatrices) -> tuple[float, float, float]:
 
 
 def rayleigh_speed(p: float, s: float) -> float:
-    """Return the speed of Rayleigh waves for those of pressure and shear waves, in m/s.
-
-    It is the root of (2 - x)² = 4 sqrt(1 - x) sqrt(1 - x s²/p²) with x = (c_R / c_s)².
-
-    Examples
-    --------
-    >>> round(rayleigh_speed(192.610300980, 102.954536490), 6)
-    95.481346
-    """
+    """Return the speed in m/s of Rayleigh waves for those of pressure and shear waves."""
+    # Root of (2 - x)² = 4 sqrt(1 - x) sqrt(1 - x s²/p²) with x = (c_R / c_s)².
     low, high, k = 1e-6, 1.0 - 1e-12, (s / p) ** 2
     for _ in range(200):
         x = (low + high) / 2
@@ -42,10 +35,7 @@ def rayleigh_speed(p: float, s: float) -> float:
 
 
 def critical_rate_estimate(terms: MotionMatrices) -> float:
-    """Return the rate at which material is as fast as Rayleigh waves, in rad/s or m/s.
-
-    It is for thick bodies: bending of thin ones is slower.
-    """
+    """Return the rate in rad/s or m/s at which thick material is as fast as Rayleigh waves."""
     return terms.motion.critical_rate(wave_speeds(terms)[2], terms.moving_points)
 
 

@@ -16,25 +16,21 @@ ALONG = 1e-6
 
 
 def moving_nodes(mesh: Mesh, part: WhereElements) -> Mask:
-    """Return the nodes (n,) of the elements of a part, which shares none with other elements.
-
-    Where they shared a node, c·n ≠ 0 would let material flow into material at rest; with c·n = 0 the two
-    would slide along one another, but share their tangential displacement, which is friction without a law.
-    """
+    """Return the nodes (n,) of the elements of a part; ModelError if it shares one with other elements."""
     if part is None:
         return mesh.used_nodes()
-    mine = np.zeros(mesh.n_elements, dtype=bool)
-    mine[mesh.elements(part)] = True
-    if not mine.any():
+    in_part = np.zeros(mesh.n_elements, dtype=bool)
+    in_part[mesh.elements(part)] = True
+    if not in_part.any():
         raise ModelError("a part in motion needs one element at least; got none")
     moving, resting = np.zeros((2, mesh.n_nodes), dtype=bool)
     for block, at in with_rows(mesh.blocks):
-        moving[block.nodes[mine[at]]] = True
-        resting[block.nodes[~mine[at]]] = True
+        moving[block.nodes[in_part[at]]] = True
+        resting[block.nodes[~in_part[at]]] = True
     shared = np.flatnonzero(moving & resting)
     if len(shared):
         raise ModelError(
-            f"{mine.sum()} moving elements share {len(shared)} nodes with elements at rest, such as node "
+            f"{in_part.sum()} moving elements share {len(shared)} nodes with elements at rest, such as node "
             f"{mesh.node_ids[shared[0]]}: material cannot both flow and rest in one place; give each side "
             "its own nodes, and tie those along the normal of the face with model.constrain"
         )
@@ -44,15 +40,7 @@ def moving_nodes(mesh: Mesh, part: WhereElements) -> Mask:
 def check_ties(
     structure: Structure, moving: Mask, field: Callable[[Array], Array], travels: bool
 ) -> list[str]:
-    """Return a warning if constraints join moving material to other material along its flow.
-
-    The force of a constraint on a node is parallel to the weights that it gives to the node's components.
-
-    Raises
-    ------
-    ModelError
-        The moving body travels, but is tied to what rests.
-    """
+    """Return a warning of ties of moving to other material along its flow; ModelError if it travels."""
     glued = []
     for constraint in structure.supports.constraints:
         dofs = np.array([constraint.slave, *constraint.masters])

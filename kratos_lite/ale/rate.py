@@ -9,22 +9,7 @@ from kratos_lite.time_series import Factor, TimeSeries, function_of, slope_of
 
 
 class Rate:
-    """A rate in time and its acceleration.
-
-    Parameters
-    ----------
-    rate : number, `TimeSeries` or function of time.
-    acceleration : likewise; the derivative of the rate if not given, and 0 in a steady state.  A number or
-        `TimeSeries` changes a rate that is a number as time goes on.
-    what : the word for the rate in messages, such as ``rate`` of ``a rate``.
-
-    Attributes
-    ----------
-    value, slope : rate and acceleration as functions of time in s.
-    steady : whether the rate never changes.
-    is_accelerated : whether the acceleration was given, and not taken from the rate.
-    is_changing : whether the acceleration may change.
-    """
+    """A rate in time and its acceleration, of numbers, `TimeSeries` or functions of time in s."""
 
     def __init__(self, rate: Factor, acceleration: Factor | None, what: str = "a rate") -> None:
         self.is_accelerated = acceleration is not None
@@ -39,11 +24,7 @@ class Rate:
             self.value = _accelerated(self.value(0.0), self.slope(0.0) if number else acceleration)
 
     def at(self, time: float, step: float = 0.0, steady: bool = False) -> tuple[float, float]:
-        """Return rate and acceleration at a time in s.
-
-        An acceleration that was not given is the mean over a step in s, so that steps add up to the whole
-        change of the rate; the slope for the step 0.  A steady state takes a rate as one that stays.
-        """
+        """Return rate and acceleration at a time in s, the mean over a step in s if not given."""
         if self.is_accelerated or not (steady or step):
             return self.value(time), self.slope(time)
         if steady:

@@ -24,7 +24,7 @@ from kratos_lite.analysis.report import RefinementStep
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.static import StaticAnalysis
 from kratos_lite.elements import ELEMENTS
-from kratos_lite.elements.formulations import is_of_library
+from kratos_lite.elements.custom import is_builtin
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh, with_rows
 from kratos_lite.mesh.facets import facets
@@ -275,7 +275,7 @@ def _can_be_raised(model: Structure) -> bool:
     return (
         mesh.hanging is None
         and not model.has_own_rules
-        and all(map(is_of_library, kinds))
+        and all(map(is_builtin, kinds))
         and any(kind.shape.degree == 1 for kind in kinds)
     )
 

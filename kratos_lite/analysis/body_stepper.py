@@ -9,7 +9,7 @@ import numpy as np
 
 from kratos_lite.analysis.integrators import body_integrator
 from kratos_lite.analysis.state import State, state_of_body
-from kratos_lite.bodies.batched import together
+from kratos_lite.bodies.batched import batch
 from kratos_lite.bodies.body import Body
 from kratos_lite.bodies.constraint_projection import project_velocity
 from kratos_lite.typing import Array
@@ -29,7 +29,7 @@ class BodyStepper:
     def __init__(self, body: Body | Sequence[Body]) -> None:
         if isinstance(body, Body):
             body.clock = replace(body.clock)  # it may have advanced together with others before
-        self.body = body if isinstance(body, Body) else together(body)
+        self.body = body if isinstance(body, Body) else batch(body)
         self.integrator = body_integrator(self.body)
         self.parts, self._free = 1, False
 

@@ -10,8 +10,6 @@ import numpy as np
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.assembly.element_groups import group_of_element
 from kratos_lite.assembly.gauss_point_fields import internal_load
-from kratos_lite.elements.overridden_steps import stiffness_of
-from kratos_lite.elements.stiffness import by_dof
 from kratos_lite.model.loads import ScaledLoad
 from kratos_lite.model.loads.body import BodyForce
 from kratos_lite.model.structure import Structure
@@ -59,7 +57,7 @@ def matrices_of(
     t, n = number(time, "the time"), model.mesh.n_nodes
     e = EquationsOfMotion(model, lumped=flag(lumped, "lumped"), rayleigh=rayleigh, massless=True)
     dofs = (3 * e.system.nodes[:, None] + np.arange(3)).ravel()
-    free, used = dofs[e.system.reduced.free], len(dofs)
+    free, used = dofs[e.system.constraint_map.free], len(dofs)
     spread = csr_array((np.ones(used), (dofs, np.arange(used))), shape=(3 * n, used))
 
     def whole(A: Any) -> csr_array[Any, Any]:
@@ -74,7 +72,7 @@ def matrices_of(
         M=whole(e.mass.matrix()),
         C=whole(e.matrix(t, 0.0, 1.0, 0.0).scipy()),
         f=np.asarray(spread @ e.load(t)),
-        T=csr_array(spread @ e.system.reduced.transform_matrix()),
+        T=csr_array(spread @ e.system.constraint_map.transform_matrix()),
         c=np.asarray(spread @ e.prescribed(t)),
         free=free,
     )
@@ -86,7 +84,7 @@ class LocalSystem(NamedTuple):
     Attributes
     ----------
     K : (3k, 3k) in N/m, stiffness.
-    r : (3k,) in N, external less internal load.
+    r : (3k,) in N, external less internal force vector.
     M : (3k, 3k) in kg, consistent mass.
     dofs : (3k,) int, degrees of freedom among those of the model, 3·node + axis.
     """
@@ -111,5 +109,5 @@ def local_system_of(model: Structure, element: int, u: ArrayLike | None = None) 
             load += factor * of.forces(model.mesh, [group])
     nodes, placed, material = group.nodes[0].astype(np.int64), group.at(points), group.material
     dofs = (3 * nodes[:, None] + np.arange(3)).ravel()
-    K = by_dof(stiffness_of(placed, material.C))[0]
+    K = placed.stiffness(material.C)[0]
     return LocalSystem(K, load[nodes].ravel(), placed.mass(material.density)[0], dofs)

@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
 
-from kratos_lite import voigt
+from kratos_lite.analysis.fields import COMPONENTS
 from kratos_lite.assembly.element_groups import ElementGroup, add_nodal
 from kratos_lite.assembly.gauss_point_fields import body_force, volumes
-from kratos_lite.elements.overridden_steps import internal_load_of
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import ModelError
 from kratos_lite.mesh import Mesh, Where
@@ -22,8 +21,6 @@ from kratos_lite.validation import choice, finite
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
-
-COMPONENTS = tuple(name.lower() for name in voigt.NAMES)
 
 
 class Solved(Protocol):
@@ -311,7 +308,7 @@ class StressAt(Quantity):
         group = self._around(result)
         placed, C = group.at(result.mesh.points), group.material.C
         stress = np.broadcast_to(C[component] / placed.dV.sum(), (*placed.dV.shape, 6))
-        add_nodal(load, group.nodes, internal_load_of(placed, stress, C))
+        add_nodal(load, group.nodes, placed.internal_force(stress, C))
         return load
 
     def local(self, result: Solved) -> Array:

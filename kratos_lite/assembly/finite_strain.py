@@ -1,4 +1,4 @@
-"""Large displacements: internal load, stiffness, energy and highest frequency of groups of elements.
+"""Large displacements: internal forces, stiffness, energy and highest frequency of groups of elements.
 
 Total Lagrangian with the Saint Venant–Kirchhoff law S = C:E + S0, where C is that of the material and
 S0 the prestress of a group; the formulas are in `elements.total_lagrangian`.  It holds for large
@@ -16,81 +16,59 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.assembly.block_matrix import BlockMatrix
-from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, compiled, floats
+from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, as_double, compiled
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import add_in_parts
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements import total_lagrangian as lagrange
-from kratos_lite.elements.geometry import GEOMETRY
-from kratos_lite.elements.overridden_steps import MECHANICS, stiffness_of
 from kratos_lite.errors import MaterialError, ModelError
 from kratos_lite.typing import Array
 
 SAME_SHAPE = 1e-10
-"""Elements whose edges differ by less than this share of their size have one frequency."""
+"""Elements whose edges differ by less than this fraction of their size have one frequency."""
 
 
 def check_elements(groups: Sequence[ElementGroup]) -> None:
-    """Raise ModelError for elements whose strain, stress or load is not that of their gradients."""
+    """Raise ModelError for elements whose strain or stiffness is not that of their gradients."""
     for group in groups:
-        own = [name for name in MECHANICS if not group.element.inherits(name)]
-        if own:
+        if group.element.custom or not group.element.has_standard_strain():
             raise ModelError(
-                f"{group.element.__name__} overrides {', '.join(own)}: a small-strain step.  Large "
+                f"{group.element.__name__} has a B or local system of small strains.  Large "
                 "displacements take Green's strain from the gradients dN/dX alone; use "
-                'formulation="corotational" or "modal", or an element that inherits these steps'
+                'formulation="corotational" or "modal", or a KinematicLinear element'
             )
 
 
 def _compiled(group: ElementGroup) -> Any:
     """Return the kernels if they stand for the geometry of an element class, else None."""
     check_elements([group])
-    return compiled("lagrange", group.element, *GEOMETRY)
+    return compiled("lagrange")
 
 
 def _placed(points: Array, group: ElementGroup) -> tuple[Any, ...]:
     """Return points, nodes, dN and weights of a group, as kernels take them."""
     nodes, _, dN, weights = group.tables()
-    return floats(points), nodes, dN, weights
+    return as_double(points), nodes, dN, weights
 
 
 def _displaced(q: Array, dq: Array | None, damping: float) -> tuple[Any, ...]:
     """Return displacements, increment and damping, as kernels take them."""
-    return floats(q), None if dq is None else floats(dq), damping
+    return as_double(q), None if dq is None else as_double(dq), damping
 
 
 def internal_load(
     points: Array, groups: Sequence[ElementGroup], q: Array, dq: Array | None = None, damping: float = 0.0
 ) -> Array:
-    """Return ∫ P grad N dV as nodal forces (n, 3) in N.
-
-    Parameters
-    ----------
-    points : (n, 3) in m, the reference positions.
-    q : (n, 3) in m, nodal displacements.
-    dq : (n, 3) in m; with it, the load of the step from q to q + dq in energy-momentum form:
-        its work on dq is the change of the strain energy, and what damping takes.
-    damping : η/h, stiffness-proportional damping over the step.
-
-    Examples
-    --------
-    A rotation needs no force.
-
-    >>> import kratos_lite as kl
-    >>> model = kl.Model(kl.box(element="KinematicLinear3D8N"), kl.Isotropic3D(E=1.0, nu=0.3))
-    >>> X, R = model.mesh.points, np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
-    >>> float(np.abs(internal_load(X, model.element_groups(), X @ R.T - X)).max()) < 1e-15
-    True
-    """
+    """Return ∫ P grad N dV as nodal forces (n, 3) in N."""
     total = np.zeros_like(points)
     for group in groups:
         if module := _compiled(group):
             step = _displaced(q, dq, damping)
-            total += module.internal_load(*_placed(points, group), *step, *group.law())
+            total += module.internal_load(*_placed(points, group), *step, *group.kernel_arguments())
             continue
         for chunk in group.chunks():
             element, at = _moved(points, group, chunk, q, dq, damping)
-            add_nodal(total, group.nodes[chunk], lagrange.internal_load(element, at))
+            add_nodal(total, group.nodes[chunk], lagrange.internal_force(element, at))
     return total
 
 
@@ -116,17 +94,13 @@ def stiffness(
 
     Without dq it is the symmetric tangent by q.  With dq it is the derivative by dq, in general not
     symmetric; for dq → 0 without damping it is half the tangent.
-
-    Parameters
-    ----------
-    pattern : the sparsity of the nodes of the groups, in their order.
     """
     data = np.zeros((len(pattern.indices), 3, 3))
     for number, group in enumerate(groups):
         if module := _compiled(group):
             step = _displaced(q, dq, damping)
             rows = (pattern.indptr, pattern.indices)
-            module.add_stiffness(*_placed(points, group), *step, *group.law(), *rows, data)
+            module.add_stiffness(*_placed(points, group), *step, *group.kernel_arguments(), *rows, data)
             continue
 
         def tangent(chunk: slice, group: ElementGroup = group) -> Array:
@@ -143,7 +117,7 @@ def strain_energy(points: Array, groups: Sequence[ElementGroup], q: Array) -> fl
     energy = 0.0
     for group in groups:
         if module := _compiled(group):
-            energy += module.totals(*_placed(points, group), floats(q), *group.law())[0]
+            energy += module.totals(*_placed(points, group), as_double(q), *group.kernel_arguments())[0]
             continue
         for chunk in group.chunks():
             element, displaced = group.at(points, chunk), q[group.nodes[chunk]]
@@ -181,18 +155,6 @@ def highest_frequency(
 ) -> float:
     """Return an upper bound of the largest angular frequency in 1/s: the largest of any element alone.
 
-    Parameters
-    ----------
-    q : (n, 3) in m, displacements whose tangent counts; without, the linear stiffness.
-    lumped : take the lumped mass of the elements in place of the consistent one.
-
-    Raises
-    ------
-    MaterialError
-        If a material has no density.
-
-    Notes
-    -----
     Source: Irons & Treharne, Proc. 3rd Conf. Matrix Methods in Struct. Mech., Wright-Patterson (1971).
     It takes one dense eigenproblem (3k, 3k) for each element, some 0.1 ms with eight nodes; without q,
     elements that are translations of each other take one together.
@@ -201,7 +163,7 @@ def highest_frequency(
     for group in groups:
         if not group.material.density > 0:
             raise MaterialError("an angular frequency needs a density > 0; give the material its density")
-        alike = q is None and group.element.has_kernels(*GEOMETRY, *MECHANICS)  # own steps may depend on X
+        alike = q is None and not group.element.custom  # a user's B may depend on X
         part = _distinct(points, group) if alike else group
         for chunk in part.chunks():
             largest = max(largest, float(_eigenvalues(points, part, chunk, q, lumped).max()))
@@ -212,9 +174,9 @@ def _distinct(points: Array, group: ElementGroup) -> ElementGroup:
     """Return a group of one element of each shape, whatever its place."""
     edges = points[group.nodes] - points[group.nodes[:, :1]]
     size = np.abs(edges).max()
-    rows = np.rint(edges.reshape(len(edges), -1) / (SAME_SHAPE * size))
+    keys = np.rint(edges.reshape(len(edges), -1) / (SAME_SHAPE * size))
     chosen = np.zeros(len(group), dtype=bool)
-    chosen[np.unique(rows, axis=0, return_index=True)[1]] = True
+    chosen[np.unique(keys, axis=0, return_index=True)[1]] = True
     return group.take(chosen)
 
 
@@ -223,7 +185,7 @@ def _eigenvalues(points: Array, group: ElementGroup, chunk: slice, q: Array | No
     C, density = group.material.C, group.material.density
     if q is None:
         element = group.at(points, chunk)
-        K = stiffness_of(element, C)
+        K = element.stiffness_by_axis(C)
     else:
         check_elements([group])
         element, at = _moved(points, group, chunk, q, None, 0.0)

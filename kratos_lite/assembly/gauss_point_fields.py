@@ -1,8 +1,7 @@
 """Gauss point fields: volumes, strains and stresses of elements, and the loads and energies of them.
 
-Every function takes the compiled kernels where the element class and the material leave the methods
-that they stand for as they are; a class that overrides one of them is computed by its own methods, in
-cache-sized chunks.
+Every function takes the compiled kernels, but for element classes with a B or local system of a user and for
+materials with a stress of their own, which are computed by their methods in cache-sized chunks.
 """
 
 from __future__ import annotations
@@ -13,26 +12,21 @@ from typing import Any
 import numpy as np
 
 from kratos_lite import voigt
-from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, by_mass_rule, compiled, floats
-from kratos_lite.elements import KinematicLinear
-from kratos_lite.elements.geometry import GEOMETRY
-from kratos_lite.elements.mass import MASS
-from kratos_lite.elements.overridden_steps import STRAIN, STRESS, internal_load_of, strain_of, stress_of
+from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, as_double, by_mass_rule, compiled
+from kratos_lite.elements import KinematicLinear, custom
 from kratos_lite.typing import Array, Ints, Mask, Rows
 
 
-def compiled_law(group: ElementGroup, *methods: str, stress: bool = True) -> Any:
+def compiled_law(group: ElementGroup, stress: bool = True) -> Any:
     """Return the kernels if they stand for the strains, or the stresses, of a group, else None."""
-    if stress and group.has_own_stress:
-        return None
-    return compiled("gauss", group.element, *GEOMETRY, *(STRESS if stress else STRAIN), *methods)
+    return None if stress and group.has_own_stress else compiled("gauss", group.element)
 
 
 def displaced(points: Array, group: ElementGroup, u: Array, stress: bool = True) -> tuple[Any, ...]:
     """Return what kernels take to compute strains, or stresses, of displacements u (n, 3)."""
     nodes, _, dN, weights = group.tables()
-    law = group.law() if stress else (np.eye(6), None)  # a strain is the stress of C = 1
-    return floats(points), nodes, dN, weights, floats(u), *law, group.strain_tables()
+    law = group.kernel_arguments() if stress else (np.eye(6), None)  # a strain is the stress of C = 1
+    return as_double(points), nodes, dN, weights, as_double(u), *law, group.strain_tables()
 
 
 # ---- geometry ------------------------------------------------------------------------------------
@@ -46,12 +40,12 @@ def clearly_positive(
     At every point of `dN` (g', k, 3) it is above 1e-9 of its mean at the first `g`, and above a thousand
     times what rounding of the coordinates makes of it.  Without kernels every element needs the closer look.
     """
-    module = compiled("gauss", element, "__init__", "dN", "J", "detJ", "_jacobian", "determinants")
+    module = compiled("gauss")
     if module is None:
         return np.zeros(len(nodes), dtype=bool)
     weights = np.where(np.arange(len(dN)) < g, 1 / g, 0.0)
     cells = np.ascontiguousarray(nodes, dtype=np.int32)
-    return module.clearly_positive(floats(points), cells, floats(dN), weights) > 0
+    return module.clearly_positive(as_double(points), cells, as_double(dN), weights) > 0
 
 
 def volumes(points: Array, group: ElementGroup) -> Array:
@@ -62,9 +56,9 @@ def volumes(points: Array, group: ElementGroup) -> Array:
     >>> volumes(model.mesh.points, model.element_groups()[0]).sum(axis=1).round(12).tolist()
     [0.5, 0.5]
     """
-    if module := compiled("gauss", group.element, *GEOMETRY):
+    if module := compiled("gauss"):
         nodes, _, dN, weights = group.tables()
-        return module.volumes(floats(points), nodes, dN, weights)
+        return module.volumes(as_double(points), nodes, dN, weights)
     return np.concatenate([group.at(points, chunk).dV for chunk in group.chunks()])
 
 
@@ -74,10 +68,10 @@ def volumes(points: Array, group: ElementGroup) -> Array:
 def body_force(points: Array, group: ElementGroup, b: Array) -> Array:
     """Return ∫ N b dV of a group as nodal forces (n, 3) in N; b (3,), or nodal (n, 3), in N/m³."""
     nodal, total = b.ndim == 2, np.zeros_like(points)
-    module = compiled("gauss", group.element, *MASS, "body_force")
+    module = compiled("gauss")
     for part in by_mass_rule(points, group, 2 if nodal else 1) if module else ():
-        tables = floats(points), *part.tables()
-        total += module.body_force(*tables, floats(b)) if nodal else module.shares(*tables) * b
+        tables = as_double(points), *part.tables()
+        total += module.body_force(*tables, as_double(b)) if nodal else module.shares(*tables) * b
     for chunk in () if module else group.chunks():
         nodes = group.nodes[chunk]
         add_nodal(total, nodes, group.at(points, chunk).body_force(b[nodes] if nodal else b))
@@ -106,11 +100,11 @@ def in_order(groups: Sequence[ElementGroup], parts: Sequence[Array]) -> Any:
     if len(parts) == 1 and (groups[0].rows == np.arange(m)).all():
         return parts[0]
     if len({part.shape[1:] for part in parts}) > 1:
-        rows: list[Any] = [None] * m
+        values: list[Any] = [None] * m
         for group, part in zip(groups, parts, strict=True):
             for row, value in zip(group.rows.tolist(), part, strict=True):
-                rows[row] = value
-        return rows
+                values[row] = value
+        return values
     out = np.zeros((m, *parts[0].shape[1:]))
     for group, part in zip(groups, parts, strict=True):
         out[group.rows] = part
@@ -123,33 +117,36 @@ def value_at(
     """Return stresses, or strains, (m, g, 6) of the placed elements of a chunk by their own methods."""
     displacements = u[group.nodes[chunk]]
     if not stress:
-        return strain_of(element, displacements, group.material.C)
-    return _elastic(element, group, displacements) + group.initial_stress(chunk)
-
-
-def _elastic(element: KinematicLinear, group: ElementGroup, u: Array) -> Array:
-    """Return the stresses of nodal displacements (m, k, 3): by the element's own law, or by the material."""
-    if not group.element.inherits("stress"):
-        return stress_of(element, group.material.C, u)
-    return group.stress(strain_of(element, u, group.material.C))
+        return element.strain(displacements, group.material.C)
+    return group.stress(element.strain(displacements, group.material.C)) + group.initial_stress(chunk)
 
 
 def internal_load(points: Array, groups: Sequence[ElementGroup], u: Array) -> Array:
     """Return ∫ B^T σ dV of displacements u (n, 3) as nodal forces (n, 3) in N."""
     total = np.zeros_like(points)
     for group in groups:
-        if module := compiled_law(group, "internal_load"):
+        if module := compiled_law(group):
             total += module.internal_load(*displaced(points, group, u))
             continue
         for chunk in group.chunks():
-            element = group.at(points, chunk)
-            stress = value_at(element, group, u, chunk)
-            add_nodal(total, group.nodes[chunk], internal_load_of(element, stress, group.material.C))
+            add_nodal(total, group.nodes[chunk], _internal_forces(group.at(points, chunk), group, u, chunk))
     return total
 
 
+def _internal_forces(element: KinematicLinear, group: ElementGroup, u: Array, chunk: slice) -> Array:
+    """Return the internal forces (m, k, 3) in N of a chunk, with those of the prestress."""
+    C, displacements = group.material.C, u[group.nodes[chunk]]
+    if "local_system" not in element.custom:
+        return element.internal_force(value_at(element, group, u, chunk), C)
+    forces = custom.system(element, C, displacements)[1]
+    if group.prestress is None:
+        return forces
+    stress = np.broadcast_to(group.initial_stress(chunk), (len(forces), len(group.rule), 6))
+    return forces + element.internal_force(stress, C)
+
+
 def totals(points: Array, groups: Sequence[ElementGroup], u: Array) -> tuple[float, float, int]:
-    """Return strain energy in J, largest von Mises stress at a Gauss point in Pa, row of its element."""
+    """Return strain energy in J, largest von Mises stress at a Gauss point in Pa, index of its element."""
     energy, largest, row = 0.0, 0.0, 0
     for group in groups:
         module = compiled_law(group)
@@ -158,8 +155,8 @@ def totals(points: Array, groups: Sequence[ElementGroup], u: Array) -> tuple[flo
             if module
             else [_totals(points, group, u, chunk) for chunk in group.chunks()]
         )
-        for share, mises, at in parts:
-            energy += share
+        for part, mises, at in parts:
+            energy += part
             if mises > largest:
                 largest, row = mises, int(group.rows[at])
     return energy, largest, row
@@ -167,8 +164,11 @@ def totals(points: Array, groups: Sequence[ElementGroup], u: Array) -> tuple[flo
 
 def _totals(points: Array, group: ElementGroup, u: Array, chunk: slice) -> tuple[float, float, int]:
     element = group.at(points, chunk)
-    value = value_at(element, group, u, chunk, stress=False)
-    elastic = _elastic(element, group, u[group.nodes[chunk]])
-    energy = float(((value * elastic).sum(axis=-1) * element.dV).sum()) / 2
+    C, displacements = group.material.C, u[group.nodes[chunk]]
+    strain = element.strain(displacements, C)
+    elastic = group.stress(strain)
+    energy = float(((strain * elastic).sum(axis=-1) * element.dV).sum()) / 2
+    if "local_system" in element.custom:
+        energy = float((custom.system(element, C, displacements)[1] * displacements).sum()) / 2
     mises = voigt.von_mises(elastic + group.initial_stress(chunk)).max(axis=1)
     return energy, float(mises.max()), chunk.start + int(mises.argmax())

@@ -9,11 +9,7 @@ import numpy as np
 
 from kratos_lite import voigt
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.elements import KinematicLinear
-from kratos_lite.elements.geometry import GEOMETRY
-from kratos_lite.elements.overridden_steps import STRAIN, strain_of
 from kratos_lite.elements.tables import cofactors, determinant
-from kratos_lite.errors import InputError
 from kratos_lite.mesh.locate import Located
 from kratos_lite.typing import Array
 
@@ -22,13 +18,7 @@ if TYPE_CHECKING:
 
 
 def at_located(groups: Sequence[ElementGroup], located: Located, u: Array, *, stress: bool = True) -> Array:
-    """Return stresses in Pa with prestress, or strains, (..., 6) of displacements u (n, 3) in m at points.
-
-    Raises
-    ------
-    InputError
-        An element class has a strain of its own, but no B-operator; or a stress of its own.
-    """
+    """Return stresses in Pa with prestress, or strains, (..., 6) of displacements u (n, 3) in m at points."""
     rows, xi = located.rows.ravel(), located.xi.reshape(-1, 3)
     out = np.zeros((len(rows), 6))
     for group in groups:
@@ -37,17 +27,12 @@ def at_located(groups: Sequence[ElementGroup], located: Located, u: Array, *, st
         at = np.flatnonzero((rows >= 0) & (number[rows] >= 0))
         if not len(at):
             continue
-        mine = number[rows[at]]
-        X, displaced = (values[group.nodes[mine]] for values in (located.mesh.points, u))
+        cells = number[rows[at]]
+        X, displaced = (values[group.nodes[cells]] for values in (located.mesh.points, u))
         value = _strain(group, X, xi[at], displaced)
-        if stress and not group.element.inherits("stress"):
-            raise InputError(
-                f"{group.element.__name__} has its own stress, known at Gauss points alone; "
-                "ask for result.stress('gauss')"
-            )
         if stress:
             value = group.stress(value)
-            value = value if group.prestress is None else value + group.prestress[mine]
+            value = value if group.prestress is None else value + group.prestress[cells]
         out[at] = value
     return out.reshape(*located.rows.shape, 6)
 
@@ -56,43 +41,21 @@ def recovered_at(recovery: Recovery, located: Located, u: Array, *, stress: bool
     """Return recovered stresses in Pa, or strains, (..., 6) at points, between nodes of one material."""
     out = np.zeros((*located.rows.shape, 6))
     for region, values in recovery.by_region(u, stress=stress):
-        mine = np.isin(located.rows, np.concatenate([group.rows for group in region.groups]))
-        if mine.any():
+        inside = np.isin(located.rows, np.concatenate([group.rows for group in region.groups]))
+        if inside.any():
             nodal = np.zeros((len(located.mesh.points), 6))
             nodal[region.nodes] = values
-            out[mine] = located[mine].interpolate(nodal)
+            out[inside] = located[inside].interpolate(nodal)
     return out
 
 
 def _strain(group: ElementGroup, X: Array, xi: Array, u: Array) -> Array:
     """Return the strain (k, 6) of elements X (k, n, 3) under u (k, n, 3), each at its own xi (k, 3)."""
     element = group.element
-    if element.inherits(*GEOMETRY, *STRAIN):
+    if element.has_standard_strain():
         dN = element.dN(xi)
         J = np.swapaxes(X, -1, -2) @ dN
         D = dN @ (cofactors(J) / determinant(J)[..., None, None])
         return voigt.symmetric_gradient(np.swapaxes(u, -1, -2) @ D)
-    if not element.inherits("strain_at"):
-        C = group.material.C
-        return np.array([element(x, group.rule).strain_at(t, v, C) for x, t, v in zip(X, xi, u, strict=True)])
-    if element.inherits("B") and not element.inherits(*STRAIN):
-        raise InputError(
-            f"{element.__name__} has its own strain, known at Gauss points alone; write its B(xi) too, or "
-            "ask for result.stress('gauss')"
-        )
-    if not element.inherits("B_at_gauss_points", "strain"):
-        _check_B(element(X[0], group.rule), group.material.C)
-    placed = zip(X, xi, u, strict=True)
-    return np.array([element(x, group.rule).B(t) @ v.ravel() for x, t, v in placed])
-
-
-def _check_B(cell: KinematicLinear, C: Array) -> None:
-    """Raise InputError if B of an element is not that of its strain at the Gauss points."""
-    u = np.random.default_rng(3).uniform(-1, 1, cell.X.shape)
-    strain = strain_of(cell, u, C)
-    miss = np.abs(np.array([cell.B(xi) @ u.ravel() for xi in cell.rule.points]) - strain).max()
-    if not miss <= 1e-8 * np.abs(strain).max():
-        raise InputError(
-            f"B(xi) of {type(cell).__name__} is not that of its strain at the Gauss points; "
-            "make both alike, or ask for result.stress('gauss')"
-        )
+    C = group.material.C
+    return np.array([element(x, group.rule).strain_at(t, v, C) for x, t, v in zip(X, xi, u, strict=True)])

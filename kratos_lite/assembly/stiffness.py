@@ -11,10 +11,8 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from kratos_lite.assembly.block_matrix import BlockMatrix
-from kratos_lite.assembly.element_groups import ElementGroup, compiled, floats
+from kratos_lite.assembly.element_groups import ElementGroup, as_double, compiled
 from kratos_lite.assembly.sparsity_pattern import Pattern
-from kratos_lite.elements.geometry import GEOMETRY
-from kratos_lite.elements.overridden_steps import MECHANICS, stiffness_of
 from kratos_lite.typing import Array, Progress
 
 SCATTER_BYTES = 64_000_000
@@ -29,21 +27,12 @@ def assemble_stiffness(
     progress: Progress | None = None,
     skipped: set[str] | None = None,
 ) -> BlockMatrix:
-    """Return the stiffness matrix as 3x3 blocks, (3n, 3n) in N/m.
-
-    Parameters
-    ----------
-    points : (n, 3) float, m.
-    groups : elements with these points.
-    pattern : the sparsity of their nodes, in the order of the groups.
-    progress : called with ``"assemble"`` and the share done, 0 … 1.
-    skipped : collects what made a part of the work unnecessary, in words for the report.
-    """
+    """Return the stiffness matrix as 3x3 blocks, (3n, 3n) in N/m."""
     data = np.zeros((len(pattern.indices), 3, 3))
-    points = floats(points)
+    points = as_double(points)
     done, total = 0, sum(len(group) for group in groups)
     for number, group in enumerate(groups):
-        kernels = compiled("stiffness", group.element, *GEOMETRY, *MECHANICS)
+        kernels = compiled("stiffness", group.element)
         add = _add_compiled if kernels else _add_computed
         for count, constant in add(data, points, group, pattern, number):
             done += count
@@ -59,7 +48,7 @@ def _add_compiled(
 ) -> Iterator[tuple[int, bool]]:
     """Add the stiffness of a group; yield the number of elements and whether J was constant in some."""
     nodes, _, dN, weights = group.tables()
-    law = group.law()[0], group.strain_tables()
+    law = group.kernel_arguments()[0], group.strain_tables()
     module = compiled("stiffness", group.element)
     constant = module.add_stiffness(points, nodes, dN, weights, *law, pattern.indptr, pattern.indices, data)
     yield len(group), constant > 0
@@ -69,12 +58,12 @@ def _add_computed(
     data: Array, points: Array, group: ElementGroup, pattern: Pattern, number: int
 ) -> Iterator[tuple[int, bool]]:
     """Do the same in NumPy, in parts."""
-    standard, constant = group.element.inherits(*GEOMETRY, *MECHANICS), False
+    standard, constant = group.element.has_standard_strain() and not group.element.custom, False
 
     def stiffness(chunk: slice) -> Array:
         nonlocal constant
         elements = group.at(points, chunk)
-        K = stiffness_of(elements, group.material.C)
+        K = elements.stiffness_by_axis(group.material.C)
         constant |= standard and elements.constant_jacobian
         return K
 
@@ -105,6 +94,6 @@ def assemble_dense(points: Array, groups: Sequence[ElementGroup]) -> Array:
             dofs = 3 * group.nodes[chunk].astype(np.int64)[:, None, :] + np.arange(3)[:, None]
             dofs = dofs.reshape(len(dofs), -1)
             places = (dofs[:, :, None] * n + dofs[:, None, :]).ravel()
-            matrices = stiffness_of(group.at(points, chunk), group.material.C)
+            matrices = group.at(points, chunk).stiffness_by_axis(group.material.C)
             K += np.bincount(places, weights=matrices.ravel(), minlength=n * n)
     return K.reshape(n, n)

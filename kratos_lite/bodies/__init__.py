@@ -18,7 +18,7 @@ from kratos_lite.bodies.equilibrium import find_equilibrium
 from kratos_lite.bodies.finite_element import FiniteElementBody
 from kratos_lite.bodies.loads import Callback, FollowerPressure, Force, Spring, Torque
 from kratos_lite.bodies.pseudo_rigid import PseudoRigidBody
-from kratos_lite.bodies.rigid import Obstacle, RigidBody
+from kratos_lite.bodies.rigid import FixedBody, RigidBody
 from kratos_lite.time_series import TimeSeries
 
 __all__ = [
@@ -29,9 +29,9 @@ __all__ = [
     "FiniteElementBody",
     "FixDirection",
     "FixPoint",
+    "FixedBody",
     "FollowerPressure",
     "Force",
-    "Obstacle",
     "PrescribedAcceleration",
     "PrescribedDisplacement",
     "PrescribedVelocity",

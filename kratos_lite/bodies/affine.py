@@ -117,8 +117,8 @@ class AffineBody(Body):
         out[..., -3:] = v
         return out
 
-    def convected(self, vector: Array, X: Array, q: Array) -> Array:
-        """Return A times the vector; see `Body.convected`."""
+    def push_forward(self, vector: Array, X: Array, q: Array) -> Array:
+        """Return A times the vector; see `FreeBody.push_forward`."""
         return np.asarray(self.matrix_of(q) @ vector)
 
     def mass_center(self) -> Array:
@@ -143,9 +143,4 @@ class AffineBody(Body):
 
     @abstractmethod
     def spin(self) -> Array:
-        """Return the angular momentum about the mass center.
-
-        Returns
-        -------
-        (..., 3) float, kg m²/s.
-        """
+        """Return the angular momentum (..., 3) in kg m²/s about the mass center."""

@@ -10,34 +10,13 @@ from kratos_lite.bodies.body import Body
 from kratos_lite.bodies.free_body import Clock
 from kratos_lite.bodies.loads import AppliedLoad
 from kratos_lite.bodies.pseudo_rigid import PseudoRigidBody
-from kratos_lite.bodies.rigid import Obstacle, RigidBody
+from kratos_lite.bodies.rigid import FixedBody, RigidBody
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model.mass_properties import MassProperties
 
 
-def together(bodies: Sequence[Body]) -> Body:
-    """Return bodies of one kind as one object; q and u of each become rows of those of the whole.
-
-    Parameters
-    ----------
-    bodies : single rigid, pseudo-rigid bodies or obstacles of one kind, integrator, damping and time, without
-        constraints and with constant loads.
-
-    Raises
-    ------
-    InputError, ModelError
-        If they differ, or one has what only a single body can have.
-
-    Examples
-    --------
-    >>> import kratos_lite as kl
-    >>> bodies = [kl.RigidBody(kl.box(), kl.Isotropic3D(1e9, 0.3, 1000.0)) for _ in range(3)]
-    >>> bodies[1].set_velocity((1, 0, 0))
-    >>> whole = together(bodies)
-    >>> whole.q[1, 9] = 7.0
-    >>> float(bodies[1].mass_center()[0])
-    7.0
-    """
+def batch(bodies: Sequence[Body]) -> Body:
+    """Return bodies of one kind as one object; q and u of each become rows of those of the whole."""
     if not isinstance(bodies, Sequence):
         raise InputError(
             f"a body or a sequence of bodies is needed; got {type(bodies).__name__}; of a model: transient()"
@@ -57,7 +36,7 @@ def together(bodies: Sequence[Body]) -> Body:
         whole.C = np.stack([body.C for body in members if isinstance(body, PseudoRigidBody)])
     else:
         assert isinstance(first, RigidBody)
-        kind = Obstacle if isinstance(first, Obstacle) else RigidBody
+        kind = FixedBody if isinstance(first, FixedBody) else RigidBody
         whole = kind.__new__(kind)
         RigidBody.__init__(
             whole, mass_properties=mass_properties, integrator=first.integrator, tolerance=first.tolerance
@@ -105,6 +84,6 @@ def _loads(members: Sequence[Body]) -> list[AppliedLoad]:
     if not any(body.loads for body in members):
         return []
     loads = [body.constant_loads() for body in members]
-    acceleration, spatial, convected = (np.array(parts) for parts in zip(*loads, strict=True))
+    acceleration, spatial, follower = (np.array(parts) for parts in zip(*loads, strict=True))
     mass = np.array([body.mass for body in members])
-    return [AppliedLoad.constant(mass, acceleration, spatial, convected)]
+    return [AppliedLoad.constant(mass, acceleration, spatial, follower)]

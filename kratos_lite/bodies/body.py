@@ -91,18 +91,13 @@ class Body(FreeBody):
         self.damping = damping
 
     def warnings(self) -> list[str]:
-        """Return what is allowed, but may be a mistake; it is also logged when the body is made.
-
-        Returns
-        -------
-        list of str
-        """
+        """Return what is allowed, but may be a mistake; it is also logged when the body is made."""
         return []
 
     # ---- deformation -----------------------------------------------------------------------------
 
-    def internal_load(self, q: Array | None = None) -> Array:
-        """Return the generalized internal load: what deformation resists with.
+    def internal_force(self, q: Array | None = None) -> Array:
+        """Return the generalized internal force vector: what deformation resists with.
 
         Parameters
         ----------
@@ -115,16 +110,11 @@ class Body(FreeBody):
         return np.zeros_like(self.u)
 
     def internal_energy(self) -> Array | float:
-        """Return the strain energy.
-
-        Returns
-        -------
-        (...) float, J.
-        """
+        """Return the strain energy (...) in J."""
         return np.zeros(self.q.shape[:-1])
 
     def stiffness(self, q: Array | None = None) -> Any:
-        """Return the tangent of `internal_load`.
+        """Return the tangent of `internal_force`.
 
         Parameters
         ----------
@@ -144,12 +134,7 @@ class Body(FreeBody):
     # ---- conversion to another kind --------------------------------------------------------------
 
     def settings(self) -> dict[str, Any]:
-        """Return the arguments, besides mesh and material, that make another body like this one.
-
-        Returns
-        -------
-        dict, ``mass_properties`` None where they follow from mesh and material.
-        """
+        """Return the arguments besides mesh and material that make another body like this one."""
         return {
             "mass_properties": self.mass_properties if self.mass_is_given else None,
             "integrator": self.integrator,
@@ -159,12 +144,7 @@ class Body(FreeBody):
 
     @abstractmethod
     def affine_motion(self) -> tuple[Array, Array]:
-        """Return the affine motion that is nearest to that of the body with respect to mass.
-
-        Returns
-        -------
-        F and Ḟ (3, 3) float, deformation gradient and its rate in 1/s.
-        """
+        """Return F and Ḟ (3, 3), in 1/s, of the affine motion nearest to the body with respect to mass."""
 
     @abstractmethod
     def set_affine_motion(
@@ -180,12 +160,7 @@ class Body(FreeBody):
         """
 
     def reference_center(self) -> Array:
-        """Return the mass center of the undeformed body as its mass matrix has it.
-
-        Returns
-        -------
-        (3,) float, m.
-        """
+        """Return the mass center (3,) in m of the undeformed body as its mass matrix has it."""
         return self.center
 
     @property
@@ -251,7 +226,7 @@ class Body(FreeBody):
         >>> import kratos_lite as kl
         >>> body = kl.RigidBody(kl.box(), kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0))
         >>> body.add(kl.Force(body.center, (1.0, 0.0, 0.0)), amplitude=lambda t: 3.0 * t)
-        >>> body.external_load(time=2.0).tolist()
+        >>> body.external_force(time=2.0).tolist()
         [0.0, 0.0, 0.0, 6.0, 0.0, 0.0]
         """
         if isinstance(load, Constraint):
@@ -284,10 +259,10 @@ class Body(FreeBody):
         self.constraints.append(constraint)
         self.integrated_velocity = None
 
-    def external_load(
+    def external_force(
         self, q: Array | None = None, time: float | None = None, u: Array | None = None
     ) -> Array:
-        """Return the generalized external load.
+        """Return the generalized external force vector.
 
         Parameters
         ----------
@@ -305,54 +280,34 @@ class Body(FreeBody):
         return total
 
     def constant_loads(self) -> tuple[Array, Array, Array]:
-        """Return the sum of the loads that stay constant.
-
-        Returns
-        -------
-        acceleration (..., 3) in m/s², and generalized forces (..., dofs) fixed in space and in the body.
-        """
+        """Return acceleration (..., 3) and forces (..., dofs) fixed in space and body of constant loads."""
         if self._constant is not None and self._constant[0] == len(self.loads):
             return self._constant[1]
         lead = self.q.shape[:-1]
-        acceleration, spatial, convected = np.zeros((*lead, 3)), np.zeros_like(self.u), np.zeros_like(self.u)
+        acceleration, spatial, follower = np.zeros((*lead, 3)), np.zeros_like(self.u), np.zeros_like(self.u)
         for load in self.loads:
             amplitude = load.amplitude(self.time)
             if load.acceleration is not None:
                 acceleration += amplitude * load.acceleration
             if load.spatial is not None:
                 spatial += amplitude * load.spatial
-            if load.convected is not None:
-                convected += amplitude * load.convected
-        self._constant = len(self.loads), (acceleration, spatial, convected)
+            if load.follower is not None:
+                follower += amplitude * load.follower
+        self._constant = len(self.loads), (acceleration, spatial, follower)
         return self._constant[1]
 
     # ---- energies --------------------------------------------------------------------------------
 
     def kinetic_energy(self) -> Array | float:
-        """Return ½ ∫ρ v·v dV.
-
-        Returns
-        -------
-        (...) float, J.
-        """
+        """Return ½ ∫ρ v·v dV (...) in J."""
         return np.asarray((self.u * self.times_mass(self.u)).sum(axis=-1) / 2)
 
     def potential_energy(self) -> Array | float:
-        """Return the potential energy of gravity, springs and other constant dead loads.
-
-        Returns
-        -------
-        (...) float, J.
-        """
+        """Return the potential energy (...) in J of gravity, springs and other constant dead loads."""
         return np.asarray(sum((load.potential(self.q) for load in self.loads), np.zeros(self.q.shape[:-1])))
 
     def energy(self) -> Array | float:
-        """Return kinetic + internal + potential energy.
-
-        Returns
-        -------
-        (...) float, J.
-        """
+        """Return kinetic + internal + potential energy (...) in J."""
         return self.kinetic_energy() + self.internal_energy() + self.potential_energy()
 
     def __repr__(self) -> str:

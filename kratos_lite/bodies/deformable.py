@@ -38,7 +38,7 @@ class Deformable(Body):
 
     @abstractmethod
     def solver(self, q: Array, c: float) -> Solve:
-        """Return what solves (M + c K(q)) x = b, with the tangent K of the internal load.
+        """Return what solves (M + c K(q)) x = b, with the tangent K of the internal force vector.
 
         Parameters
         ----------
@@ -58,7 +58,7 @@ class Deformable(Body):
 
         Parameters
         ----------
-        residual : (dofs,), loads less internal load.
+        residual : (dofs,), external less internal force vector.
         entries : rows, dofs and values (k,) of H (c, dofs).
         gap : (c,) m.
         tangent : rows, dofs and values of A, the derivative of loads and reactions with respect to q.
@@ -70,30 +70,13 @@ class Deformable(Body):
 
     @abstractmethod
     def extent(self) -> float:
-        """Return the size of what displacements are added to.
-
-        Returns
-        -------
-        float, coordinates in m, or the 1 of a deformation gradient.
-        """
+        """Return the size of what displacements are added to: coordinates in m, or the 1 of F."""
 
     @abstractmethod
     def highest_frequency(self) -> float:
-        """Return an upper bound of the angular frequencies at the configuration.
-
-        Returns
-        -------
-        float, rad/s.
-        """
+        """Return an upper bound of the angular frequencies in rad/s at the configuration."""
 
     def critical_step(self) -> float:
-        """Return the longest stable step of the explicit integrator: 2/ω, and less with damping.
-
-        The damping force is that of the old velocity, so that h²ω²/2 + h η ω² must not exceed 2.
-
-        Returns
-        -------
-        float, s.
-        """
+        """Return the longest stable step in s of the explicit integrator: h²ω²/2 + h η ω² ≤ 2."""
         h = 2.0 / self.highest_frequency()
         return float(h * h / (np.hypot(h, self.damping) + self.damping))

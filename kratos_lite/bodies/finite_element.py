@@ -120,13 +120,7 @@ class FiniteElementBody(Deformable):
         return self.q.reshape(-1, 3)
 
     def position(self, X: ArrayLike, q: Array | None = None) -> Array:
-        """Return x = X + Σ N_a q_a of points X (m, 3) or (3,) in m.
-
-        Raises
-        ------
-        MeshError
-            If a point lies outside the undeformed body.
-        """
+        """Return x = X + Σ N_a q_a of points X (m, 3) or (3,) in m."""
         q = (self.q if q is None else q).reshape(-1, 3)
         return self.points + q if X is self.points else points_of(X) + self._interpolated(X, q)
 
@@ -247,8 +241,8 @@ class FiniteElementBody(Deformable):
         """Return the entries as they are; see `FreeBody.generalized_nodal_tangent`."""
         return entries
 
-    def convected(self, vector: Array, X: Array, q: Array) -> Array:
-        """Return F(X) times the vector; see `Body.convected`."""
+    def push_forward(self, vector: Array, X: Array, q: Array) -> Array:
+        """Return F(X) times the vector; see `FreeBody.push_forward`."""
         located = self._in_mesh(X[None])
         block, nodes = self.mesh.blocks[int(located.block[0])], self._at(X)[0]
         assert block.shape is not None
@@ -262,8 +256,8 @@ class FiniteElementBody(Deformable):
 
     # ---- deformation -----------------------------------------------------------------------------
 
-    def internal_load(self, q: Array | None = None) -> Array:
-        """Return the internal load of the formulation, (3n,) in N."""
+    def internal_force(self, q: Array | None = None) -> Array:
+        """Return the internal force vector of the formulation, (3n,) in N."""
         return self.formulation.load(self.q if q is None else q)
 
     def load_over(self, q: Array, dq: Array, damping: float) -> Array:
@@ -285,7 +279,7 @@ class FiniteElementBody(Deformable):
         return self.formulation.energy(self.q)
 
     def stiffness(self, q: Array | None = None) -> BlockMatrix:
-        """Return the tangent (3n, 3n) of the internal load in N/m."""
+        """Return the tangent (3n, 3n) of the internal force vector in N/m."""
         return self.formulation.stiffness(self.q if q is None else q)
 
     def damping_load(self, q: Array, u: Array) -> Array:
@@ -351,10 +345,10 @@ class FiniteElementBody(Deformable):
         holds has its six rigid motions first.
         """
         K, M = self.formulation.K0.scipy().tocsr(), self._mass.matrix()
-        held = [c.jacobian(self, np.zeros(self.dofs)) for c in self.constraints]
-        if not held:
+        constrained = [c.jacobian(self, np.zeros(self.dofs)) for c in self.constraints]
+        if not constrained:
             return modes(K, M, count)
-        T = allowed(np.concatenate(held))
+        T = allowed(np.concatenate(constrained))
         omega, shapes = modes((T.T @ K @ T).tocsr(), (T.T @ M @ T).tocsr(), count)
         return omega, np.asarray(T @ shapes)
 

@@ -143,11 +143,6 @@ class FreeBody(ABC):
         Parameters
         ----------
         X : (3,) or (m, 3) m.
-
-        Raises
-        ------
-        MeshError
-            A point lies outside.
         """
         if self.mesh is not None:
             self.mesh.locate(X).require()
@@ -239,7 +234,7 @@ class FreeBody(ABC):
         )
 
     @abstractmethod
-    def convected(self, vector: Array, X: Array, q: Array) -> Array:
+    def push_forward(self, vector: Array, X: Array, q: Array) -> Array:
         """Return where a vector points that is fixed in the body.
 
         Parameters
@@ -315,21 +310,11 @@ class FreeBody(ABC):
 
     @abstractmethod
     def mass_solver(self) -> Solve:
-        """Return what solves M x = b of a single body.
-
-        Returns
-        -------
-        function of columns b (dofs, k) or (dofs,) that returns x.
-        """
+        """Return the function that solves M x = b, (dofs,) or columns (dofs, k), of a single body."""
 
     @abstractmethod
     def mass_center(self) -> Array:
-        """Return where the mass center is.
-
-        Returns
-        -------
-        (..., 3) float, m.
-        """
+        """Return the place (..., 3) in m of the mass center."""
 
     @abstractmethod
     def gravity_potential(self, g: Array, q: Array) -> Array:
@@ -347,12 +332,7 @@ class FreeBody(ABC):
 
     @abstractmethod
     def linear_momentum(self) -> Array:
-        """Return ∫ρ v dV.
-
-        Returns
-        -------
-        (..., 3) float, kg m/s.
-        """
+        """Return ∫ρ v dV (..., 3) in kg m/s."""
 
     @abstractmethod
     def angular_momentum(self, about: ArrayLike | None = None) -> Array:

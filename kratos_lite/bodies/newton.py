@@ -10,15 +10,13 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.bodies.linear_algebra import Entries
 from kratos_lite.solvers import direct
 from kratos_lite.solvers.constraint_map import ConstraintMap
-from kratos_lite.solvers.linear_solver import LinearSolver, choose
+from kratos_lite.solvers.linear_solver import LinearSolver
+from kratos_lite.solvers.plan import Facts, choose
 from kratos_lite.typing import Array, Ints
 
 
 def dense_step(K: Array, residual: Array, entries: Entries, gap: Array) -> tuple[Array, Array]:
-    """Return x (n,) and multipliers (c,) for a full matrix K (n, n), which may be singular.
-
-    Least squares: a body that loads do not move needs no support, and redundant supports share their load.
-    """
+    """Return x (n,) and multipliers (c,) for a full matrix K (n, n), which may be singular: least squares."""
     n, c = len(residual), len(gap)
     row, dof, value = entries
     A = np.zeros((n + c, n + c))
@@ -51,10 +49,9 @@ def _eliminated(
     prescribed, free = np.zeros(n), np.ones(n, dtype=bool)
     prescribed[dof], free[dof] = -gap / value, False
     constraints = ConstraintMap(np.flatnonzero(free), prescribed)
-    method, reason = choose("auto", len(constraints.free), n)
-    method = method if symmetric or method == "dense" else "direct"
-    matrix: Any = K if method != "dense" else K.scipy().toarray()
-    solver = LinearSolver(matrix, constraints, points, method, reason, symmetric=symmetric)
+    plan = choose("auto", Facts(len(constraints.free), n, symmetric))
+    matrix: Any = K.scipy().toarray() if plan.method == "dense" else K
+    solver = LinearSolver(matrix, constraints, points, plan, symmetric=symmetric)
     x = solver.solve(residual, 1e-12).x
     reaction = (K @ x - residual)[dof] / value
     twice = np.bincount(dof, minlength=n)[dof]
@@ -62,12 +59,10 @@ def _eliminated(
 
 
 def _less(K: BlockMatrix, tangent: Entries) -> BlockMatrix:
-    from scipy.sparse import bsr_array, csr_array
+    from scipy.sparse import csr_array
 
     row, column, value = tangent
-    A = bsr_array(K.scipy().tocsr() - csr_array((value, (row, column)), shape=K.shape), blocksize=(3, 3))
-    A.sort_indices()
-    return BlockMatrix(A.data, A.indices.astype(np.int32), A.indptr.astype(np.int32))
+    return BlockMatrix.of(K.scipy().tocsr() - csr_array((value, (row, column)), shape=K.shape))
 
 
 def _with_multipliers(K: BlockMatrix, residual: Array, entries: Entries, gap: Array) -> tuple[Array, Array]:

@@ -34,7 +34,7 @@ class PseudoRigidBody(AffineBody, Deformable):
 
     Parameters
     ----------
-    mesh : the shape; may be left out where mass_properties are given.
+    mesh : the shape; may be omitted where mass_properties are given.
     material : one material (a body of several has no single C).
     mass_properties : mass, volume, center and Euler tensor in place of those of mesh and material.
     integrator : one of `Deformable.integrators`; ``energy_momentum`` if not given.
@@ -167,7 +167,7 @@ class PseudoRigidBody(AffineBody, Deformable):
 
     # ---- deformation ----------------------------------------------------------------------------
 
-    def internal_load(self, q: Array | None = None) -> Array:
+    def internal_force(self, q: Array | None = None) -> Array:
         """Return V P(F) row by row, and no force on the mass center, (..., 12)."""
         F = (self.q if q is None else q)[..., :9]
         out = np.zeros((*F.shape[:-1], 12))
@@ -188,12 +188,7 @@ class PseudoRigidBody(AffineBody, Deformable):
         return np.asarray(V * (stress + np.swapaxes(B, -1, -2) @ self.C @ B))
 
     def mass_matrix(self) -> Array:
-        """Return the mass of Ḟ, diag(E0, E0, E0).
-
-        Returns
-        -------
-        (..., 9, 9) in kg m².
-        """
+        """Return the mass (..., 9, 9) in kg m² of Ḟ, diag(E0, E0, E0)."""
         return by_rows(self.mass_properties.euler)
 
     def solver(self, q: Array, c: float) -> Solve:
@@ -206,22 +201,12 @@ class PseudoRigidBody(AffineBody, Deformable):
         return self.solver(self.q, 0.0)
 
     def step_constants(self) -> tuple[Array, Array, Array, Array, float]:
-        """Return what steps take.
-
-        Returns
-        -------
-        Euler tensor, mass, volume, C and damping.
-        """
+        """Return what steps take: Euler tensor, mass, volume, C and damping."""
         c = self.mass_properties
         return c.euler, c.mass, c.volume, self.C, self.damping
 
     def frequencies(self) -> Array:
-        """Return the angular frequencies at the configuration.
-
-        Returns
-        -------
-        (..., 9) in rad/s, ascending; 0 if ω² < 0.
-        """
+        """Return the angular frequencies (..., 9) in rad/s at the configuration, ascending; 0 if ω² < 0."""
         L = np.linalg.inv(np.linalg.cholesky(self.mass_matrix()))
         K = self.stiffness()
         squares = np.linalg.eigvalsh(L @ K @ np.swapaxes(L, -1, -2))

@@ -1,4 +1,4 @@
-"""RigidBody: a rotation and the place of the mass center; Obstacle: one that nothing moves.
+"""RigidBody: a rotation and the place of the mass center; FixedBody: one that nothing moves.
 
 Source: Solfec-1.0 theory, rigid bodies.
 """
@@ -32,7 +32,7 @@ class RigidBody(AffineBody):
 
     Parameters
     ----------
-    mesh : the shape; may be left out where mass_properties are given.
+    mesh : the shape; may be omitted where mass_properties are given.
     material : its density counts.
     mass_properties : mass, center and inertia in place of those of mesh and material; with leading axes for
         a batch of bodies.
@@ -158,12 +158,7 @@ class RigidBody(AffineBody):
         return np.concatenate([spin, self.mass[..., None] * v[..., 3:]], axis=-1)
 
     def step_constants(self) -> tuple[Array, Array, Array]:
-        """Return what steps take.
-
-        Returns
-        -------
-        Inertia, its inverse and mass.
-        """
+        """Return what steps take: inertia, its inverse and mass."""
         return self.mass_properties.inertia, self._inverse, self.mass_properties.mass
 
     def mass_solver(self) -> Solve:
@@ -192,7 +187,7 @@ class RigidBody(AffineBody):
         return apply(self.rotation, self.times_mass(self.u)[..., :3])
 
 
-class Obstacle(RigidBody):
+class FixedBody(RigidBody):
     """A body that loads do not affect: it is fixed, or moves at the velocity set by `set_velocity`.
 
     Its vectors are those of a rigid body; it carries neither mass nor energy, and takes no loads.
@@ -205,14 +200,14 @@ class Obstacle(RigidBody):
     Examples
     --------
     >>> import kratos_lite as kl
-    >>> floor = Obstacle(kl.box((10.0, 10.0, 0.1)))
+    >>> floor = FixedBody(kl.box((10.0, 10.0, 0.1)))
     >>> floor.set_velocity(linear=(0.5, 0, 0))
     >>> *_, end = kl.integrate(floor, dt=0.1, steps=20)
     >>> floor.mass_center().round(12).tolist()
     [6.0, 5.0, 0.05]
     """
 
-    kind = "obstacle"
+    kind = "fixed"
     integrators: ClassVar[Mapping[str, str]] = {"uniform": ""}
     convertible = False
 
@@ -222,7 +217,7 @@ class Obstacle(RigidBody):
 
     @property
     def mass(self) -> Array:
-        """Return 0: an obstacle carries no mass."""
+        """Return 0: a fixed body carries no mass."""
         return np.zeros_like(self.mass_properties.mass)
 
     def times_mass(self, v: Array) -> Array:
@@ -235,10 +230,10 @@ class Obstacle(RigidBody):
         Raises
         ------
         ModelError
-            Always: loads do not affect an obstacle.
+            Always: loads do not affect a fixed body.
         """
         raise ModelError(
-            "loads do not affect an obstacle: set its motion with set_velocity, or use a RigidBody"
+            "loads do not affect a fixed body: set its motion with set_velocity, or use a RigidBody"
         )
 
     def constrain(self, constraint: object) -> None:
@@ -247,6 +242,6 @@ class Obstacle(RigidBody):
         Raises
         ------
         ModelError
-            Always: an obstacle needs no support.
+            Always: a fixed body needs no support.
         """
-        raise ModelError("an obstacle needs no constraint: it is fixed, or moves at the velocity set")
+        raise ModelError("a fixed body needs no constraint: it is fixed, or moves at the velocity set")

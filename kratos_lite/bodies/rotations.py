@@ -20,11 +20,7 @@ ORTHOGONAL = 1e-8
 
 
 def hat(a: ArrayLike) -> Array:
-    """Return the matrix (..., 3, 3) with hat(a) b = a × b.
-
-    >>> hat([1.0, 2.0, 3.0]) @ np.array([0.0, 0.0, 1.0])
-    array([ 2., -1.,  0.])
-    """
+    """Return the matrix (..., 3, 3) with hat(a) b = a × b."""
     a = np.asarray(a, dtype=float)
     out = np.zeros((*a.shape, 3))
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
@@ -54,13 +50,7 @@ def _coefficients(psi: Array) -> tuple[Array, Array, Array]:
 
 
 def exp(psi: ArrayLike) -> Array:
-    """Return the rotation (..., 3, 3) by the angle |psi| about psi (..., 3), in radians.
-
-    >>> exp([0.0, 0.0, np.pi / 2]).round(12) + 0.0
-    array([[ 0., -1.,  0.],
-           [ 1.,  0.,  0.],
-           [ 0.,  0.,  1.]])
-    """
+    """Return the rotation (..., 3, 3) by the angle |psi| about psi (..., 3), in radians."""
     psi = np.asarray(psi, dtype=float)
     a, b, _ = _coefficients(psi)
     H = hat(psi)
@@ -76,15 +66,7 @@ def right_jacobian(psi: ArrayLike) -> Array:
 
 
 def polar(F: ArrayLike) -> Array:
-    """Return the rotation R (..., 3, 3) nearest to F: F = R U with U symmetric.
-
-    For det F < 0 it is the nearest rotation, not the nearest reflection.
-
-    >>> polar(np.diag([2.0, 1.0, 0.5]))
-    array([[1., 0., 0.],
-           [0., 1., 0.],
-           [0., 0., 1.]])
-    """
+    """Return the rotation R (..., 3, 3) nearest to F, never a reflection: F = R U with U symmetric."""
     V, _, W = np.linalg.svd(np.asarray(F, dtype=float))
     sign = np.ones(V.shape[:-1])
     sign[..., 2] = np.sign(np.linalg.det(V @ W))
@@ -92,13 +74,7 @@ def polar(F: ArrayLike) -> Array:
 
 
 def check_rotation(R: ArrayLike, what: str = "a rotation") -> Array:
-    """Return R (..., 3, 3) as floats if it is a rotation.
-
-    Raises
-    ------
-    InputError
-        Its shape is wrong, it is not orthogonal to 1e-8, or it is a reflection.
-    """
+    """Return R (..., 3, 3) as floats; InputError unless it is a rotation to 1e-8."""
     R = finite(R, what)
     if R.shape[-2:] != (3, 3):
         raise InputError(f"{what} must have shape (3, 3); got {R.shape}")

@@ -14,26 +14,26 @@ EXIT_CODES = """exit codes:
   0    done
   1    a defect of kratos-lite, or a row of verify that fails
   2    bad input, or an output that cannot be written
-  3    solved, but an expected value of the run file, or the error asked for, is missed
+  3    solved, but an expected value of the run file, or the requested error, is not reached
   130  interrupted with Ctrl-C; 143 by SIGTERM"""
 MODEL = (
     ".mdpa, any file of an .elem set or its stem, ProjectParameters.json or its folder, or any mesh that "
     "meshio reads"
 )
-BODY = "a .json file with a body, or a .py script with body, dt and steps"
+SCRIPT = "a .py script with a case, or with body, dt and steps"
 EXAMPLES = {
     "solve": """kratos-lite solve cube.mdpa -o cube.vtu
   kratos-lite solve examples/cantilever --json result.json
   kratos-lite solve wheel.mdpa --fix hub:xyz --rotation z:30 --picture wheel.png
   kratos-lite solve bridge.mdpa --modes 10 -o modes.pvd --picture modes.png
   kratos-lite solve tower.mdpa --fix z-:xyz --traction z+:1e4,0,0 --time 1e-3:500:10 -o swing.pvd
-  kratos-lite solve examples/bodies/tumbling_box.json -o out/box.pvd -o out/box.csv --picture out/box.png
-  kratos-lite solve box.json --steps 500 -o second.csv --restart half.npz
+  kratos-lite solve examples/bodies/thrown_box.py -o out/box.pvd -o out/box.csv --picture out/box.png
+  kratos-lite solve box.py --steps 500 -o second.csv --restart half.npz
   mpirun -n 4 kratos-lite solve bridge.mdpa --engine petsc -o bridge.pvtu
   kratos-lite solve part.msh --material E=210e9,nu=0.3,density=7850 \\
       --fix bottom:xyz --gravity 0,0,-9.81 --traction top:0,0,-1e5 --picture part.png""",
-    "info": "kratos-lite info beam.mdpa\n  kratos-lite info examples/bodies/pendulum.json",
-    "check": "kratos-lite check beam.mdpa\n  kratos-lite check examples/bodies/tumbling_box.json\n"
+    "info": "kratos-lite info beam.mdpa\n  kratos-lite info examples/bodies/pendulum.py",
+    "check": "kratos-lite check beam.mdpa\n  kratos-lite check examples/bodies/thrown_box.py\n"
     "  kratos-lite check part.msh --material E=210e9,nu=0.3 --fix bottom:xyz --pressure top:1e5\n"
     "  mpirun -n 4 kratos-lite check bridge.mdpa --engine petsc\n"
     "  kratos-lite check my_element.py",
@@ -50,6 +50,20 @@ MODES = (
     "them to --picture"
 )
 ENGINE = "petsc: statics, by PETSc over all processes that mpirun or srun has started (own, on one)"
+ERROR = "relative error of the energy norm, such as 1%% or 0.01: statics, the mesh made finer"
+FORMULATION = (
+    "of the elements, in place of what their names in the file say: standard, enhanced, b_bar, reduced, or "
+    "non_locking, that of each shape which does not lock"
+)
+OUTPUT = (
+    "static: .vtu for ParaView, .html for the browser, .vtk, .json or .csv (nodes), over many processes "
+    ".pvtu with a piece of each, or .json; in time: .pvd for ParaView, .html, .csv or .npz; of modes: .pvd "
+    "or .html; may be given several times"
+)
+PROBLEMS = (
+    "problems, their families or patterns such as '*cylinder*' (all); a .py file defines elements of your "
+    "own, which are then those that are verified"
+)
 RESTART = (
     "go on from a state that --state wrote; series and picture then hold the rest of the run only, and "
     "replace those of the same name, so give them new names"
@@ -62,13 +76,13 @@ def with_values(words: Sequence[str]) -> list[str]:
     >>> with_values(["solve", "a.mdpa", "--petsc", "-ksp_view"])
     ['solve', 'a.mdpa', '--petsc=-ksp_view']
     """
-    found: list[str] = []
+    joined: list[str] = []
     for word in words:
-        if found[-1:] == ["--petsc"]:
-            found[-1] = f"--petsc={word}"
+        if joined[-1:] == ["--petsc"]:
+            joined[-1] = f"--petsc={word}"
         else:
-            found.append(word)
-    return found
+            joined.append(word)
+    return joined
 
 
 def build_parser() -> Parser:
@@ -83,14 +97,14 @@ def build_parser() -> Parser:
     commands = parser.add_subparsers(prog="kratos-lite", dest="command", required=True, metavar="COMMAND")
     _add_solve(commands)
     info = _add(commands, "info", "describe a file without solving it")
-    info.add_argument("input", help=f"{MODEL}; or {BODY}")
+    info.add_argument("input", help=f"{MODEL}; or {SCRIPT}")
     check = _add(
         commands,
         "check",
         "report what keeps a file from being solved, by the words of solve, without solving it; or every "
         "problem of the elements and materials in a Python file",
     )
-    check.add_argument("input", help=f"{MODEL}; {BODY}; or a .py file that defines elements or materials")
+    check.add_argument("input", help=f"{MODEL}; {SCRIPT}; or a .py file that defines elements or materials")
     _add_case(check)
     convert = _add(commands, "convert", "convert a model file to another format")
     convert.add_argument("input", help=MODEL)
@@ -122,8 +136,17 @@ def _add(commands: Any, name: str, text: str) -> argparse.ArgumentParser:
 
 def _add_solve(commands: Any) -> None:
     solve = _add(commands, "solve", "solve what a file describes, at rest or in time, and print a summary")
-    solve.add_argument("input", help=f"{MODEL}; or {BODY}")
+    solve.add_argument("input", help=f"{MODEL}; or {SCRIPT}")
     _add_case(solve)
+
+
+def _add_options(group: Any, *options: tuple[str, str | None, str], **settings: Any) -> None:
+    """Add options: their names, what stands for the value (None without one), and the help."""
+    for names, value, text in options:
+        if value is None:
+            group.add_argument(*names.split(), action="store_true", help=text)
+        else:
+            group.add_argument(*names.split(), metavar=value or None, help=text, **settings)
 
 
 def _add_case(command: argparse.ArgumentParser) -> None:
@@ -133,54 +156,36 @@ def _add_case(command: argparse.ArgumentParser) -> None:
     _add_motion(command)
     _add_time(command)
     how = command.add_argument_group("solver")
-    how.add_argument("--modes", type=int, metavar="N", help=MODES)
-    how.add_argument("--solver", choices=("auto", "dense", "direct", "amg"), help="auto chooses by size")
-    how.add_argument(
-        "--error",
-        metavar="SHARE",
-        help="relative error of the energy norm, such as 1%% or 0.01: statics, the mesh made finer",
+    _add_options(how, ("--modes", "N", MODES), type=int)
+    _add_options(how, ("--solver", "", "auto chooses by size"), choices=("auto", "dense", "direct", "amg"))
+    _add_options(how, ("--error", "FRACTION", ERROR))
+    _add_options(how, ("--engine", "", ENGINE), choices=("own", "petsc"))
+    _add_options(how, ("--petsc", "OPTIONS", "options of PETSc, such as '-pc_type hypre'"))
+    _add_options(how, ("--tolerance", "", "relative residual of the iterative solver (1e-10)"), type=float)
+    _add_options(how, ("--threads", "N", "threads of the compiled kernels (all cores)"), type=int)
+    _add_options(
+        how,
+        ("--progress", None, "show progress, even if not on a terminal"),
+        ("-v --verbose", None, "also list what the solution skipped"),
+        ("-q --quiet", None, "print no summary"),
     )
-    how.add_argument("--engine", choices=("own", "petsc"), help=ENGINE)
-    how.add_argument("--petsc", metavar="OPTIONS", help="options of PETSc, such as '-pc_type hypre'")
-    how.add_argument("--tolerance", type=float, help="relative residual of the iterative solver (1e-10)")
-    how.add_argument("--threads", type=int, metavar="N", help="threads of the compiled kernels (all cores)")
-    how.add_argument("--progress", action="store_true", help="show progress, even if not on a terminal")
-    how.add_argument("-v", "--verbose", action="store_true", help="also list what the solution skipped")
-    how.add_argument("-q", "--quiet", action="store_true", help="print no summary")
 
 
 def _add_verify(commands: Any) -> None:
     verify = _add(commands, "verify", "compare elements with closed forms and published values")
-    verify.add_argument(
-        "names",
-        nargs="*",
-        metavar="NAME",
-        help="problems, their families or patterns such as '*cylinder*' (all); a .py file defines elements "
-        "of your own, which are then those that are verified",
+    verify.add_argument("names", nargs="*", metavar="NAME", help=PROBLEMS)
+    only = "only this one, such as 3D8N; may be given several times (all of the library)"
+    _add_options(verify, ("--element", "NAME", only), action="append", default=[])
+    _add_options(
+        verify,
+        ("-o --output", "OUT", "write the table as .md or .json"),
+        ("--list", None, "list the problems and their sources instead"),
     )
-    verify.add_argument(
-        "--element",
-        action="append",
-        default=[],
-        metavar="NAME",
-        help="only this one, such as 3D8N; may be given several times (all of the library)",
-    )
-    verify.add_argument("-o", "--output", metavar="OUT", help="write the table as .md or .json")
-    verify.add_argument("--list", action="store_true", help="list the problems and their sources instead")
 
 
-def _add_outputs(solve: argparse.ArgumentParser) -> None:
-    out = solve.add_argument_group("output (instead of the files that the input names)")
-    out.add_argument(
-        "-o",
-        "--output",
-        metavar="OUT",
-        action="append",
-        default=[],
-        help="static: .vtu for ParaView, .html for the browser, .vtk, .json or .csv (nodes), over many "
-        "processes .pvtu with a piece of each, or .json; in time: .pvd for ParaView, .html, .csv or .npz; of "
-        "modes: .pvd or .html; may be given several times",
-    )
+def _add_outputs(command: argparse.ArgumentParser) -> None:
+    out = command.add_argument_group("output (instead of the files that the input names)")
+    _add_options(out, ("-o --output", "OUT", OUTPUT), action="append", default=[])
     _add_options(
         out,
         ("--json", "OUT.json", "summary, displacements and reactions by node id"),
@@ -191,20 +196,17 @@ def _add_outputs(solve: argparse.ArgumentParser) -> None:
         ),
         ("--state", "OUT.npz", "the last state in time, for --restart; written after Ctrl-C too"),
     )
-    out.add_argument(
-        "--vtu",
-        choices=("binary", "compressed", "ascii"),
-        help="how .vtu files store their numbers: quickest, smallest, or to be read by eye (binary)",
-    )
+    text = "how .vtu files store their numbers: quickest, smallest, or to be read by eye (binary)"
+    _add_options(out, ("--vtu", "", text), choices=("binary", "compressed", "ascii"))
 
 
-def _add_model(solve: argparse.ArgumentParser) -> None:
-    given = solve.add_argument_group(
+def _add_model(command: argparse.ArgumentParser) -> None:
+    model = command.add_argument_group(
         "model (adds to what the file says; PART is a part of the mesh or a side x- x+ y- y+ z- z+)"
     )
     fix = "prescribe displacements in m along the axes named, 0 if no value is given"
     _add_options(
-        given,
+        model,
         ("--material", "[PART:][LAW:]E=…,nu=…", "constants in SI units; replaces the materials of the file"),
         ("--fix", "PART:xyz[=VALUE]", fix),
         ("--gravity", "X,Y,Z", "acceleration in m/s²"),
@@ -214,26 +216,19 @@ def _add_model(solve: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
     )
-    given.add_argument(
-        "--formulation",
-        metavar="WORD",
-        help="of the elements, in place of what their names in the file say: standard, enhanced, b_bar, "
-        "reduced, or non_locking, that of each shape which does not lock",
-    )
-    given.add_argument(
-        "--ignore-initial-displacement",
-        action="store_true",
-        help="do not take the DISPLACEMENT of free nodes in the file for the state without stress",
+    _add_options(
+        model,
+        ("--formulation", "WORD", FORMULATION),
+        (
+            "--ignore-initial-displacement",
+            None,
+            "do not take the DISPLACEMENT of free nodes in the file for the state without stress",
+        ),
     )
 
 
-def _add_options(group: Any, *options: tuple[str, str, str], **settings: Any) -> None:
-    for option, meta, text in options:
-        group.add_argument(option, metavar=meta, help=text, **settings)
-
-
-def _add_motion(solve: argparse.ArgumentParser) -> None:
-    ale = solve.add_argument_group("motion of the material through the mesh (one at most)")
+def _add_motion(command: argparse.ArgumentParser) -> None:
+    ale = command.add_argument_group("motion of the material through the mesh (one at most)")
     _add_options(
         ale,
         ("--rotation", "AXIS:RATE[:ACCELERATION]", "about x, y, z or X,Y,Z, in rad/s and rad/s²"),
@@ -243,19 +238,14 @@ def _add_motion(solve: argparse.ArgumentParser) -> None:
         ("--translation", "AXIS:RATE[:ACCELERATION]", "of the moving frame, in m/s and m/s²"),
         ("--damping", "ALPHA", "by mass, relative to the motion, in 1/s (0)"),
         ("--moving-part", "PART", "the part that moves; the others rest (all)"),
+        ("--stiffening", None, "add the geometric stiffness of the centrifugal stress"),
     )
-    ale.add_argument(
-        "--stiffening", action="store_true", help="add the geometric stiffness of the centrifugal stress"
-    )
-    ale.add_argument(
-        "--boundaries",
-        choices=("absorbing", "periodic", "fixed", "natural"),
-        help="condition on the cut faces of the moving frame (absorbing)",
-    )
+    text = "condition on the cut faces of the moving frame (absorbing)"
+    _add_options(ale, ("--boundaries", "", text), choices=("absorbing", "periodic", "fixed", "natural"))
 
 
-def _add_time(solve: argparse.ArgumentParser) -> None:
-    time = solve.add_argument_group("time integration")
+def _add_time(command: argparse.ArgumentParser) -> None:
+    time = command.add_argument_group("time integration")
     _add_options(
         time,
         ("--time", "STEP:STEPS[:EVERY]", "step in s, their number, and every how many is kept"),
@@ -263,5 +253,5 @@ def _add_time(solve: argparse.ArgumentParser) -> None:
         ("--integrator", "NAME[:NUMBERS]", f"of models: {INTEGRATORS}"),
         ("--rayleigh", "ALPHA,BETA", "damping ALPHA·M + BETA·K of models, in 1/s and s"),
     )
-    time.add_argument("--steps", type=int, metavar="N", help="number of steps, overrides the file")
-    time.add_argument("--lumped", action="store_true", help="lumped mass (models)")
+    _add_options(time, ("--steps", "N", "number of steps, overrides the file"), type=int)
+    _add_options(time, ("--lumped", None, "lumped mass (models)"))

@@ -30,91 +30,37 @@ class BBar(KinematicLinear):
 
     A subclass states `shape`, `rule` and the `dilatation`, the degree of the polynomials: 0 for the mean over
     the element, 1 for a linear one.  Neighbors have dilatations of their own.  Where displacements of other
-    dilatations alone would have no energy, `kept` is the share of mᵀB - Π(mᵀB) that stays.
+    dilatations alone would have no energy, `kept` is the fraction of mᵀB - Π(mᵀB) that stays.
 
     Source: Hughes, IJNME 15 (1980) 1413; for linear ones Boffi & Gastaldi, M3AS 12 (2002) 1577:
     polynomials in x, y, z, not in ξ, keep the order on distorted cells.
     """
 
     formulation = "b_bar"
-    batched: ClassVar[bool] = True
     dilatation: ClassVar[int] = 0
 
     @classmethod
     def strain_tables(cls, rule: Rule, C: Array) -> StrainTables:
-        """Return the polynomials of the dilatation for kernels; see `KinematicLinear.strain_tables`.
-
-        Parameters
-        ----------
-        rule : quadrature rule.
-        C : (6, 6) float, Pa; for `kept`.
-
-        Returns
-        -------
-        StrainTables
-        """
+        """Return the polynomials of the dilatation for kernels; see `KinematicLinear.strain_tables`."""
         center = cls._center()
         functions = np.zeros((len(rule), len(cls.nodes) if cls.dilatation else 0))
         if cls.dilatation:
             functions += cls.N(rule.points) - cls.N(center)
-        share = 1 - float(cls(cls.nodes, rule).kept(C))
-        return StrainTables(cls.dN(center), functions, None, share)
+        fraction = 1 - float(cls(cls.nodes, rule).kept(C))
+        return StrainTables(cls.dN(center), functions, None, fraction)
 
-    def B_at_gauss_points(self, C: ArrayLike | None = None) -> Array:
-        """Return B̄ at the Gauss points.
-
-        Parameters
-        ----------
-        C : (6, 6) or (..., 6, 6) float, Pa; for `kept`.
-
-        Returns
-        -------
-        (..., g, 6, 3n) float, 1/m
-        """
-        B = strain_rows(self._gauss[1])
-        change = (1 - self.kept(C))[..., None, None] * (self._projected(self.rule.points) - _trace(B))
-        B[..., :3, :] += change[..., None, :] / 3
+    def B(self, xi: ArrayLike, C: ArrayLike | None = None) -> Array:
+        """Return B̄ at points; see `KinematicLinear.B`."""
+        B, points = super().B(xi), arguments.points(xi)
+        projected = self._projected(points.reshape(-1, 3)).reshape(*B.shape[:-2], -1)
+        fraction = 1 - self.kept(C)
+        fraction = fraction.reshape(fraction.shape + (1,) * points.ndim)
+        B[..., :3, :] += (fraction * (projected - _trace(B)) / 3)[..., None, :]
         return B
 
     def kept(self, C: ArrayLike | None) -> Array:
-        """Return the share of the dilatation beyond its projection that stays in the strain: none.
-
-        Parameters
-        ----------
-        C : (6, 6) or (..., 6, 6) float, Pa.
-
-        Returns
-        -------
-        () or (...) float, 0 … 1
-        """
+        """Return the fraction (...) of the dilatation beyond its projection that stays in the strain."""
         return np.zeros(())
-
-    def strain_at(self, xi: ArrayLike, u: ArrayLike, C: ArrayLike | None = None) -> Array:
-        """Return the strain with projected dilatation at points; see `KinematicLinear.strain_at`.
-
-        Parameters
-        ----------
-        xi : (3,) or (..., 3) float, points in reference coordinates.
-        u : (..., n, 3) float, nodal displacements in m.
-        C : (6, 6) or (..., 6, 6) float, Pa; for `kept`.
-
-        Returns
-        -------
-        (..., 6) float
-
-        Raises
-        ------
-        InputError
-            If `xi` are not points or `u` is not made of nodal displacements.
-        """
-        xi, u = arguments.points(xi), arguments.nodal(u, self.X)
-        strain = super().strain_at(xi, u)
-        projected = self._projected(xi.reshape(-1, 3)) @ u.reshape(*u.shape[:-2], -1, 1)
-        dilatation = strain[..., :3].sum(axis=-1)
-        share = 1 - self.kept(C)
-        share = share.reshape(share.shape + (1,) * (dilatation.ndim - share.ndim))
-        strain[..., :3] += (share * (projected.reshape(dilatation.shape) - dilatation) / 3)[..., None]
-        return strain
 
     def _projected(self, xi: Array) -> Array:
         """Return Π(mᵀB) (..., g, 3n) at points (g, 3)."""

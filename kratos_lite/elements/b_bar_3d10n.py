@@ -8,9 +8,8 @@ import numpy as np
 
 from kratos_lite.elements import arguments
 from kratos_lite.elements.b_bar import BBar
-from kratos_lite.elements.strain_tables import StrainTables
 from kratos_lite.errors import InputError, MaterialError
-from kratos_lite.quadrature import Rule, tetrahedron
+from kratos_lite.quadrature import tetrahedron
 from kratos_lite.shapes.tetrahedra import Tetrahedron10
 from kratos_lite.typing import Array
 
@@ -29,39 +28,8 @@ class BBar3D10N(BBar):
     shape = Tetrahedron10
     rule = tetrahedron(degree=2)
 
-    @classmethod
-    def strain_tables(cls, rule: Rule, C: Array) -> StrainTables:
-        """Return the share for kernels, which `kept` gives; see `BBar.strain_tables`.
-
-        Parameters
-        ----------
-        rule : quadrature rule.
-        C : (6, 6) float, Pa.
-
-        Returns
-        -------
-        StrainTables
-        """
-        return super().strain_tables(rule, C)
-
     def kept(self, C: ArrayLike | None) -> Array:
-        """Return √min(1, μ / κ); see `BBar.kept`.
-
-        Parameters
-        ----------
-        C : (6, 6) or (..., 6, 6) float, Pa.
-
-        Returns
-        -------
-        () or (...) float, 0 … 1
-
-        Raises
-        ------
-        InputError
-            If `C` is not given.
-        MaterialError
-            If its bulk or shear modulus is not positive.
-        """
+        """Return √min(1, μ / κ); InputError without C, MaterialError if κ or μ is not positive."""
         if C is None:
             raise InputError(f"the strain of {type(self).__name__} depends on the material; give its C")
         C = arguments.elasticity(C, self.X)

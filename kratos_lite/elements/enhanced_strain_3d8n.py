@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -61,74 +61,21 @@ class EnhancedStrain3D8N(KinematicLinear):
     shape = Hexahedron8
     rule = hexahedron(degree=3)
     formulation = "enhanced"
-    batched: ClassVar[bool] = True
 
     @classmethod
     def strain_tables(cls, rule: Rule, C: Array) -> StrainTables:
-        """Return the monomials of the modes for kernels; see `KinematicLinear.strain_tables`.
-
-        Parameters
-        ----------
-        rule : quadrature rule.
-        C : (6, 6) float, Pa.
-
-        Returns
-        -------
-        StrainTables
-
-        Raises
-        ------
-        InputError, MaterialError
-            As by `B_at_gauss_points`.
-        """
+        """Return the monomials of the modes for kernels; see `KinematicLinear.strain_tables`."""
         _check_rule(rule)
         if not np.linalg.eigvalsh(C).min() > 0:
             raise _not_definite(cls, C)
-        return StrainTables(cls.dN(np.zeros(3)), _monomials(rule.points), C, share=0.0)
+        return StrainTables(cls.dN(np.zeros(3)), _monomials(rule.points), C, fraction=0.0)
 
-    def B_at_gauss_points(self, C: ArrayLike | None = None) -> Array:
-        """Return the operator of the enhanced strain at the Gauss points, B - G D⁻¹ L.
-
-        Parameters
-        ----------
-        C : (6, 6) or (..., 6, 6) float, Pa.
-
-        Returns
-        -------
-        (..., g, 6, 24) float, 1/m
-
-        Raises
-        ------
-        InputError
-            If `C` is not given, or the rule has too few points for the modes.
-        MaterialError
-            If `C` is not positive definite.
-        """
-        G = self._modes(self.rule.points)
-        return strain_rows(self._gauss[1]) - G @ self._amplitudes(C, G)[..., None, :, :]
-
-    def strain_at(self, xi: ArrayLike, u: ArrayLike, C: ArrayLike | None = None) -> Array:
-        """Return the enhanced strain at points; see `KinematicLinear.strain_at`.
-
-        Parameters
-        ----------
-        xi : (3,) or (..., 3) float, points in reference coordinates.
-        u : (..., n, 3) float, nodal displacements in m.
-        C : (6, 6) or (..., 6, 6) float, Pa.
-
-        Returns
-        -------
-        (..., 6) float
-
-        Raises
-        ------
-        InputError, MaterialError
-            As by `B_at_gauss_points`.
-        """
-        xi = arguments.points(xi)
-        alpha = self._amplitudes(C, self._modes(self.rule.points)) @ _column(arguments.nodal(u, self.X))
-        enhanced = self._modes(xi.reshape(-1, 3)) @ alpha[..., None, :, :]
-        return super().strain_at(xi, u) - enhanced.reshape(*enhanced.shape[:-3], *xi.shape[:-1], 6)
+    def B(self, xi: ArrayLike, C: ArrayLike | None = None) -> Array:
+        """Return B - G D⁻¹ L; InputError without C or with few points, MaterialError if C is not definite."""
+        B, points = super().B(xi), arguments.points(xi)
+        amplitudes = self._amplitudes(C, self._modes(self.rule.points))
+        enhanced = self._modes(points.reshape(-1, 3)) @ amplitudes[..., None, :, :]
+        return B - enhanced.reshape(*enhanced.shape[:-3], *points.shape[:-1], 6, -1)
 
     def _modes(self, xi: Array) -> Array:
         """Return G (..., g, 6, 21) at points (g, 3)."""
@@ -165,15 +112,11 @@ class EnhancedStrain3D8N(KinematicLinear):
 
 
 def _not_definite(cls: type[EnhancedStrain3D8N], C: Array) -> MaterialError:
-    found = np.linalg.eigvalsh(C)
+    eigenvalues = np.linalg.eigvalsh(C)
     return MaterialError(
         f"{cls.__name__} needs a C that is positive definite; got C with the eigenvalues "
-        f"{found.min():.3g} … {found.max():.3g} Pa"
+        f"{eigenvalues.min():.3g} … {eigenvalues.max():.3g} Pa"
     )
-
-
-def _column(u: Array) -> Array:
-    return u.reshape(*u.shape[:-2], -1, 1)
 
 
 def _monomials(xi: Array) -> Array:

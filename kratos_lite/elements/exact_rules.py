@@ -53,36 +53,19 @@ _LINES = {
 
 @remembered
 def degree_of(shape: type[Shape]) -> int:
-    """Return the polynomial degree of shape functions along the directions of a rule.
-
-    Functions that are no polynomials count as those that they span, `Shape.degree`.
-
-    >>> from kratos_lite.shapes.hexahedra import Hexahedron20
-    >>> from kratos_lite.shapes.tetrahedra import Tetrahedron4
-    >>> degree_of(Hexahedron20), degree_of(Tetrahedron4)
-    (2, 1)
-    """
-    found, k = 0, np.arange(MOST + 2)
+    """Return the degree of shape functions along directions of a rule; `Shape.degree` if not polynomials."""
+    degree, k = 0, np.arange(MOST + 2)
     T = np.cos(np.outer(k, np.pi * (k + 0.5) / (MOST + 2)))  # Chebyshev polynomials at the zeros of the last
     for start, end in np.array(_LINES[shape.cell]):
         N = np.asarray(shape.N(start + (1 + T[1][:, None]) / 2 * (end - start)), dtype=float)
         size = np.abs(T @ N).max(axis=1)  # of the coefficients
-        found = max(found, int(np.flatnonzero(size > 1e-10 * size.max())[-1]))
-    return found if found <= MOST else shape.degree
+        degree = max(degree, int(np.flatnonzero(size > 1e-10 * size.max())[-1]))
+    return degree if degree <= MOST else shape.degree
 
 
 @remembered
 def exact_rule(shape: type[Shape], factors: int, geometry: int = CURVED, flow: bool = False) -> Rule:
-    """Return the rule that integrates a product of shape functions, det J included.
-
-    Parameters
-    ----------
-    shape : of the cell.
-    factors : number of functions in the product; coordinates X = Σ N_a X_a count, too.
-    geometry : AFFINE, STRAIGHT or CURVED.
-    flow : whether the integrand is N_a c·grad N_b or (c·grad N_a)(c·grad N_b) with a linear c.  The first is
-        a polynomial of the degree of N N det J; the second is one over affine cells alone.
-    """
+    """Return the rule that integrates a product of shape functions, or N c·grad N (`flow`), with det J."""
     p, simplex = degree_of(shape), shape.cell == "tetrahedron"
     curved = 3 * (p - 1) if simplex else 3 * p - 1
     degree = factors * p + (0, 0 if simplex else 2, curved)[geometry]
@@ -98,10 +81,7 @@ def has_rules(shape: type[Shape]) -> bool:
 
 @remembered
 def interpolations(shape: type[Shape]) -> list[tuple[Array, Array] | None]:
-    """Return nodes (b,) and C (n, b) of AFFINE and STRAIGHT: a cell has that geometry if X = C X[nodes].
-
-    None stands for a geometry that the functions of the shape do not span.
-    """
+    """Return nodes and C of AFFINE and STRAIGHT cells, X = C X[nodes]; None if a shape spans none."""
     if not has_rules(shape):
         return [None, None]
     xi = shape.nodes
@@ -115,8 +95,8 @@ def interpolations(shape: type[Shape]) -> list[tuple[Array, Array] | None]:
         return np.hstack([ones, points]) @ np.linalg.inv(np.column_stack([np.ones(4), xi[base]]))
 
     linear = shape.linear()
-    found: list[tuple[Array, Array] | None] = [_spanned(shape, np.array(base), affine)]
-    return [*found, _spanned(shape, np.arange(shape.corners), linear.N) if linear else None]
+    maps: list[tuple[Array, Array] | None] = [_spanned(shape, np.array(base), affine)]
+    return [*maps, _spanned(shape, np.arange(shape.corners), linear.N) if linear else None]
 
 
 def _spanned(
@@ -134,9 +114,9 @@ def geometries(shape: type[Shape], X: Array) -> Geometries:
     """Return AFFINE, STRAIGHT or CURVED of cells X (..., n, 3)."""
     near = ROUNDING * np.abs(X).max(axis=(-2, -1))
     X = X - X[..., :1, :]
-    found = np.full(X.shape[:-2], CURVED, dtype=np.int8)
+    kinds = np.full(X.shape[:-2], CURVED, dtype=np.int8)
     for geometry in (STRAIGHT, AFFINE):
         if spanned := interpolations(shape)[geometry]:
             nodes, C = spanned
-            found[np.abs(X - C @ X[..., nodes, :]).max(axis=(-2, -1)) <= near] = geometry
-    return found
+            kinds[np.abs(X - C @ X[..., nodes, :]).max(axis=(-2, -1)) <= near] = geometry
+    return kinds

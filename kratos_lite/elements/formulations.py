@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from kratos_lite.elements.custom import is_builtin
 from kratos_lite.elements.kinematic_linear import ELEMENTS, UNNAMED, KinematicLinear
 from kratos_lite.errors import InputError, nearest
 from kratos_lite.shapes import Shape
@@ -17,68 +18,41 @@ INCOMPRESSIBLE = 2 * (1 + 0.45) / (3 * (1 - 2 * 0.45)) * (1 + 1e-9)
 
 
 def formulations_of(shape: type[Shape]) -> dict[str, type[KinematicLinear]]:
-    """Return the element class of each formulation of a shape, those of the library before those of users.
-
-    >>> from kratos_lite.shapes.hexahedra import Hexahedron8
-    >>> {word: element.__name__ for word, element in formulations_of(Hexahedron8).items()}
-    {'standard': 'KinematicLinear3D8N', 'enhanced': 'EnhancedStrain3D8N', 'b_bar': 'BBar3D8N'}
-    """
+    """Return the element class of each formulation of a shape, built-in before custom."""
     alike = [element for element in ELEMENTS.values(f"3D{len(shape.nodes)}N") if element.shape is shape]
-    alike.sort(key=lambda element: (element.formulation, not is_of_library(element)))
+    alike.sort(key=lambda element: (element.formulation, not is_builtin(element)))
     return {element.formulation: element for element in reversed(alike)}
 
 
-def is_of_library(element: type[KinematicLinear]) -> bool:
-    """Return whether an element class is one of the library; those of users are never replaced."""
-    return element.__module__.startswith("kratos_lite.elements.")
-
-
 def is_unnamed(name: str) -> bool:
-    """Return whether the name of a block says only how many nodes its elements have.
-
-    >>> is_unnamed("Element3D8N"), is_unnamed("SmallDisplacementElement3D8N")
-    (True, False)
-    """
+    """Return whether the name of a block says only how many nodes its elements have, as ``Element3D8N``."""
     return name.startswith(UNNAMED) and name in ELEMENTS and name not in list(ELEMENTS)
 
 
 def element_of(
     name: str, formulation: str | None, C: Array | None, unnamed: str = NON_LOCKING
 ) -> type[KinematicLinear]:
-    """Return the class by which the elements of a block are computed.
-
-    Parameters
-    ----------
-    name : registered name of the elements.
-    formulation : a word in place of what the name says, or None.
-    C : (6, 6) float, Pa, of their material; if not given, ``non_locking`` takes it for compressible.
-    unnamed : the formulation of elements whose name says none, such as ``Element3D8N``.
-
-    Raises
-    ------
-    InputError
-        If the name is unknown, or its shape has no such formulation.
-    """
+    """Return the class by which a block is computed, by its name or a word such as ``non_locking`` and C."""
     element = ELEMENTS[name]
-    if not is_of_library(element):
+    if not is_builtin(element):
         return element
     if formulation is None:
         if not is_unnamed(name):
             return element
         formulation = unnamed
-    found = formulations_of(element.shape)
+    classes = formulations_of(element.shape)
     if formulation == NON_LOCKING:
         if len(element.nodes) != element.shape.corners:
             formulation = "b_bar" if C is not None and is_nearly_incompressible(C) else "standard"
         else:
             formulation = "enhanced"
-        return found.get(formulation, found["standard"])
-    if formulation not in found:
+        return classes.get(formulation, classes["standard"])
+    if formulation not in classes:
         raise InputError(
             f"there is no formulation {formulation!r} of elements with {len(element.nodes)} nodes such as "
-            f"{element.__name__}; there is {', '.join([*found, NON_LOCKING])}"
+            f"{element.__name__}; there is {', '.join([*classes, NON_LOCKING])}"
         )
-    return found[formulation]
+    return classes[formulation]
 
 
 def checked_formulation(word: object) -> str:
@@ -91,15 +65,7 @@ def checked_formulation(word: object) -> str:
 
 
 def is_nearly_incompressible(C: Array) -> bool:
-    """Return whether elements need a projected dilatation for a C (6, 6): ν > 0.45 if it is isotropic.
-
-    Otherwise by the bulk modulus against equal pressure, 1 / mᵀC⁻¹m, over the mean shear modulus: a material
-    that is stiff along fibers alone changes its volume easily.
-
-    >>> from kratos_lite import Isotropic3D
-    >>> [is_nearly_incompressible(Isotropic3D(E=1.0, nu=nu).C) for nu in (0.3, 0.45, 0.46)]
-    [False, False, True]
-    """
+    """Return whether a C (6, 6) needs a projected dilatation: ν > 0.45 if it is isotropic."""
     return bulk_over_shear(C) > INCOMPRESSIBLE
 
 

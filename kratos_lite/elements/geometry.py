@@ -7,12 +7,11 @@ leading axes of X first, then those of the points, then its own.
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from kratos_lite.elements import arguments
-from kratos_lite.elements.overridden_steps import run_step
 from kratos_lite.elements.tables import cofactors, determinant, tabulate
 from kratos_lite.errors import InputError, MeshError
 from kratos_lite.quadrature import Rule
@@ -25,9 +24,6 @@ from kratos_lite.validation import short
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-GEOMETRY = ("__init__", "N", "dN", "J", "detJ", "dNdX", "dV", "_jacobian", "_gauss")
-"""What an element class may redefine so that its geometry is not that of the tables of shape and rule."""
-
 
 class PlacedCell(Tabular):
     """Geometry of a cell: shape × rule at the places X of its nodes; see `KinematicLinear`."""
@@ -35,7 +31,6 @@ class PlacedCell(Tabular):
     shape: ClassVar[type[Shape]]
     nodes: ClassVar[Array]
     rule: Rule
-    batched: ClassVar[bool] = True
 
     def __init__(self, X: ArrayLike, rule: Rule | None = None) -> None:
         name = type(self).__name__
@@ -51,41 +46,13 @@ class PlacedCell(Tabular):
 
     @classmethod
     def N(cls, xi: ArrayLike) -> Array:
-        """Return the shape functions at points.
-
-        Parameters
-        ----------
-        xi : (..., 3) float, points in reference coordinates.
-
-        Returns
-        -------
-        (..., n) float
-
-        Raises
-        ------
-        InputError
-            If `xi` are not points.
-        """
+        """Return the shape functions (..., n) at points xi (..., 3)."""
         xi = arguments.points(xi)
         return _table(cls.shape, "N", xi, (len(cls.nodes),))
 
     @classmethod
     def dN(cls, xi: ArrayLike) -> Array:
-        """Return the derivatives dN_a/dxi_j at points.
-
-        Parameters
-        ----------
-        xi : (..., 3) float, points in reference coordinates.
-
-        Returns
-        -------
-        (..., n, 3) float
-
-        Raises
-        ------
-        InputError
-            If `xi` are not points.
-        """
+        """Return the derivatives dN_a/dxi_j (..., n, 3) at points xi (..., 3)."""
         xi = arguments.points(xi)
         return _table(cls.shape, "dN", xi, cls.nodes.shape)
 
@@ -96,105 +63,31 @@ class PlacedCell(Tabular):
         return np.moveaxis(flat.reshape(*self.X.shape[:-2], 3, g, 3), -2, -3)
 
     def determinants(self, dN: Array) -> Array:
-        """Return det J for tabulated derivatives.
-
-        Parameters
-        ----------
-        dN : (g, n, 3) float, derivatives of the shape functions at the points of a rule.
-
-        Returns
-        -------
-        (..., g) float, m³
-
-        Raises
-        ------
-        InputError
-            If `dN` is not made of real numbers (g, n, 3).
-        """
+        """Return det J (..., g) in m³ of derivatives dN (g, n, 3) tabulated at points."""
         dN = arguments.real(dN, "derivatives dN", self.nodes.shape)
         if dN.ndim != 3:
             raise InputError(f"derivatives dN must have shape (g, {len(self.nodes)}, 3); got {dN.shape}")
         return determinant(self._jacobian(dN))
 
     def J(self, xi: ArrayLike) -> Array:
-        """Return the Jacobian dX_i/dxi_j at points.
-
-        Parameters
-        ----------
-        xi : (3,) or (..., 3) float, points in reference coordinates.
-
-        Returns
-        -------
-        (..., 3, 3) float, m
-            Axes of the elements, axes of the points, 3, 3.
-
-        Raises
-        ------
-        InputError
-            If `xi` are not points.
-        """
+        """Return the Jacobian dX_i/dxi_j (..., 3, 3) in m at points xi (..., 3)."""
         xi = arguments.points(xi)
         dN = self.dN(xi).reshape(-1, *self.nodes.shape)
         return self._jacobian(dN).reshape(*self.X.shape[:-2], *xi.shape[:-1], 3, 3)
 
     def detJ(self, xi: ArrayLike) -> Array:
-        """Return det J at points.
-
-        Parameters
-        ----------
-        xi : (3,) or (..., 3) float, points in reference coordinates.
-
-        Returns
-        -------
-        (...) float, m³
-            Axes of the elements, axes of the points.
-
-        Raises
-        ------
-        InputError
-            If `xi` are not points.
-        """
+        """Return det J (...) in m³ at points xi (..., 3)."""
         return determinant(self.J(xi))
 
     def dNdX(self, xi: ArrayLike) -> Array:
-        """Return the gradients dN_a/dX_i at points.
-
-        Parameters
-        ----------
-        xi : (3,) or (..., 3) float, points in reference coordinates.
-
-        Returns
-        -------
-        (..., n, 3) float, 1/m
-            Axes of the elements, axes of the points, n, 3.
-
-        Raises
-        ------
-        InputError
-            If `xi` are not points.
-        """
+        """Return the gradients dN_a/dX_i (..., n, 3) in 1/m at points xi (..., 3)."""
         J = self.J(xi)
         inverse = cofactors(J)
         det = (J[..., :, 0] * inverse[..., 0, :]).sum(axis=-1)
         return self.dN(xi) @ (inverse / det[..., None, None])
 
     def position(self, xi: ArrayLike) -> Array:
-        """Return the places X(xi) of points.
-
-        Parameters
-        ----------
-        xi : (3,) or (..., 3) float, points in reference coordinates.
-
-        Returns
-        -------
-        (..., 3) float, m
-            Axes of the elements, axes of the points, 3.
-
-        Raises
-        ------
-        InputError
-            If `xi` are not points.
-        """
+        """Return the places X(xi) (..., 3) in m of points xi (..., 3)."""
         xi = arguments.points(xi)
         N = self.N(xi).reshape(-1, len(self.nodes))
         return (N @ self.X).reshape(*self.X.shape[:-2], *xi.shape[:-1], 3)
@@ -203,23 +96,15 @@ class PlacedCell(Tabular):
 
     def _N(self, rule: Rule) -> Array:
         """Return N (g, n) at the points of a rule."""
-        if same_methods(type(self), PlacedCell, "N"):
-            return tabulate(self.shape, rule)[0]
-        return np.array([self.N(xi) for xi in rule.points])
+        return tabulate(self.shape, rule)[0]
 
     def _volumes(self, rule: Rule) -> Array:
         """Return γ det J (..., g) at the points of a rule."""
-        if same_methods(type(self), PlacedCell, "dN", "J", "detJ"):
-            return determinant(self._jacobian(tabulate(self.shape, rule)[1])) * rule.weights
-        det = [run_step(self, "detJ", (), xi) for xi in rule.points]
-        return np.stack(det, axis=-1) * rule.weights
+        return determinant(self._jacobian(tabulate(self.shape, rule)[1])) * rule.weights
 
     @cached_property
     def _gauss(self) -> tuple[Array, Array]:
         """Return weights γ det J (..., g) and gradients dN_a/dX_i as (..., g, 3, n)."""
-        if not same_methods(type(self), PlacedCell, "dN", "J", "detJ", "dNdX"):
-            gradients = [run_step(self, "dNdX", self.nodes.shape, xi) for xi in self.rule.points]
-            return self._volumes(self.rule), np.swapaxes(np.stack(gradients, axis=-3), -1, -2)
         _, dN = tabulate(self.shape, self.rule)
         J = self._jacobian(dN)
         inverse = cofactors(J)
@@ -236,12 +121,7 @@ class PlacedCell(Tabular):
         return self._gauss[0]
 
     def gauss_points(self) -> Array:
-        """Return the places X of the Gauss points.
-
-        Returns
-        -------
-        (..., g, 3) float, m
-        """
+        """Return the places X (..., g, 3) in m of the Gauss points."""
         return self._N(self.rule) @ self.X
 
     @cached_property
@@ -253,21 +133,7 @@ class PlacedCell(Tabular):
         return bool((change <= 8 * np.finfo(float).eps * size).all())
 
     def table(self) -> list[tuple[str, str]]:
-        """Return the rows of a summary: shape, rule and nodes.
-
-        Returns
-        -------
-        Labels and values.
-
-        Examples
-        --------
-        >>> from kratos_lite import KinematicLinear3D8N
-        >>> print(KinematicLinear3D8N(0.5 * KinematicLinear3D8N.nodes))
-        shape   Hexahedron8
-        nodes   8
-        rule    Gauss-Legendre 2x2x2: 8 points, degree 3
-        volume  1 m³
-        """
+        """Return the rows of a summary: shape, rule, nodes and volume."""
         count, rule = int(np.prod(self.X.shape[:-2])), self.rule
         volume = self._volumes(rule).sum()
         return [
@@ -294,13 +160,3 @@ def _table(shape: type[Shape], name: str, xi: Array, tail: tuple[int, ...]) -> A
 def _at_point(shape: type[Shape], name: str, xi: bytes) -> Array:
     """Return N or dN at one point: one element after the other asks for the same ones."""
     return np.asarray(getattr(shape, name)(np.frombuffer(xi)))
-
-
-def same_methods(cls: type[Any], base: type[Any], *methods: str) -> bool:
-    """Return whether a class has these methods from a base."""
-    return all(_plain(getattr(cls, name)) is _plain(getattr(base, name)) for name in methods)
-
-
-def _plain(method: Any) -> Any:
-    """Return the function of a class method, which is bound anew each time."""
-    return getattr(method, "__func__", method)

@@ -17,7 +17,7 @@ from kratos_lite.elements.exact_rules import (
     geometries,
     has_rules,
 )
-from kratos_lite.elements.geometry import GEOMETRY, PlacedCell, same_methods
+from kratos_lite.elements.geometry import PlacedCell
 from kratos_lite.elements.tables import lumped
 from kratos_lite.errors import InputError
 from kratos_lite.quadrature import Rule
@@ -26,31 +26,15 @@ from kratos_lite.typing import Array, Mask
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-MASS = (*GEOMETRY, "_N", "_volumes", "mass_rules", "_integrate", "scalar_mass")
-"""What an element class may redefine so that its mass is not that of its shape and geometry."""
-
 
 class CellMass(PlacedCell):
     """Volume, body forces and mass of a cell, by rules that are exact for its shape and geometry."""
 
     mass_rule: ClassVar[Rule | None] = None
-    batched: ClassVar[bool] = True
 
     @classmethod
     def mass_rules(cls, kinds: Geometries, factors: int, flow: bool = False) -> list[tuple[Mask, Rule]]:
-        """Return the rules for products of shape functions over cells, each with a mask of its cells.
-
-        Parameters
-        ----------
-        kinds : (...) int, the geometry of each cell; see `geometries`.
-        factors : number of functions in the product.
-        flow : whether it is one of G or H; see `exact_rule`.
-
-        Returns
-        -------
-        list of (mask (...), Rule)
-            For the mass itself a `mass_rule` of the class; the own rule for cells of unknown degree.
-        """
+        """Return masks (...) of cells and the rules for products of shape functions over them."""
         stated = cls.mass_rule if factors == 2 and not flow else None
         if stated is None and not has_rules(cls.shape):
             stated = cls.rule
@@ -58,50 +42,29 @@ class CellMass(PlacedCell):
             return [(np.ones(kinds.shape, dtype=bool), stated)]
         rules: dict[Rule, Mask] = {}
         for kind in (AFFINE, STRAIGHT, CURVED):
-            mine = np.asarray(kinds == kind)
-            if mine.any() or (kind == AFFINE and not kinds.size):
+            mask = np.asarray(kinds == kind)
+            if mask.any() or (kind == AFFINE and not kinds.size):
                 rule = exact_rule(cls.shape, factors, kind, flow)
-                rules[rule] = rules[rule] | mine if rule in rules else mine
+                rules[rule] = rules[rule] | mask if rule in rules else mask
         return [(mask, rule) for rule, mask in rules.items()]
 
     def _integrate(self, of: Callable[[Array, Array], Array], factors: int) -> Array:
         """Return integrals of products of `factors` functions, made of N (g, n) and γ det J (..., g)."""
         total: Array | None = None
-        for mine, rule in self.mass_rules(geometries(self.shape, self.X), factors):
-            found = of(self._N(rule), self._volumes(rule))
+        for mask, rule in self.mass_rules(geometries(self.shape, self.X), factors):
+            values = of(self._N(rule), self._volumes(rule))
             if total is not None:
-                found[~mine] = total[~mine]
-            total = found
+                values[~mask] = total[~mask]
+            total = values
         assert total is not None
         return total
 
     def volume(self) -> Array:
-        """Return the volume, exact for every geometry of the cell.
-
-        Returns
-        -------
-        (...) float, m³
-        """
-        if not same_methods(type(self), PlacedCell, "dV", "_gauss"):
-            return np.asarray(self.dV.sum(axis=-1))
+        """Return the volume (...) in m³, exact for every geometry of the cell."""
         return self._integrate(lambda N, dV: dV.sum(axis=-1), factors=0)
 
     def body_force(self, b: ArrayLike) -> Array:
-        """Return the load r_ext = ∫ N b dV of a body force, exact for every geometry of the cell.
-
-        Parameters
-        ----------
-        b : (3,) or (..., 3) constant, or (..., n, 3) at the nodes; N/m³.
-
-        Returns
-        -------
-        (..., n, 3) float, N
-
-        Raises
-        ------
-        InputError
-            If `b` is none of these.
-        """
+        """Return r_ext = ∫ N b dV (..., n, 3) in N, exact, of b (3,), (..., 3) or nodal in N/m³."""
         force = arguments.real(b, "a body force b", (3,), "give its x, y and z in N/m³")
         if force.ndim == self.X.ndim and force.shape[-2:] == self.nodes.shape:
             return self.scalar_mass() @ arguments.nodal(force, self.X, "a body force b")
@@ -110,74 +73,25 @@ class CellMass(PlacedCell):
                 f"a body force b must have shape (3,), {(*self.X.shape[:-2], 3)} or {self.X.shape}; "
                 f"got {force.shape}"
             )
-        if same_methods(type(self), PlacedCell, "dV", "_gauss"):
-            share = self._integrate(lambda N, dV: dV @ N, factors=1)
-        else:
-            share = self.dV @ self._N(self.rule)
-        return share[..., :, None] * force[..., None, :]
+        volumes = self._integrate(lambda N, dV: dV @ N, factors=1)
+        return volumes[..., :, None] * force[..., None, :]
 
     def scalar_mass(self, density: ArrayLike = 1.0) -> Array:
-        """Return the mass matrix of one axis, ∫ ρ N N^T dV, exact for every geometry of the cell.
-
-        A `mass_rule` that the class states is used as it is.
-
-        Parameters
-        ----------
-        density : number, or (...) one for each element; kg/m³.
-
-        Returns
-        -------
-        (..., n, n) float, kg
-
-        Raises
-        ------
-        InputError
-            If the density is none of these.
-        """
+        """Return ∫ ρ N N^T dV (..., n, n) in kg, exact but for a stated `mass_rule`; ρ in kg/m³."""
         rho = arguments.density(density, self.X)
         m = self._integrate(lambda N, dV: (N.T * dV[..., None, :]) @ N, factors=2)
         return m * rho[..., None, None]
 
     def mass(self, density: ArrayLike) -> Array:
-        """Return the consistent mass matrix.
-
-        Parameters
-        ----------
-        density : number, or (...) one for each element; kg/m³.
-
-        Returns
-        -------
-        (..., 3n, 3n) float, kg
-
-        Raises
-        ------
-        InputError
-            If the density is none of these.
-        """
+        """Return the consistent mass matrix (..., 3n, 3n) in kg of one density or (...) in kg/m³."""
         m = self.scalar_mass(density)
         n = len(self.nodes)
         M = m[..., :, None, :, None] * np.eye(3)[:, None, :]
         return M.reshape(*m.shape[:-2], 3 * n, 3 * n)
 
     def lumped_mass(self, density: ArrayLike) -> Array:
-        """Return the mass of each node; it is positive and sums to the mass of the element.
-
-        It is the row sum where row sums are positive, on the reference cell and on the element; otherwise
-        the scaled diagonal of Hinton, Rock & Zienkiewicz, Earthq. Eng. Struct. Dyn. 4 (1976) 245-249.
-
-        Parameters
-        ----------
-        density : number, or (...) one for each element; kg/m³.
-
-        Returns
-        -------
-        (..., n) float, kg
-
-        Raises
-        ------
-        InputError
-            If the density is none of these.
-        """
+        """Return the mass (..., n) in kg of each node, positive: row sums, or the scaled diagonal."""
+        # Source: Hinton, Rock & Zienkiewicz, Earthq. Eng. Struct. Dyn. 4 (1976) 245-249.
         m = self.scalar_mass(density)
         _, reference = self.mass_rules(geometries(self.shape, self.nodes), factors=2)[0]
         return lumped(m.sum(axis=-1), np.diagonal(m, axis1=-2, axis2=-1), self.shape, reference)

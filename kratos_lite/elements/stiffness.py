@@ -39,10 +39,7 @@ def summed(B: Array, S: Array, dV: Array) -> Array:
 
 
 def isotropic(D: Array, dV: Array, lame: tuple[float, float]) -> Array:
-    """Return K (..., 3, n, 3, n) of gradients D (..., g, 3, n) and Lamé's constants.
-
-    K_iajb = λ P_iajb + μ P_jaib + μ δ_ij P_kakb with P_iajb = Σ dN_a/dX_i dN_b/dX_j dV.
-    """
+    """Return K = λ P_iajb + μ P_jaib + μ δ_ij P_kakb, P_iajb = Σ D_ia D_jb dV, of D (..., g, 3, n)."""
     g, n = D.shape[-3], D.shape[-1]
     A = D.reshape(*D.shape[:-3], g, 3 * n)
     P = (np.swapaxes(A, -1, -2) * dV[..., None, :]) @ A
@@ -55,10 +52,7 @@ def isotropic(D: Array, dV: Array, lame: tuple[float, float]) -> Array:
 
 
 def affine(J: Array, products: Array, C: Array) -> Array:
-    """Return K (..., 3, n, 3, n) of elements with one J each, by the products R of the reference cell.
-
-    K_iajb = Σ_kl G_ijkl R_kalb with G_ijkl = det J Σ_pq C_ipjq J^-1_kp J^-1_lq.
-    """
+    """Return K = Σ_kl G_ijkl R_kalb of constant J, G_ijkl = det J Σ_pq C_ipjq J^-1_kp J^-1_lq."""
     inverse, det = cofactors(J), determinant(J)[..., None, None]
     pairs = (inverse / det)[..., :, None, :, None] * inverse[..., None, :, None, :]
     tensor = voigt.tensor(np.moveaxis(voigt.tensor(C), 0, -1))  # j q i p

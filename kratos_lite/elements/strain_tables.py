@@ -8,18 +8,9 @@ from kratos_lite.typing import Array
 
 
 class StrainTables(NamedTuple):
-    """What kernels need to add to the strain of the displacements; see `KinematicLinear.strain_tables`.
+    """What kernels need to add to the strain of the displacements; see `KinematicLinear.strain_tables`."""
 
-    Attributes
-    ----------
-    center : (n, 3), dN at the center.
-    functions : (g, 6), the monomials of enhanced modes at the Gauss points; or of a projected dilatation that
-        is linear in x, y, z, N less N at the center, (g, n), and (g, 0) of a mean one.
-    C : (6, 6) in Pa, which the enhanced modes depend on; None of a dilatation.
-    share : of the dilatation that is projected.
-    """
-
-    center: Array
-    functions: Array
-    C: Array | None
-    share: float
+    center: Array  # (n, 3), dN at the center
+    functions: Array  # (g, 6) enhanced monomials; N - N(center) (g, n), or (g, 0), of a dilatation
+    C: Array | None  # (6, 6) Pa, which enhanced modes depend on; None of a dilatation
+    fraction: float  # of the dilatation that is projected

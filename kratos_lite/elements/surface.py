@@ -16,21 +16,13 @@ if TYPE_CHECKING:
 
 
 def face_rule(shape: type[Shape]) -> Rule:
-    """Return the rule for loads on a face or line: exact for N, times N, times normal and area.
-
-    Per direction of a product the normal times the area has the degree 2p - 1 of functions of degree p, over
-    a triangle 2(p - 1).  The area alone is a square root on faces that are not plane, so that tractions are
-    exact on plane faces, and pressures on all.
-    """
+    """Return the rule for loads on a face or line, exact for N N times area (plane) or normal."""
     p = shape.degree
     return rule_for(shape.cell, max(4 * p - (2 if shape.cell == "triangle" else 1), 0))
 
 
 def area_vectors(shape: type[Shape], X: ArrayLike, rule: Rule | None = None) -> Array:
-    """Return normal × area of each Gauss point of faces X (..., k, 3) as (..., g, 3) in m².
-
-    The normal points to the side from which the nodes run counter-clockwise.
-    """
+    """Return normal × area (..., g, 3) in m² of faces X (..., k, 3); nodes run counter-clockwise about it."""
     rule = rule or face_rule(shape)
     _, dN = tabulate(shape, rule)
     tangents = np.einsum("...ai,gaj->...gji", np.asarray(X, dtype=float), dN)
@@ -38,24 +30,7 @@ def area_vectors(shape: type[Shape], X: ArrayLike, rule: Rule | None = None) -> 
 
 
 def surface_load(shape: type[Shape], X: ArrayLike, traction: ArrayLike) -> Array:
-    """Return ∫ N t dA of faces (or ∫ N t ds of lines, or t of points) as nodal forces.
-
-    Parameters
-    ----------
-    shape : shape of the face, line or point.
-    X : (..., k, 3) float, m.
-    traction : (3,) or (..., 3) constant, or (..., k, 3) nodal; Pa, N/m or N.
-
-    Returns
-    -------
-    (..., k, 3) float, N.
-
-    Examples
-    --------
-    >>> from kratos_lite.shapes.faces import Triangle3
-    >>> surface_load(Triangle3, [[0, 0, 0], [1, 0, 0], [0, 1, 0]], (0, 0, 6.0))[:, 2]
-    array([1., 1., 1.])
-    """
+    """Return ∫ N t dA, ∫ N t ds or t (..., k, 3) in N of faces, lines or points; t constant or nodal."""
     X, t = np.asarray(X, dtype=float), np.asarray(traction, dtype=float)
     rule = face_rule(shape)
     N, dN = tabulate(shape, rule)
@@ -80,16 +55,8 @@ def surface_mass(shape: type[Shape], X: ArrayLike) -> Array:
 
 
 def surface_pressure_tangent(shape: type[Shape], X: ArrayLike, pressure: ArrayLike) -> Array:
-    """Return the derivative of `surface_pressure` with respect to the nodes, (..., k, 3, k, 3) in N/m.
-
-    With t1, t2 the tangents, d(t1 × t2) = t1 × dt2 - t2 × dt1.
-
-    Parameters
-    ----------
-    shape : shape of the face.
-    X : (..., k, 3) float, m.
-    pressure : number, or (...) per face; Pa.
-    """
+    """Return the derivative (..., k, 3, k, 3) in N/m of `surface_pressure` by the nodes."""
+    # With tangents t1, t2: d(t1 × t2) = t1 × dt2 - t2 × dt1.
     X, p = np.asarray(X, dtype=float), np.asarray(pressure, dtype=float)
     rule = face_rule(shape)
     N, dN = tabulate(shape, rule)
@@ -101,14 +68,7 @@ def surface_pressure_tangent(shape: type[Shape], X: ArrayLike, pressure: ArrayLi
 
 
 def surface_pressure(shape: type[Shape], X: ArrayLike, pressure: ArrayLike) -> Array:
-    """Return -∫ N p n dA of faces as nodal forces (..., k, 3) in N: a pressure pushes against n.
-
-    Parameters
-    ----------
-    shape : shape of the face.
-    X : (..., k, 3) float, m.
-    pressure : number, (...) per face, or (..., k) nodal; Pa.
-    """
+    """Return -∫ N p n dA (..., k, 3) in N of faces; p in Pa, one, (...) per face or (..., k) nodal."""
     X, p = np.asarray(X, dtype=float), np.asarray(pressure, dtype=float)
     rule = face_rule(shape)
     N, _ = tabulate(shape, rule)

@@ -49,10 +49,7 @@ def has_positive_row_sums(shape: type[Shape], rule: Rule) -> bool:
 
 
 def lumped(sums: Array, diagonal: Array, shape: type[Shape], rule: Rule) -> Array:
-    """Return lumped masses (..., n) of row sums and diagonals (..., n) of mass matrices.
-
-    See `KinematicLinear.lumped_mass`.
-    """
+    """Return lumped masses (..., n) of row sums and diagonals (..., n); see `KinematicLinear.lumped_mass`."""
     scaled = diagonal * (sums.sum(axis=-1) / diagonal.sum(axis=-1))[..., None]
     if not has_positive_row_sums(shape, rule):
         return scaled

@@ -5,7 +5,7 @@ second Piola–Kirchhoff stress is S = C:E + S0 and the first P = F S.  Rows of 
 Voigt order with engineering shear, as everywhere.
 
 Over a step from q to q + dq the energy-momentum form takes F at the middle and the mean of both
-stresses, so that the work of the internal load over dq is exactly the change of the strain energy.
+stresses, so that the work of the internal force vector over dq is exactly the change of the strain energy.
 
 Source: Simo & Tarnow, ZAMP 43 (1992) 757-792; Bonet & Wood, Nonlinear Continuum Mechanics (2008), ch. 9.
 """
@@ -22,22 +22,13 @@ from kratos_lite.typing import Array
 
 
 class Deformation(NamedTuple):
-    """What is known at the Gauss points of displaced elements.
+    """What is known at the Gauss points of displaced elements, at q or over a step."""
 
-    Attributes
-    ----------
-    F : (..., g, 3, 3), P = F S: at q, or in the middle of a step.
-    S : (..., g, 6) in Pa, the second Piola–Kirchhoff stress.
-    F_end : (..., g, 3, 3), δE = sym(F_end^T δF): at q, or at the end of a step.
-    rate_F : dF / d(grad of the variable): 1, or 1/2 over a step.
-    rate_S : dS = rate_S C:δE: 1, or 1/2 + damping over a step.
-    """
-
-    F: Array
-    S: Array
-    F_end: Array
-    rate_F: float
-    rate_S: float
+    F: Array  # (..., g, 3, 3), P = F S: at q, or in the middle of a step
+    S: Array  # (..., g, 6) Pa, the second Piola–Kirchhoff stress
+    F_end: Array  # (..., g, 3, 3), δE = sym(F_end^T δF): at q, or at the end of a step
+    rate_F: float  # dF / d(grad of the variable): 1, or 1/2 over a step
+    rate_S: float  # dS = rate_S C:δE: 1, or 1/2 + damping over a step
 
 
 def displacement_gradient(element: KinematicLinear, q: Array) -> Array:
@@ -65,15 +56,7 @@ def deformation(
     damping: float = 0.0,
     prestress: Array | float = 0.0,
 ) -> Deformation:
-    """Return the deformation at q (..., n, 3), or over the step from q to q + dq.
-
-    Parameters
-    ----------
-    C : (6, 6) in Pa.
-    q, dq : (..., n, 3) in m; without dq, the state at q.
-    damping : η/h, the stress of a step takes it times C:(E+ - E).
-    prestress : (..., 1, 6) in Pa, or 0.
-    """
+    """Return the deformation at q (..., n, 3), or over a step dq with damping η/h times C:(E+ - E) in S."""
     H = displacement_gradient(element, q)
     F, E = np.eye(3) + H, strain_change(np.eye(3), H)
     if dq is None:
@@ -83,7 +66,7 @@ def deformation(
     return Deformation(F + dF / 2, S, F + dF, 0.5, 0.5 + damping)
 
 
-def internal_load(element: KinematicLinear, at: Deformation) -> Array:
+def internal_force(element: KinematicLinear, at: Deformation) -> Array:
     """Return ∫ P grad N dV as (..., n, 3) in N."""
     dV, D = element._gauss
     S = voigt.tensor(at.S) * dV[..., None, None]
@@ -91,11 +74,7 @@ def internal_load(element: KinematicLinear, at: Deformation) -> Array:
 
 
 def stiffness_by_axis(element: KinematicLinear, C: Array, at: Deformation) -> Array:
-    """Return the derivative of the internal load as (..., 3, n, 3, n) in N/m.
-
-    Order: axis and node of the row, axis and node of the column.  At q it is the symmetric tangent;
-    over a step it is the derivative by dq, which is not symmetric.
-    """
+    """Return the derivative (..., 3, n, 3, n) in N/m of internal forces by q, or by dq (not symmetric)."""
     dV, D = element._gauss
     g, n = D.shape[-3], D.shape[-1]
     left = _variation(at.F, D)

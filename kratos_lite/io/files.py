@@ -16,7 +16,6 @@ from kratos_lite.view.progress import watched
 if TYPE_CHECKING:
     from kratos_lite.analysis.model import Model
     from kratos_lite.io.formats.document import Document
-    from kratos_lite.io.settings import Settings
     from kratos_lite.mesh import Mesh
 
 
@@ -27,8 +26,8 @@ def read(
 
     Parameters
     ----------
-    path : .mdpa or any file of an .elem set or its stem (both also gzipped), a .json run file, a folder
-        with a ``ProjectParameters.json``, or any format of meshio.
+    path : .mdpa or any file of an .elem set or its stem (both also gzipped), a .json run file of Kratos, a
+        folder with a ``ProjectParameters.json``, a Python script with a case, or any format of meshio.
     materials : take the materials from the file; False leaves them to the caller (but for run files).
     strict : refuse `.mdpa` rows that do not stand on lines of their own (but in run files).
     initial_displacement : take the DISPLACEMENT of nodes that are not fixed for the state without stress,
@@ -62,8 +61,8 @@ def read_case(
 
     Parameters
     ----------
-    path : a model file, as for `read`; a .json file with a model, with a body, or of Kratos; a folder with
-        a ``ProjectParameters.json``; or a Python script that defines `body`, `dt` and `steps`.
+    path : a model file, as for `read`; a .json run file of Kratos; a folder with a
+        ``ProjectParameters.json``; or a Python script that defines a `case`, or `body`, `dt` and `steps`.
     materials : take the materials from a model file; False leaves them to the caller.
     strict : refuse `.mdpa` rows that do not stand on lines of their own.
     allow_outside : let a .json file name files outside its folder.
@@ -84,12 +83,13 @@ def read_case(
     path = input_file(path_of(path))
     with watched(None, "read"):
         if ending(path) == ".json":
-            from kratos_lite.io.settings import read_settings
+            from kratos_lite.io.kratos.run_file import read_kratos_project
 
-            settings = read_settings(path)
-            case = _case_of_json(settings, strict, allow_outside, initial_displacement, part)
+            case = read_kratos_project(
+                path, allow_outside, initial_displacement=initial_displacement, part=part
+            )
         elif ending(path) == ".py":
-            from kratos_lite.io.readers.script import read_script
+            from kratos_lite.io.script import read_script
 
             case = read_script(path)
         else:
@@ -101,24 +101,6 @@ def read_case(
             model = model_from(document, materials=materials, initial_displacement=initial_displacement)
             case = Case(model, files=[path])
         return case
-
-
-def _case_of_json(settings: Settings, strict: bool, outside: bool, initial: bool, part: int | None) -> Case:
-    """Return the case of a JSON file; the reader is chosen by its keys."""
-    if "solver_settings" in settings or "problem_data" in settings:
-        from kratos_lite.io.kratos.run_file import read_kratos_project
-
-        folder = Path(settings.source).parent
-        return read_kratos_project(settings, folder, outside, initial_displacement=initial, part=part)
-    if "properties" in settings and "model" not in settings:
-        raise settings.error("properties", "this is a materials file; read the run file that names it")
-    if ("body" in settings or "mesh" in settings) and "model" not in settings:
-        from kratos_lite.io.readers.body_file import read_body_file
-
-        return read_body_file(settings, strict=strict)
-    from kratos_lite.io.readers.run_file import read_run_file
-
-    return read_run_file(settings, strict=strict, allow_outside=outside, initial_displacement=initial)
 
 
 def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:

@@ -49,7 +49,7 @@ def kratos_name(name: str) -> str:
 
 
 def nearest_variable(name: str, known: Iterable[str]) -> str:
-    """Return a hint like `errors.nearest`, but only for a likely slip of the pen.
+    """Return a hint like `errors.nearest`, but only for a likely misspelling.
 
     >>> nearest_variable("YOUNGS_MODULUS", ["YOUNG_MODULUS"]), nearest_variable("EMISSIVITY", ["VISCOSITY"])
     (' Did you mean YOUNG_MODULUS?', '')
@@ -67,9 +67,9 @@ def misspelt(name: str, known: Iterable[str]) -> str | None:
     """
     if any(letter.isdigit() for letter in name):
         return None
-    found = {word: _slips(name.upper(), word) for word in known if abs(len(name) - len(word)) <= 2}
-    best = min(found, key=lambda word: (found[word], -len(word)), default="")
-    return best if best and found[best] <= (2 if len(best) > 8 else 1) else None
+    slips = {word: _slips(name.upper(), word) for word in known if abs(len(name) - len(word)) <= 2}
+    best = min(slips, key=lambda word: (slips[word], -len(word)), default="")
+    return best if best and slips[best] <= (2 if len(best) > 8 else 1) else None
 
 
 def _slips(a: str, b: str) -> int:

@@ -40,7 +40,7 @@ def run(case: Case, progress: Progress | None = None) -> Outcome:
     Parameters
     ----------
     case : such as `kratos_lite.read_case` returns.
-    progress : called with the phase and the share done, 0 … 1.
+    progress : called with the phase and the fraction done, 0 … 1.
 
     Returns
     -------
@@ -108,13 +108,13 @@ def _check_statics(case: Case) -> None:
             f"engine='petsc' solves statics; this case has {NOT_OF_PETSC[case.analysis]}; leave it out"
         )
     if case.error is not None:
-        raise InputError("engine='petsc' solves on the mesh as it is; leave the error asked for out")
+        raise InputError("engine='petsc' solves on the mesh as it is; leave the requested error out")
 
 
 def prepare(case: Case, progress: Progress | None = None) -> tuple[Any, Iterator[Any]]:
     """Return the transient or body of a case in time and its states, checked; no step is taken yet."""
     if case.time is None:
-        raise ModelError("this case is not in time; give its file a section 'time'")
+        raise ModelError("this case is not in time; give it a kl.TimeIntegration")
     subject, states = runner_of(case).prepare(case, progress)
     return subject, states
 

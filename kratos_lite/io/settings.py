@@ -1,4 +1,4 @@
-"""Settings: a JSON object that is asked for keys by type and answers mistakes with their place."""
+"""Settings: a JSON object whose values are read by type; errors name the keys that lead to a wrong value."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from kratos_lite.errors import InputError, KratosLiteError, nearest
-from kratos_lite.io.json_file import Object, read_json
+from kratos_lite.io.json_file import read_json
 
 T = TypeVar("T")
 LONGEST = 255
@@ -25,30 +25,17 @@ def is_number(value: Any) -> bool:
 class Settings:
     """A JSON object with the file and the keys that lead to it.
 
-    Parameters
-    ----------
-    values : the object.
-    source : name of the file, for messages.
-    path : keys that lead here, for messages, such as ``solver_settings``.
-    place : line and column of the key that leads here, for messages about an empty object.
-    files : files that the whole tree has named so far and that are there; `find_file` adds to them.
+    `path` are these keys, such as ``solver_settings``; `files` those that the whole tree has named so far and
+    that are there: `find_file` adds to them.
 
-    Examples
-    --------
-    >>> from kratos_lite.io.json_file import parse_json
-    >>> Settings(parse_json('{"type": "amg"}'), "run.json").text("type")
+    >>> Settings({"type": "amg"}, "run.json").text("type")
     'amg'
     """
 
     def __init__(
-        self,
-        values: Object,
-        source: str,
-        path: str = "",
-        place: tuple[int, int] = (1, 1),
-        files: list[Path] | None = None,
+        self, values: dict[str, Any], source: str, path: str = "", files: list[Path] | None = None
     ) -> None:
-        self.values, self.source, self.path, self.place = values, source, path, place
+        self.values, self.source, self.path = values, source, path
         self.files = [] if files is None else files
 
     def __contains__(self, key: str) -> bool:
@@ -64,29 +51,29 @@ class Settings:
             raise self.error(key, message)
 
     def error(self, key: str, message: str) -> InputError:
-        """Return an error at the place of a key, or of the object where it is missing."""
-        line, column = self.values.places.get(key) or next(iter(self.values.places.values()), self.place)
-        return InputError(f"{self.source}:{line}:{column}: {message}")
+        """Return an error about a key, or about the whole object; it may say what the value "must be"."""
+        name = self.name(key) if key else self.path
+        joined = f"{name} {message}" if message.startswith("must ") else f"{name}: {message}"
+        return InputError(f"{self.source}: {joined if name else message}")
 
     def placed(self, key: str, action: Callable[..., T], *arguments: Any, **named: Any) -> T:
         """Return what an action returns; an error of the library gets the place of a key."""
         try:
             return action(*arguments, **named)
         except KratosLiteError as error:
-            name = self.name(key) if key else self.path
-            raise self.error(key, f"{name}: {error}") from None
+            raise self.error(key, str(error)) from None
 
     def get(self, key: str, default: Any = REQUIRED) -> Any:
         """Return a value of any type."""
         if key in self.values:
             return self.values[key]
         if default is REQUIRED:
-            raise self.error(key, f"key {self.name(key)!r} is missing")
+            raise InputError(f"{self.source}: key {self.name(key)!r} is missing")
         return default
 
     def _typed(self, key: str, default: Any, fits: bool, kind: str) -> Any:
         if key in self.values and not fits:
-            raise self.error(key, f"{self.name(key)} must be {kind}; got {shown(self.values[key])}")
+            raise self.error(key, f"must be {kind}; got {shown(self.values[key])}")
         return self.get(key, default)
 
     def text(self, key: str, default: Any = REQUIRED) -> str:
@@ -127,20 +114,17 @@ class Settings:
 
     def section(self, key: str, required: bool = False) -> Settings:
         """Return an inner object; an empty one where the key is missing, unless it is required."""
-        default = REQUIRED if required else Object()
-        value = self._typed(key, default, isinstance(self.values.get(key), Object), "an object {…}")
-        return Settings(
-            value, self.source, self.name(key), self.values.places.get(key, self.place), self.files
-        )
+        default = REQUIRED if required else {}
+        value = self._typed(key, default, isinstance(self.values.get(key), dict), "an object {…}")
+        return Settings(value, self.source, self.name(key), self.files)
 
     def sections(self, key: str) -> list[Settings]:
         """Return a list of inner objects."""
         value = self.values.get(key)
-        fits = isinstance(value, list) and all(isinstance(v, Object) for v in value)
+        fits = isinstance(value, list) and all(isinstance(v, dict) for v in value)
         entries = self._typed(key, [], fits, "a list of objects [{…}, …]")
-        place = self.values.places.get(key, self.place)
         return [
-            Settings(entry, self.source, f"{self.name(key)}[{i}]", place, self.files)
+            Settings(entry, self.source, f"{self.name(key)}[{i}]", self.files)
             for i, entry in enumerate(entries)
         ]
 
@@ -152,12 +136,8 @@ class Settings:
         """Raise InputError at the first key that is not among the known ones."""
         known = list(known)
         for key in self.unknown(known):
-            raise self.error(key, self.unknown_key(key, known))
-
-    def unknown_key(self, key: str, known: Iterable[str]) -> str:
-        """Return the message about an unknown key."""
-        known = list(known)
-        return f"unknown key {self.name(key)!r}.{nearest(key, known)} The keys are {', '.join(known)}"
+            hint = f"{nearest(key, known)} The keys are {', '.join(known)}"
+            raise InputError(f"{self.source}: unknown key {self.name(key)!r}.{hint}")
 
 
 def shown(value: Any) -> str:
@@ -169,8 +149,8 @@ def shown(value: Any) -> str:
 def read_settings(path: str | Path) -> Settings:
     """Return the object that a JSON file holds; see `read_json` for the errors."""
     value = read_json(path)
-    if not isinstance(value, Object):
-        raise InputError(f"{path}:1:1: an object {{…}} is expected; got {type(value).__name__}")
+    if not isinstance(value, dict):
+        raise InputError(f"{path}: an object {{…}} is expected; got {type(value).__name__}")
     return Settings(value, str(path), files=[Path(path)])
 
 
@@ -201,11 +181,11 @@ def find_file(
     """
     name = settings.text(key) + ending
     if isdir(name) or isdir(folder / name):  # where the methods of Path refuse names that are too long
-        raise settings.error(key, f"{settings.name(key)}: {name} is a folder; name a file in it")
+        raise settings.error(key, f"{name} is a folder; name a file in it")
     try:
         path = inside(folder, name, outside)
     except ValueError as error:
-        raise settings.error(key, f"{settings.name(key)}: {error}") from None
+        raise settings.error(key, str(error)) from None
     beside = folder / path.name
     if path.is_file():
         settings.files.append(path)
@@ -213,4 +193,4 @@ def find_file(
     if beside.is_file():
         settings.files.append(beside)
         return beside, f"{name} is not there; {path.name} beside the run file is read"
-    raise settings.error(key, f"{settings.name(key)}: there is no file {folder / name}; correct the name")
+    raise settings.error(key, f"there is no file {folder / name}; correct the name")

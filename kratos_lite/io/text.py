@@ -23,14 +23,7 @@ _COMMENT = re.compile(rb"//[^\n]*|/\*.*?(?:\*/|(\Z))", re.DOTALL)
 
 
 def read_bytes(path: str | Path) -> bytes:
-    """Return a whole input file with LF line ends, unzipped if it is gzipped.
-
-    Raises
-    ------
-    InputError
-        The file is missing, a folder, a pipe or device, unreadable, a broken gzip, or holds a NUL byte
-        or a line of more than `MAX_LINE` bytes.
-    """
+    """Return an input file with LF line ends, unzipped if it is gzipped; InputError where it is no text."""
     path = Path(path)
     try:
         mode = path.stat().st_mode
@@ -108,15 +101,7 @@ def blank_comments(data: bytes, source: str = "") -> bytes:
 
 
 class Source:
-    """Text of an input file without its comments, and where in it something is wrong or odd.
-
-    Parameters
-    ----------
-    name : the file, for messages.
-    data : its text, see `read_bytes` and `blank_comments`.
-    problems, notes : collect what is wrong and what is odd.
-    origin : name of the file in notes; none for the main file of a document.
-    """
+    """Text of an input file without its comments; collects what is wrong and what is odd in it."""
 
     def __init__(
         self, name: str, data: bytes, problems: Problems, notes: list[Note], origin: str = ""

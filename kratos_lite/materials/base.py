@@ -99,12 +99,7 @@ class LinearMaterial:
             raise MaterialError(f"{type(self).__name__}: C must be positive definite; {self.why_unstable()}")
 
     def why_unstable(self) -> str:
-        """Name the bound that the constants violate.
-
-        Returns
-        -------
-        str
-        """
+        """Return which bound the constants violate."""
         return "the strain energy of some strain is not positive"
 
     def compliance(self) -> Array:
@@ -170,13 +165,7 @@ class LinearMaterial:
         return e @ self.C.T
 
     def check_stress(self) -> None:
-        """Check that `stress` is C strain, once for each material; what is solved is C.
-
-        Raises
-        ------
-        MaterialError
-            If it is not, or does not take strains (..., 6).
-        """
+        """Check that `stress` is C strain, once for each material; what is solved is C."""
         if type(self).stress is not LinearMaterial.stress:
             _ = self._stress_is_checked
 
@@ -221,9 +210,10 @@ class LinearMaterial:
         MaterialError
             If a variable is missing or outside its bounds.
         """
-        given = {field: values[name] for field, name in cls.variables.items() if name in values}
+        constants = {field: values[name] for field, name in cls.variables.items() if name in values}
         needed = {name for name in names_of(cls) if name != "density"}
-        missing = [cls.variables.get(field, field) for field in sorted(needed - given.keys())]
+        absent = sorted(needed - constants.keys())
+        missing = [f"{field} ({cls.variables.get(field, field)})" for field in absent]
         if missing:
             raise MaterialError(f"{cls.__name__} needs {', '.join(missing)}")
-        return cls(**given)
+        return cls(**constants)

@@ -76,12 +76,7 @@ class Isotropic3D(LinearMaterial):
         return 2 * mu * self.nu / (1 - 2 * self.nu), mu
 
     def elasticity(self) -> Array:
-        """Return C = λ 1 1^T + 2 μ I (normal), μ I (shear).
-
-        Returns
-        -------
-        (6, 6) float, Pa
-        """
+        """Return C (6, 6) in Pa: λ 1 1^T + 2 μ I (normal), μ I (shear)."""
         lam, mu = self.lame
         C = np.diag([2 * mu] * 3 + [mu] * 3)
         C[:3, :3] += lam

@@ -95,16 +95,6 @@ class Orthotropic3D(LinearMaterial):
         return S
 
     def elasticity(self) -> Array:
-        """Return the inverse of the compliance, made exactly symmetric.
-
-        Returns
-        -------
-        (6, 6) float, Pa
-
-        Raises
-        ------
-        MaterialError
-            If the compliance is singular.
-        """
+        """Return the inverse (6, 6) in Pa of the compliance, made exactly symmetric."""
         C = super().elasticity()
         return (C + C.T) / 2

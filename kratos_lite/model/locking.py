@@ -14,8 +14,8 @@ import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.elements import KinematicLinear
-from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear, formulations_of, is_of_library
-from kratos_lite.elements.overridden_steps import MECHANICS
+from kratos_lite.elements.custom import is_builtin
+from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear, formulations_of
 from kratos_lite.mesh import Mesh
 from kratos_lite.typing import Array
 
@@ -39,7 +39,7 @@ def _near_half(groups: Sequence[ElementGroup]) -> list[str]:
     """Warn of plain elements with ν near ½; ten-node tetrahedra have sound displacements."""
     found: dict[str, str] = {}
     for kind, C in ((group.element, group.material.C) for group in groups):
-        plain = kind.inherits(*MECHANICS) and kind.formulation == "standard"
+        plain = not kind.custom and kind.formulation == "standard"
         if plain and kind.__name__ != "KinematicLinear3D10N" and bulk_over_shear(C) > NEAR_HALF:
             found[kind.__name__] = better_element(kind, "BBar")
     if not found:
@@ -52,7 +52,7 @@ def _with_apex(groups: Sequence[ElementGroup]) -> list[str]:
     """Warn of linear tetrahedra, and of linear pyramids unless they are few, between other elements."""
     counts: dict[type[KinematicLinear], int] = {}
     for group in groups:
-        if is_of_library(group.element) and len(group.element.nodes) in (4, 5):
+        if is_builtin(group.element) and len(group.element.nodes) in (4, 5):
             counts[group.element] = counts.get(group.element, 0) + len(group)
     half = sum(map(len, groups)) / 2
     return [
@@ -110,4 +110,4 @@ def _shear_over_young(C: Array) -> float:
 def _shears(kind: type[KinematicLinear]) -> bool:
     """Return whether an element is a plain linear brick or wedge of the library, which bends by shearing."""
     linear = kind.shape.cell in ("hexahedron", "wedge") and len(kind.nodes) == kind.shape.corners
-    return linear and is_of_library(kind) and kind.formulation != "enhanced"
+    return linear and is_builtin(kind) and kind.formulation != "enhanced"

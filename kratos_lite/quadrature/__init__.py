@@ -45,7 +45,7 @@ def _checked(degree: int) -> int:
 
 
 def _orbits(d: int, orbits: Sequence[tuple[float, tuple[float, ...]]]) -> tuple[Array, Array]:
-    """Return all permutations of barycentric points with their weights (share of the volume)."""
+    """Return all permutations of barycentric points with their weights (fraction of the volume)."""
     points, weights = [], []
     for weight, barycentric in orbits:
         orbit = sorted(set(permutations(barycentric)))
@@ -71,11 +71,6 @@ def line(degree: int) -> Rule:
     Returns
     -------
     Rule
-
-    Raises
-    ------
-    InputError
-        The degree is no such number.
     """
     n = _points_for(degree)
     return Rule(*gauss.tensor_product(n, 1), 2 * n - 1, f"Gauss-Legendre {n}")
@@ -92,11 +87,6 @@ def quadrilateral(degree: int) -> Rule:
     Returns
     -------
     Rule
-
-    Raises
-    ------
-    InputError
-        The degree is no such number.
     """
     n = _points_for(degree)
     return Rule(*gauss.tensor_product(n, 2), 2 * n - 1, f"Gauss-Legendre {n}x{n}")
@@ -113,11 +103,6 @@ def hexahedron(degree: int) -> Rule:
     Returns
     -------
     Rule
-
-    Raises
-    ------
-    InputError
-        The degree is no such number.
 
     Examples
     --------
@@ -142,11 +127,6 @@ def triangle(degree: int) -> Rule:
     Returns
     -------
     Rule
-
-    Raises
-    ------
-    InputError
-        The degree is no such number.
     """
     if _checked(degree) <= 1:
         return Rule(*_orbits(2, [(1.0, (1 / 3,) * 3)]), 1, "centroid")
@@ -183,11 +163,6 @@ def tetrahedron(degree: int) -> Rule:
     Returns
     -------
     Rule
-
-    Raises
-    ------
-    InputError
-        The degree is no such number.
     """
     if _checked(degree) <= 1:
         return Rule(*_orbits(3, [(1.0, (1 / 4,) * 4)]), 1, "centroid")
@@ -219,11 +194,6 @@ def wedge(degree: int) -> Rule:
     Returns
     -------
     Rule
-
-    Raises
-    ------
-    InputError
-        The degree is no such number.
     """
     return _prism(triangle(degree), line(degree))
 
@@ -246,11 +216,6 @@ def pyramid(degree: int) -> Rule:
     Returns
     -------
     Rule
-
-    Raises
-    ------
-    InputError
-        The degree is no such number.
     """
     n = _points_for(degree)
     ab, w = gauss.tensor_product(n, 2)

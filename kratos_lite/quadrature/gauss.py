@@ -10,13 +10,8 @@ from kratos_lite.typing import Array
 
 
 def legendre(n: int) -> tuple[Array, Array]:
-    """Return the n-point Gauss-Legendre rule on [-1, 1], exact to degree 2n - 1.
-
-    Source: closed forms up to five points (Abramowitz & Stegun 25.4.30), `numpy` beyond.
-
-    >>> legendre(2)[0]
-    array([-0.57735027,  0.57735027])
-    """
+    """Return the n-point Gauss-Legendre rule on [-1, 1], exact to degree 2n - 1."""
+    # Source: closed forms up to five points (Abramowitz & Stegun 25.4.30), `numpy` beyond.
     if n == 1:
         x, w = [0.0], [2.0]
     elif n == 2:
@@ -38,10 +33,8 @@ def legendre(n: int) -> tuple[Array, Array]:
 
 
 def jacobi(n: int, alpha: int) -> tuple[Array, Array]:
-    """Return the n-point rule for ∫_0^1 f(x) (1 - x)^alpha dx, exact to degree 2n - 1.
-
-    Source: Golub & Welsch, Math. Comp. 23 (1969) 221-230, for the Jacobi weight.
-    """
+    """Return the n-point rule for ∫_0^1 f(x) (1 - x)^alpha dx, exact to degree 2n - 1."""
+    # Source: Golub & Welsch, Math. Comp. 23 (1969) 221-230, for the Jacobi weight.
     k = np.arange(n, dtype=float)
     s = 2 * k + alpha
     diagonal = np.full(n, -alpha / (alpha + 2.0))
@@ -61,15 +54,13 @@ def tensor_product(n: int, d: int) -> tuple[Array, Array]:
 
 
 def conical_simplex(n: int, d: int) -> tuple[Array, Array]:
-    """Return the n^d Gauss-Jacobi product on the unit simplex; all weights are positive.
-
-    Source: Stroud, Approximate Calculation of Multiple Integrals (1971), conical products.
-    """
+    """Return the n^d Gauss-Jacobi product on the unit simplex; all weights are positive."""
+    # Source: Stroud, Approximate Calculation of Multiple Integrals (1971), conical products.
     rules = [jacobi(n, d - 1 - i) for i in range(d)]
     grid = np.meshgrid(*[x for x, _ in rules], indexing="ij")
     weights = np.meshgrid(*[w for _, w in rules], indexing="ij")
-    points, rest = [], np.ones_like(grid[0])
+    points, remainder = [], np.ones_like(grid[0])
     for x in grid:
-        points.append(x * rest)
-        rest = rest * (1 - x)
+        points.append(x * remainder)
+        remainder = remainder * (1 - x)
     return np.stack(points, axis=-1).reshape(-1, d), np.prod(weights, axis=0).ravel()

@@ -63,19 +63,7 @@ class Shape:
 
     @classmethod
     def linear(cls) -> type[Shape] | None:
-        """Return the shape of the corners alone.
-
-        Returns
-        -------
-        type of Shape, or None
-            None for a cell that kratos_lite does not know.
-
-        Examples
-        --------
-        >>> from kratos_lite.shapes.hexahedra import Hexahedron20
-        >>> Hexahedron20.linear().__name__
-        'Hexahedron8'
-        """
+        """Return the shape of the corners alone; None for a cell that kratos_lite does not know."""
         return LINEAR[cls.cell] if cls.cell in LINEAR else None
 
     @staticmethod

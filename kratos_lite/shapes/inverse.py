@@ -17,21 +17,12 @@ INSIDE = 1e-9
 
 
 class Inverse(NamedTuple):
-    """Reference coordinates of points, and what is known of them.
+    """Reference coordinates of points, and what is known of them."""
 
-    Attributes
-    ----------
-    xi : (..., 3) float, reference coordinates.
-    inside : (...) bool, whether the point lies in the cell, to 1e-9 of its size and the last digits of
-        the coordinates.
-    converged : (...) bool, whether Newton found a xi with X(xi) = the point.
-    iterations : Newton steps taken (1 where the map is affine).
-    """
-
-    xi: Array
-    inside: Mask
-    converged: Mask
-    iterations: int
+    xi: Array  # (..., 3), reference coordinates
+    inside: Mask  # (...), to 1e-9 of the size of the cell
+    converged: Mask  # (...), whether Newton found X(xi) = point
+    iterations: int  # of Newton, 1 where the map is affine
 
 
 def outside_by(cell: str, xi: Array) -> Array:
@@ -56,36 +47,8 @@ def inverse_map(
     max_iterations: int = 30,
     start: ArrayLike | None = None,
 ) -> Inverse:
-    """Return xi with Σ N_a(xi) X_a = point, by Newton from the centroid.
-
-    Parameters
-    ----------
-    shape : the reference cell.
-    X : (..., n, 3) float, m; nodes of the cells.
-    points : (..., 3) float, m; one point per cell, or broadcast against them.
-    tolerance : size of the last step, in reference coordinates, at which Newton stops.
-    max_iterations : steps after which a point counts as not converged.
-    start : (..., 3) float, reference coordinates at which Newton starts instead of the centroid.
-
-    Returns
-    -------
-    Inverse
-
-    Notes
-    -----
-    Where the map is affine one step is exact, and a node, such as the apex of a pyramid where the Jacobian
-    has no limit, is found without any.  Steps are limited to the size of the cell, and points that run away
-    (they lie outside a curved cell) are reported as not converged.  A curved cell may take two xi to one
-    point, one of them outside; another `start` may then find the other.
-    Source: Solfec-1.0 theory, finite-element shape functions, inverse map.
-
-    Examples
-    --------
-    >>> from kratos_lite.shapes.hexahedra import Hexahedron8
-    >>> found = inverse_map(Hexahedron8, Hexahedron8.nodes * 2, [1.0, 0.5, -1.0])
-    >>> found.xi.tolist(), bool(found.inside), found.iterations
-    ([0.5, 0.25, -0.5], True, 1)
-    """
+    """Return xi (..., 3) with Σ N_a(xi) X_a = point, by Newton from the centroid or `start`."""
+    # An affine cell takes one step, a node none. Source: Solfec-1.0 theory, inverse map.
     X, p = np.asarray(X, dtype=float), np.asarray(points, dtype=float)
     batch = np.broadcast_shapes(X.shape[:-2], p.shape[:-1])
     X = np.broadcast_to(X, (*batch, *X.shape[-2:])).reshape(-1, *X.shape[-2:])

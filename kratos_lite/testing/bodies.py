@@ -26,27 +26,7 @@ TURN = exp([0.4, -1.1, 0.7])
 
 
 def check_body(kind: type[Body]) -> list[Finding]:
-    """Check a kind of body on a box: mass, momenta, forces, and its load of deformation if it has any.
-
-    Parameters
-    ----------
-    kind : a class that is made of a mesh and a material.
-
-    Returns
-    -------
-    list of Finding
-
-    Raises
-    ------
-    InputError
-        If it is no class of bodies.
-
-    Examples
-    --------
-    >>> from kratos_lite import PseudoRigidBody
-    >>> all(finding.passed for finding in check_body(PseudoRigidBody))
-    True
-    """
+    """Check a kind of body on a box: mass, momenta, forces, and its internal forces if it deforms."""
     if not (isinstance(kind, type) and issubclass(kind, Body)):
         raise InputError(f"check a class of bodies, such as RigidBody; got {kind!r}")
 
@@ -141,31 +121,31 @@ def rigid_motions(make: Make) -> Measured:
     body = make()
     body.rotate(TURN)
     moved = _stirred(make)
-    scale = float(np.abs(moved.internal_load()).max())
-    load = float(np.abs(body.internal_load()).max()) / scale
+    scale = float(np.abs(moved.internal_force()).max())
+    load = float(np.abs(body.internal_force()).max()) / scale
     stored = float(body.internal_energy()) / float(moved.internal_energy())
-    return Measured(max(load, stored), 1e-12, "internal_load or internal_energy of a turned body")
+    return Measured(max(load, stored), 1e-12, "internal_force or internal_energy of a turned body")
 
 
 def balance_of_moments(make: Make) -> Measured:
-    """Check that the internal load does no work on rigid motions."""
+    """Check that the internal force vector does no work on rigid motions."""
     body = _stirred(make)
     error: float = 0.0
-    load = body.internal_load()
+    load = body.internal_force()
     for axis in np.eye(3):
         body.set_velocity(axis)
         error = max(error, abs(float(load @ body.u)))
         body.set_velocity(angular=axis)
         error = max(error, abs(float(load @ body.u)))
-    text = "internal_load · u of a translation or rotation"
+    text = "internal_force · u of a translation or rotation"
     return Measured(error / float(np.abs(load).max()), 1e-12, text)
 
 
 def energy(make: Make) -> Measured:
-    """Check that the internal load is the slope of the internal energy."""
+    """Check that the internal force vector is the slope of the internal energy."""
     body = _stirred(make)
     q, v, h = body.q.copy(), body.u.copy(), 1e-5
-    slope, energies = float(body.internal_load() @ v), []
+    slope, energies = float(body.internal_force() @ v), []
     for side in (1, -1):
         body.set_configuration(q + side * h * v)
         energies.append(float(body.internal_energy()))
@@ -176,14 +156,14 @@ def energy(make: Make) -> Measured:
 
 
 def tangent(make: Make) -> Measured:
-    """Check that `solver` solves with M + c K, K by differences of the internal load."""
+    """Check that `solver` solves with M + c K, K by differences of the internal force vector."""
     body = _stirred(make)
     assert isinstance(body, Deformable)
     c, h = 1e-4, 1e-6
     x = body.solver(body.q, c)(body.times_mass(body.u))
-    slope = (body.internal_load(body.q + h * x) - body.internal_load(body.q - h * x)) / (2 * h)
-    found = body.times_mass(x) + c * slope
-    return Measured(difference(found, body.times_mass(body.u)), 1e-7, "(M + c K) x differs from b")
+    slope = (body.internal_force(body.q + h * x) - body.internal_force(body.q - h * x)) / (2 * h)
+    product = body.times_mass(x) + c * slope
+    return Measured(difference(product, body.times_mass(body.u)), 1e-7, "(M + c K) x differs from b")
 
 
 def conservation(make: Make) -> Measured:

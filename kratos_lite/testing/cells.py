@@ -46,11 +46,7 @@ def linear_field(X: Array) -> tuple[Array, Array]:
 
 
 def rotations(shape: type[Shape]) -> Array:
-    """Return the node permutations (k, n) that turn the reference cell into itself.
-
-    Brute force: an affine map is set by where it takes four corners; those of determinant 1
-    that take every node to a node are kept.
-    """
+    """Return the node permutations (k, n) that turn the reference cell into itself."""
     H = np.column_stack([shape.nodes, np.ones(len(shape.nodes))])
     c = shape.corners
     base = next(list(b) for b in combinations(range(c), 4) if abs(np.linalg.det(H[list(b)])) > 1e-9)

@@ -8,8 +8,7 @@ from itertools import product
 import numpy as np
 
 from kratos_lite import voigt
-from kratos_lite.elements import KinematicLinear
-from kratos_lite.elements.overridden_steps import internal_load_of, strain_of
+from kratos_lite.elements import KinematicLinear, custom
 from kratos_lite.quadrature import Rule
 from kratos_lite.shapes import Shape
 from kratos_lite.solvers.constraint_map import rigid_modes
@@ -47,21 +46,21 @@ def check_element(element: Element) -> list[Finding]:
     >>> [finding.check for finding in findings if not finding.passed]
     ['mid edges', 'quadratic patch']
     """
-    found = run((definition,), element)
+    findings = run((definition,), element)
     if _wrong(element):
-        return found
+        return findings
     shape = check_functions(element.shape)
     rule, mass = (
         [replace(f, check=f"{name} {f.check}") for f in check_rule(element.shape.cell, r)] if r else []
         for name, r in (("rule", element.rule), ("mass rule", element.mass_rule))
     )
     causes = [f for f in shape if f.check in ("derivatives", "broadcasting", "kronecker")] + rule
-    found += shape + rule + mass
+    findings += shape + rule + mass
     if failures(causes):
-        return found + run_after(causes, SINGLE + MASS + patches.CHECKS, element)
+        return findings + run_after(causes, SINGLE + MASS + patches.CHECKS, element)
     if failures(mass):
-        return found + run(SINGLE + patches.CHECKS, element) + run_after(mass, MASS, element)
-    return found + run(SINGLE + MASS + patches.CHECKS, element)
+        return findings + run(SINGLE + patches.CHECKS, element) + run_after(mass, MASS, element)
+    return findings + run(SINGLE + MASS + patches.CHECKS, element)
 
 
 def definition(element: Element) -> Measured:
@@ -96,24 +95,13 @@ def _wrong(element: Element) -> list[str]:
 # ---- checks ------------------------------------------------------------------------------------
 
 
-def functions(element: Element) -> Measured:
-    """Check that N and dN of the element are those of its shape: faces and places take them from there."""
-    xi = element.shape.nodes[: element.shape.corners].mean(axis=0) * 0.9
-    errors = {
-        name: difference(getattr(element, name)(xi), getattr(element.shape, name)(xi)) for name in ("N", "dN")
-    }
-    error, name = worst(errors)
-    text = f"{name} of the element against that of its shape, which loads on faces and places take"
-    return Measured(error, 1e-14, text)
-
-
 def volume(element: Element) -> Measured:
     """Check that the volume of a sheared cell is det A times that of the reference cell."""
     X, exact = affine(element)
     cell = element(X)
-    found = max(float(cell.volume()), float(cell.dV.sum()), key=lambda value: abs(value - exact))
-    text = f"volume of a sheared cell is {found:.15g}; exact is {exact:.15g}"
-    return Measured(abs(found / exact - 1), 1e-13, text)
+    value = max(float(cell.volume()), float(cell.dV.sum()), key=lambda value: abs(value - exact))
+    text = f"volume of a sheared cell is {value:.15g}; exact is {exact:.15g}"
+    return Measured(abs(value / exact - 1), 1e-13, text)
 
 
 def strain_operator(element: Element) -> Measured:
@@ -121,9 +109,8 @@ def strain_operator(element: Element) -> Measured:
     X = distorted(element)
     u, exact = linear_field(X)
     cell = element(X)
-    strain = by_B = strain_of(cell, u, C_ISOTROPIC)
-    if element.inherits("strain", "B_at_gauss_points"):  # otherwise the strain is not that of B
-        by_B = np.array([cell.B(xi) @ u.ravel() for xi in element.rule.points])
+    strain = cell.strain(u, C_ISOTROPIC)
+    by_B = np.array([cell.strain_at(xi, u, C_ISOTROPIC) for xi in element.rule.points])
     miss = np.maximum(np.abs(by_B - exact), np.abs(strain - exact))
     g, row = np.unravel_index(int(np.argmax(miss)), miss.shape)
     text = f"strain {voigt.NAMES[row]} at Gauss point {g}: B u gives {by_B[g, row]:.6g}, strain(u) "
@@ -132,29 +119,21 @@ def strain_operator(element: Element) -> Measured:
 
 
 def stiffness(element: Element) -> Measured:
-    """Check K = Σ B^T C B dV, summed by hand of strains and stresses; one cell, a batch, the order agree."""
-    X, n = distorted(element), len(element.shape.nodes)
+    """Check K = Σ B^T C B dV, or that of its own local system, of one cell and of a batch."""
+    X = distorted(element)
     cell, batch = element(X), element(np.stack([X, affine(element)[0]]))
+    system = "local_system" in element.custom
     errors = {}
     for name, C in (("isotropic", C_ISOTROPIC), ("general", anisotropic())):
-        B, S = _by_unit_displacements(cell, C)
-        hand = np.einsum("gki,gkj,g->ij", B, S, cell.dV, optimize=True)
-        for whose, K, parts in (
-            ("", cell.stiffness(C), cell.stiffness_by_axis(C)),
-            (" of a batch", batch.stiffness(C)[0], batch.stiffness_by_axis(C)[0]),
-        ):
-            by_axis = parts.transpose(1, 0, 3, 2).reshape(3 * n, 3 * n)
-            for method, found in (("stiffness", K), ("stiffness_by_axis", by_axis)):
-                text = f"{method}(C){whose}, {name} C, against Σ B^T C B γ det J of one cell"
-                errors[text] = difference(found, hand)
+        strains = [cell.strain(u, C) for u in np.eye(X.size).reshape(-1, *X.shape)]
+        hand = np.einsum("igk,kl,jgl,g->ij", strains, C, strains, cell.dV, optimize=True)
+        if system:
+            hand, _ = custom.system(cell, C, np.zeros_like(X))
+        for whose, K in (("", cell.stiffness(C)), (" of a batch", batch.stiffness(C)[0])):
+            text = f"stiffness(C){whose}, {name} C, against "
+            text += "K of local_system of one cell" if system else "Σ B^T C B γ det J of one cell"
+            errors[text] = difference(K, hand)
     return Measured(worst(errors)[0], 1e-13, worst(errors)[1])
-
-
-def _by_unit_displacements(cell: KinematicLinear, C: Array) -> tuple[Array, Array]:
-    """Return strains and stresses (g, 6, 3n) of unit displacements, by the element's own steps."""
-    units = np.eye(cell.X.size).reshape(-1, *cell.X.shape)
-    strains = [strain_of(cell, u, C) for u in units]
-    return np.stack(strains, axis=-1), np.stack([cell.stress(C, u) for u in units], axis=-1)
 
 
 def symmetry(element: Element) -> Measured:
@@ -166,10 +145,7 @@ def symmetry(element: Element) -> Measured:
 
 
 def rank(element: Element) -> Measured:
-    """Check that K has no eigenvalue that is zero or less (below 1e-9 of the largest) but the six rigid ones.
-
-    A class may state `spurious_modes` of an element alone; eight bricks of it have none.
-    """
+    """Check that K has no eigenvalue ≤ 1e-9 of the largest but the six rigid and the stated spurious ones."""
     cells = (element(X) for X in (element.shape.nodes, distorted(element)))
     counts = [_zeros(cell.stiffness(C_ISOTROPIC)) for cell in cells]
     spurious = element.spurious_modes
@@ -205,7 +181,7 @@ def stretched(element: Element) -> Measured:
             error = max(1e6 * (values[zeros - 1] - rounding), 100 * rounding) / values[zeros]
         text = f"1e6 times zero, or 100 times its rounding, over the first elastic eigenvalue {where}"
         errors[text] = float(error)
-        energy = float(((strain_of(cell, u, C) * cell.stress(C, u)).sum(axis=-1) * cell.dV).sum())
+        energy = float(((cell.strain(u, C) * cell.stress(C, u)).sum(axis=-1) * cell.dV).sum())
         work, terms = (float(v @ k @ v) for v, k in ((u.ravel(), K), (np.abs(u).ravel(), np.abs(K))))
         errors[f"error of u·K u {where}, by 10 ε |u|·|K| |u|"] = abs(work - energy) / (10 * EPS * terms)
     return Measured(worst(errors)[0], 1.0, worst(errors)[1])
@@ -268,14 +244,15 @@ def offset(element: Element) -> Measured:
     return Measured(max(loss), 20, text)
 
 
-def internal_load(element: Element) -> Measured:
-    """Check ∫ B^T σ(u) dV = K u."""
+def internal_force(element: Element) -> Measured:
+    """Check that local_system gives K, and r_int = ∫ B^T σ(u) dV or its own, with r_int = K u."""
     X, C = distorted(element), anisotropic()
     u = np.random.default_rng(19).uniform(-1, 1, X.shape)
     cell = element(X)
-    load = internal_load_of(cell, cell.stress(C, u), C)
-    error = difference(load.ravel(), cell.stiffness(C) @ u.ravel())
-    return Measured(error, 1e-13, "internal_load(stress(C, u)) against stiffness(C) u")
+    expected = cell.stiffness(C)
+    K, r = custom.system(cell, C, u)
+    errors = {"K": difference(K, expected), "r_int": difference(r.ravel(), expected @ u.ravel())}
+    return Measured(worst(errors)[0], 1e-13, f"{worst(errors)[1]} of local_system(C, u) against stiffness(C)")
 
 
 def body_force(element: Element) -> Measured:
@@ -325,7 +302,7 @@ def lumped_mass(element: Element) -> Measured:
 
 
 SINGLE = (
-    functions, volume, strain_operator, stiffness, symmetry, rank, stretched, rigid_motions, frame_invariance,
-    numbering_invariance, length_scaling, offset, internal_load,
+    volume, strain_operator, stiffness, symmetry, rank, stretched, rigid_motions, frame_invariance,
+    numbering_invariance, length_scaling, offset, internal_force,
 )  # fmt: skip
 MASS = (body_force, mass_total, consistent_mass, lumped_mass)

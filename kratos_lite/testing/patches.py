@@ -6,7 +6,6 @@ import numpy as np
 
 from kratos_lite import voigt
 from kratos_lite.elements import KinematicLinear
-from kratos_lite.elements.overridden_steps import STRAIN
 from kratos_lite.elements.surface import area_vectors
 from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.mesh import Block, Mesh
@@ -27,10 +26,7 @@ def patch(
     size: tuple[float, float, float] = (1, 1, 1),
     move: float = 0.0,
 ) -> tuple[Array, Ints]:
-    """Return points (n, 3) and nodes (m, k) of a box that begins at the origin, cut into cells of one shape.
-
-    `move` is how far the corners inside are moved at most, along each axis (seeded).
-    """
+    """Return points (n, 3) and nodes (m, k) of a box of one shape, inner corners moved by up to `move`."""
     mesh = box(size, cells, "KinematicLinear3D8N")
     points, bricks = mesh.points.copy(), mesh.blocks[0].nodes.astype(np.int64)
     inner = ((points > 0) & (points < size)).all(axis=1)
@@ -77,18 +73,16 @@ def on_box(points: Array) -> Mask:
 
 def errors(cells: KinematicLinear, u: Array, exact: Array, stress: Array) -> tuple[float, float]:
     """Return the largest errors of u (m, k, 3) and of its stress at the Gauss points, relative, two-sided."""
-    found = cells.stress(MATERIAL.C, u)
+    computed = cells.stress(MATERIAL.C, u)
     return (
         float(np.abs(u - exact).max() / np.abs(exact).max()),
-        float(np.abs(found - stress).max() / np.abs(stress).max()),
+        float(np.abs(computed - stress).max() / np.abs(stress).max()),
     )
 
 
 def linear_patch(element: Element) -> Measured | str:
-    """Check Irons' patch test with shear: 27 bricks, inner corners moved, u linear on the boundary.
-
-    Source of the field: MacNeal & Harder, Finite Elements in Analysis and Design 1 (1985) 3-20.
-    """
+    """Check Irons' patch test with shear: 27 bricks, inner corners moved, u linear on the boundary."""
+    # Source of the field: MacNeal & Harder, Finite Elements in Analysis and Design 1 (1985) 3-20.
     if why := unbuildable(element.shape):
         return why
     points, nodes = patch(element.shape, (3, 3, 3), move=0.08)
@@ -104,8 +98,10 @@ def quadratic_patch(element: Element) -> Measured | str:
     """Check a random quadratic u under the body force that holds it in balance, on sheared cells."""
     if element.shape.degree < 2:
         return f"{element.shape.__name__} spans no quadratics"
-    if not element.inherits(*STRAIN):
-        return f"{element.__name__} has a strain of its own, which need not be exact for quadratics"
+    if element.custom or not element.has_standard_strain():
+        return (
+            f"{element.__name__} has a B or local system of its own, which need not be exact for quadratics"
+        )
     if why := unbuildable(element.shape):
         return why
     points, nodes = patch(element.shape, (2, 2, 2))
@@ -151,11 +147,8 @@ def shared_faces(element: Element) -> Measured | str:
 
 
 def bend(element: Element, bricks: tuple[int, int, int]) -> tuple[float, float, float]:
-    """Bend a 2x1x1 bar by turning its ends; return strain energy / exact - 1, errors of u and of stress.
-
-    Only what the ends need is held: u_x, and three components against rigid motion.  The exact
-    solution is u = κ (x z, -ν y z, (ν (y² - z²) - x²) / 2), stress σ_xx = E κ z.
-    """
+    """Bend a 2x1x1 bar by turning its ends; return strain energy / exact - 1, errors of u and of stress."""
+    # u = κ (x z, -ν y z, (ν (y² - z²) - x²) / 2), σ_xx = E κ z; only what the ends need is held.
     points, nodes = patch(element.shape, bricks, (2, 1, 1))
     points = points - [1, 0.5, 0.5]
     x, y, z = points.T
@@ -176,15 +169,12 @@ def bend(element: Element, bricks: tuple[int, int, int]) -> tuple[float, float, 
 
 
 def bending(element: Element) -> Measured | str:
-    """Check pure bending: exact for quadratic shapes, too stiff but converging for linear ones.
-
-    Elements with a strain of their own need only converge.
-    """
+    """Check pure bending: exact for quadratic shapes; others, and B or local system of a user, converge."""
     if why := unbuildable(element.shape):
         return why
     wide = 2 if element.spurious_modes else 1  # one brick wide, they are free
     coarse, of_u, of_stress = bend(element, (2, wide, 1))
-    own = not element.inherits(*STRAIN)
+    own = bool(element.custom) or not element.has_standard_strain()
     if element.shape.degree >= 2 and not own:
         text = f"pure bending of two bricks: u is off by {of_u:.3g}, the stress by {of_stress:.3g}"
         return Measured(np.maximum(of_u, of_stress), 1e-12, text)

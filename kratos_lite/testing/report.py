@@ -118,11 +118,7 @@ def report(name: str, findings: list[Finding], *, whole: bool = False) -> str:
 
 
 def _reasons(findings: Iterable[Finding]) -> str:
-    """Return why checks were not run, those of one reason together.
-
-    >>> _reasons([Finding("mid edges", False, 0, 0, "there are none", skipped=True)])
-    'mid edges (there are none)'
-    """
+    """Return why checks were not run, those of one reason together."""
     checks: dict[str, list[str]] = {}
     for finding in findings:
         if finding.skipped:
@@ -135,11 +131,7 @@ def _reasons(findings: Iterable[Finding]) -> str:
 
 
 def run(checks: Iterable[Callable[[S], Measured | str]], subject: S) -> list[Finding]:
-    """Run checks on a subject; each returns what it measured, or a text that says why it cannot run.
-
-    Whatever the subject raises becomes a failed finding, for a kit that stops at the first bug
-    would not show the second.  The same error, met again, is counted once.
-    """
+    """Run checks on a subject; what it raises is a failed finding, the same error again a skipped one."""
     findings: list[Finding] = []
     first: dict[str, str] = {}
     for check in checks:
@@ -155,11 +147,7 @@ def run(checks: Iterable[Callable[[S], Measured | str]], subject: S) -> list[Fin
 def run_after(
     causes: Iterable[Finding], checks: Iterable[Callable[[S], Measured | str]], subject: S
 ) -> list[Finding]:
-    """Run checks that only mean something if others passed; after a failure they are not run, and say so.
-
-    >>> run_after([Finding("kronecker", False, 1.0, 0.0, "")], [worst], {})[0].detail
-    'fix kronecker first'
-    """
+    """Run checks that only mean something if others passed; after a failure they are not run, and say so."""
     names = [finding.check for finding in failures(causes)]
     if not names:
         return run(checks, subject)
@@ -207,11 +195,7 @@ def describe(error: Exception) -> str:
 
 
 def difference(found: ArrayLike, expected: ArrayLike) -> float:
-    """Return max |found - expected| / max |expected|, two-sided; infinite where the sizes differ.
-
-    >>> difference([1.0, 2.0], [1.0, 4.0])
-    0.5
-    """
+    """Return max |found - expected| / max |expected|, two-sided; infinite where the sizes differ."""
     a, b = np.asarray(found, dtype=float), np.asarray(expected, dtype=float)
     if a.shape != b.shape:
         raise ConformanceError(f"a result has shape {a.shape}; expected {b.shape}")
@@ -219,20 +203,12 @@ def difference(found: ArrayLike, expected: ArrayLike) -> float:
 
 
 def worst(errors: Mapping[T, float]) -> tuple[float, T]:
-    """Return the largest error and what it belongs to; one that is not a number counts as largest.
-
-    >>> worst({"K": 0.1, "M": float("nan"), "f": 0.2})
-    (nan, 'M')
-    """
+    """Return the largest error and what it belongs to; one that is not a number counts as largest."""
     names = list(errors)
     i = int(np.argmax([errors[name] for name in names]))
     return float(errors[names[i]]), names[i]
 
 
 def at(xi: ArrayLike) -> str:
-    """Return a point as text.
-
-    >>> at([0.25, -1.0, 0.5])
-    '(0.25, -1, 0.5)'
-    """
+    """Return a point as text."""
     return "(" + ", ".join(f"{x:.6g}" for x in np.asarray(xi, dtype=float).tolist()) + ")"

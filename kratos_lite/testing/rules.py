@@ -53,33 +53,19 @@ def check_rule(cell: str, rule: Rule) -> list[Finding]:
 
 
 def exponents(d: int, degree: int) -> list[tuple[int, ...]]:
-    """Return the exponents of all monomials in d variables up to a total degree.
-
-    >>> exponents(2, 1)
-    [(0, 0), (0, 1), (1, 0)]
-    """
+    """Return the exponents of all monomials in d variables up to a total degree."""
     return [e for e in product(range(degree + 1), repeat=d) if sum(e) <= degree]
 
 
 def monomial(e: tuple[int, ...]) -> str:
-    """Return a monomial as text.
-
-    >>> monomial((2, 0, 1)), monomial((0, 0, 0))
-    ('r^2 t', '1')
-    """
+    """Return a monomial as text."""
     letters = [f"{x}^{n}" if n > 1 else x for x, n in zip("rst", e, strict=False) if n]
     return " ".join(letters) or "1"
 
 
 def integral(cell: str, e: tuple[int, ...]) -> float:
-    """Return the integral of a monomial over a reference cell, in closed form.
-
-    Source: on the simplex Dirichlet's integral, a! b! c! / (a + b + c + 3)!; on the pyramid the
-    sections z = const are squares of half side 1 - z.
-
-    >>> integral("wedge", (1, 0, 2)) == 1 / 6 * 2 / 3
-    True
-    """
+    """Return the integral of a monomial over a reference cell, in closed form."""
+    # Simplex: Dirichlet, a! b! c! / (a + b + c + 3)!; pyramid: sections are squares of half side 1 - z.
     if cell == "wedge":
         return integral("triangle", e[:2]) * integral("line", e[2:])
     if cell in ("triangle", "tetrahedron"):
@@ -120,9 +106,9 @@ def monomials(subject: CellRule) -> Measured:
     errors: dict[str, float] = {}
     for e in exponents(rule.points.shape[1], rule.degree):
         values = np.prod(rule.points ** np.array(e, dtype=int), axis=1)
-        found, exact = float(rule.weights @ values), integral(cell, e)
+        value, exact = float(rule.weights @ values), integral(cell, e)
         size = max(float(np.abs(rule.weights) @ np.abs(values)), abs(exact), 1e-300)
-        errors[f"∫ {monomial(e)} gives {found:.17g}; exact is {exact:.17g}"] = abs(found - exact) / size
+        errors[f"∫ {monomial(e)} gives {value:.17g}; exact is {exact:.17g}"] = abs(value - exact) / size
     error, text = worst(errors)
     return Measured(error, 1e-13, f"{text} (degree claimed: {rule.degree})")
 

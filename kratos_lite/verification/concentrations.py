@@ -16,10 +16,7 @@ from kratos_lite.verification.scenes import Scene
 
 
 def hole(kind: str, n: int = 6, nu: float = scenes.UNIT.nu) -> Scene:
-    """Return a quarter of a plate 8 × 8 with a hole of radius 1 under tension along x, in plane strain.
-
-    Two blocks of n × n bricks from the hole to the sides, where the exact field is prescribed.
-    """
+    """Return a quarter of a plate 8 × 8 with a hole of radius 1 under tension along x, in plane strain."""
 
     def place(X: Array) -> Array:
         angle = np.pi / 2 * X[:, 1]

@@ -21,13 +21,7 @@ FINE = 20_000
 
 
 def errors(scene: Scene, u: Array) -> dict[str, float]:
-    """Return the relative errors of nodal displacements u (n, 3) in m.
-
-    ``displacement`` is the L2 norm of the error, ``energy`` its energy norm, ``nodal`` its maximum at
-    the nodes.  Where no exact field is known, they come from the work W = f · u / 2 of the loads, which is
-    the energy U of the exact solution in the limit: ``displacement`` is |W/U - 1|, the error of the
-    displacement under the load, and ``energy`` its root.
-    """
+    """Return the relative errors of nodal displacements u (n, 3) in m, or of the work of the loads."""
     if scene.exact is None:
         if scene.energy is None:
             return {}
@@ -43,11 +37,11 @@ def norms(
     field: fields.Field, points: Array, groups: Sequence[ElementGroup], u: Array
 ) -> tuple[float, float]:
     """Return the relative errors of nodal displacements u (n, 3): L2 norm, and energy norm."""
-    found = np.zeros(4)
+    integrals = np.zeros(4)
     for group in groups:
         for start in range(0, len(group), 1000):
-            found += _integrals(points, field, group, slice(start, start + 1000), u)
-    return float(np.sqrt(found[0] / found[1])), float(np.sqrt(found[2] / found[3]))
+            integrals += _integrals(points, field, group, slice(start, start + 1000), u)
+    return float(np.sqrt(integrals[0] / integrals[1])), float(np.sqrt(integrals[2] / integrals[3]))
 
 
 def _integrals(points: Array, field: fields.Field, group: ElementGroup, chunk: slice, u: Array) -> Array:
@@ -60,7 +54,7 @@ def _integrals(points: Array, field: fields.Field, group: ElementGroup, chunk: s
     X, dV = N @ points[nodes], placed.dV
     exact, C = field(X), group.material.C
     strain = voigt.symmetric_gradient(fields.gradient(field, X))
-    if group.element.inherits("strain_at"):
+    if group.element.has_standard_strain():
         off = placed.strain(u[nodes]) - strain
     else:  # the modes of an element are those of its own rule
         off = group.at(points, chunk).strain_at(rule.points, u[nodes], C) - strain

@@ -20,11 +20,7 @@ Place = Callable[[Array], Array]
 
 
 def element(kind: str) -> str:
-    """Return the name of an element.
-
-    >>> element("8N"), element("3D8N"), element("KinematicLinear3D8N")[-4:]
-    ('KinematicLinear3D8N', 'KinematicLinear3D8N', '3D8N')
-    """
+    """Return the name of an element such as ``8N`` or ``3D8N``."""
     names = (f"KinematicLinear3D{kind}", f"KinematicLinear{kind}")
     return next((name for name in names if name in ELEMENTS), kind)
 
@@ -50,11 +46,7 @@ def is_stable(kind: str) -> bool:
 
 
 def short(name: str) -> str:
-    """Return a short name of an element for tables.
-
-    >>> short("KinematicLinear3D8N"), short("EnhancedStrain3D8N"), short("BBar3D27N")
-    ('8N', '8N enhanced', '27N b_bar')
-    """
+    """Return a short name of an element for tables, such as ``8N enhanced``."""
     if (
         name.startswith("KinematicLinear3D")
         or name not in ELEMENTS
@@ -97,20 +89,17 @@ def straight(kind: str, cells: Sequence[int], place: Place) -> Mesh:
     return split(place(grid.points), grid.blocks[0].nodes, kind)
 
 
-def joined(pieces: Sequence[Mesh]) -> Mesh:
+def joined(blocks: Sequence[Mesh]) -> Mesh:
     """Return meshes of one kind as one: nodes at one place become one node."""
-    starts = np.cumsum([0, *(piece.n_nodes for piece in pieces)])
-    points = np.vstack([piece.points for piece in pieces])
-    nodes = np.vstack([piece.blocks[0].nodes + start for piece, start in zip(pieces, starts, strict=False)])
+    starts = np.cumsum([0, *(block.n_nodes for block in blocks)])
+    points = np.vstack([block.points for block in blocks])
+    nodes = np.vstack([block.blocks[0].nodes + start for block, start in zip(blocks, starts, strict=False)])
     _, first, same = np.unique(points.round(9), axis=0, return_index=True, return_inverse=True)
-    return Mesh(points[first], [Block(pieces[0].blocks[0].name, same.ravel()[nodes])])
+    return Mesh(points[first], [Block(blocks[0].blocks[0].name, same.ravel()[nodes])])
 
 
 def octant(n: int, kind: str, outer: Place) -> Mesh:
-    """Return the space between the unit sphere and an outer surface, x y z ≥ 0, in three blocks of n³ bricks.
-
-    `outer` takes directions (m, 3) to the outer surface.
-    """
+    """Return the space between unit sphere and outer surface, x y z ≥ 0, in three blocks of n³ bricks."""
     center, edges = np.ones(3), np.array([[1, 1, 0], [0, 1, 1], [1, 0, 1]])
 
     def block(k: int) -> Mesh:
@@ -165,16 +154,13 @@ def body_forces(mesh: Mesh, force: Place) -> Array:
     for start in range(0, len(block), 2000):
         nodes = block.nodes[start : start + 2000]
         placed = kind(mesh.points[nodes], rule)
-        share = N.T @ (force(N @ mesh.points[nodes]) * placed.dV[..., None])
-        np.add.at(total, nodes, share)
+        forces = N.T @ (force(N @ mesh.points[nodes]) * placed.dV[..., None])
+        np.add.at(total, nodes, forces)
     return total
 
 
 def face_forces(mesh: Mesh, where: Mask, traction: Callable[[Array, Array], Array]) -> Array:
-    """Return ∫ N t dA over the boundary faces among nodes, as nodal forces (n, 3).
-
-    `traction` takes places and unit normals (m, g, 3) to t.  The normals point outward.
-    """
+    """Return ∫ N t dA (n, 3) over boundary faces among nodes; `traction` takes places and normals."""
     total = np.zeros_like(mesh.points)
     for faces in mesh.faces(where):
         assert faces.shape is not None

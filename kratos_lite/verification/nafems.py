@@ -22,10 +22,7 @@ FREQUENCIES = (45.897, 109.44, 109.44, 167.89, 193.59, 206.19, 206.19)
 
 
 def le10(kind: str) -> tuple[Model, ...]:
-    """Return a quarter of an elliptic plate with an elliptic hole, 0.6 thick, 1 MPa on it; 6 × 4 × 4 bricks.
-
-    The outer face is held in the plane, its middle line along z; the layers are thus an even number.
-    """
+    """Return a quarter of an elliptic plate with an elliptic hole, 0.6 thick, under 1 MPa."""
 
     def place(X: Array) -> Array:
         angle = np.pi / 2 * X[:, 1]

@@ -27,10 +27,7 @@ def lame_cylinder(nu: float, E: float, a: float, b: float, r: float) -> float:
 
 
 def thick_cylinder(nu: float) -> Callable[[str], tuple[Model, ...]]:
-    """Return a function: a quarter of a cylinder, radii 3 and 9, in nine segments of five bricks.
-
-    By symmetry that is the segment of 10° of MacNeal & Harder, without supports at an angle.
-    """
+    """Return a function: a quarter of a cylinder, radii 3 and 9, in nine segments of five bricks."""
 
     def place(X: Array) -> Array:
         r, angle = np.interp(5 * X[:, 0], range(6), RADII), np.pi / 2 * X[:, 1]

@@ -11,7 +11,6 @@ from kratos_lite.analysis.model import Model
 from kratos_lite.analysis.result import Result
 from kratos_lite.errors import InputError, KratosLiteError
 from kratos_lite.verification.meshes import kind_of, short
-from kratos_lite.verification.sources import SOURCES
 
 ELEMENTS = (
     *(f"KinematicLinear3D{n}N" for n in (4, 5, 6, 8)), "EnhancedStrain3D8N", "BBar3D8N",
@@ -33,32 +32,16 @@ def every(kind: str) -> bool:
 
 @dataclass(frozen=True, kw_only=True)
 class Problem:
-    """A quantity with a known value.
+    """A quantity with a known value."""
 
-    Attributes
-    ----------
-    name : family and problem, such as ``patch/linear``.
-    quantity : what is measured, with its unit.
-    source : a key of `SOURCES`, and where it stands in there.
-    reference : the value known; errors are relative to it, or absolute where it is 0.
-    of : takes the name of an element, or "" where the problem has none, to the value found.
-    tolerance : error up to which a row passes.
-    exact : elements that have to pass; the others are graded.  All are graded without a tolerance.
-    takes : elements that the problem is for; None where it has no element.
-    """
-
-    name: str
-    quantity: str
-    source: str
-    reference: float
-    of: Callable[[str], float]
-    tolerance: float | None = None
-    exact: Of = every
-    takes: Of | None = every
-
-    def __post_init__(self) -> None:
-        if self.cited not in SOURCES:
-            raise ValueError(f"{self.name}: {self.source!r} names none of the sources")
+    name: str  # family/problem
+    quantity: str  # with its unit
+    source: str  # a key of SOURCES, and where it stands in there
+    reference: float  # errors are relative to it, or absolute where it is 0
+    of: Callable[[str], float]  # takes the name of an element to the value
+    tolerance: float | None = None  # up to which a row passes; all are graded without
+    exact: Of = every  # elements that have to pass; others are graded
+    takes: Of = every  # elements that it is for
 
     @property
     def cited(self) -> str:
@@ -78,23 +61,17 @@ class Problem:
         return next((letter for limit, letter in GRADES if error <= limit * (1 + 1e-9)), "F")
 
     def elements(self, wanted: tuple[str, ...] = ELEMENTS) -> tuple[str, ...]:
-        """Return those of some elements that the problem is for; ("",) where it has none."""
-        return ("",) if self.takes is None else tuple(filter(self.takes, wanted))
+        """Return those of some elements that the problem is for."""
+        return tuple(filter(self.takes, wanted))
 
     def row(self, element: str) -> Row:
-        """Find the value for an element; an error of the library becomes a row that fails.
-
-        Raises
-        ------
-        InputError
-            An element that is not of the library raises any other error.
-        """
+        """Find the value for an element; an error of the library becomes a row that fails."""
         try:
             value, note = float(self.of(element)), ""
         except KratosLiteError as error:
             value, note = float("nan"), str(error)
         except Exception as error:
-            if element in ("", *ELEMENTS):
+            if element in ELEMENTS:
                 raise
             raise InputError(
                 f"{element} raises {type(error).__name__}: {error}, in {self.name}; "
@@ -103,33 +80,15 @@ class Problem:
         return Row(self, element, value, note=note)
 
 
-def bounded(
-    name: str, quantity: str, source: str, reference: float, tolerance: float, of: Callable[[str], float],
-    takes: Of | None = None,
-) -> Problem:  # fmt: skip
-    """Return a problem with a tolerance; without an element unless `takes` says for which it is."""
-    return Problem(
-        name=name, quantity=quantity, source=source, reference=float(reference), tolerance=tolerance, of=of,
-        takes=takes,
-    )  # fmt: skip
-
-
 @dataclass(frozen=True, kw_only=True)
 class StaticProblem(Problem):
-    """A problem whose answer follows from the displacements of one or several models at rest.
+    """A problem whose answer follows from the displacements of one or several models at rest."""
 
-    Attributes
-    ----------
-    models : takes the name of an element to the models.
-    measure : takes their results to the value.
-    """
-
-    models: Callable[[str], tuple[Model, ...]]
-    measure: Callable[..., float]
+    models: Callable[[str], tuple[Model, ...]]  # of the name of an element
+    measure: Callable[..., float]  # takes their results to the value
     of: Callable[[str], float] = field(init=False)
 
     def __post_init__(self) -> None:
-        super().__post_init__()
         object.__setattr__(self, "of", self._solved)
 
     def _solved(self, element: str) -> float:
@@ -144,22 +103,13 @@ def solved(models: Callable[[str], tuple[Model, ...]], element: str) -> tuple[Re
 
 @dataclass(frozen=True)
 class Row:
-    """One line of the table.
-
-    Attributes
-    ----------
-    problem : what is asked.
-    element : its name, or "".
-    value : what was found.
-    others : what other programs find, by their names.
-    note : why there is no value.
-    """
+    """One line of the table."""
 
     problem: Problem
     element: str
     value: float
-    others: dict[str, float] = field(default_factory=dict)
-    note: str = ""
+    others: dict[str, float] = field(default_factory=dict)  # what other programs find, by their names
+    note: str = ""  # why there is no value
 
     @property
     def error(self) -> float:
@@ -170,7 +120,7 @@ class Row:
     def grade(self) -> str:
         """``pass``, ``FAIL`` or a letter; ``refused`` where spurious modes of the element may spoil it."""
         if self.note:
-            return REFUSED if self.element and kind_of(self.element).spurious_modes else FAIL
+            return REFUSED if kind_of(self.element).spurious_modes else FAIL
         return self.problem.grade(self.value, self.element)
 
     @property

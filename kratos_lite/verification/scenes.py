@@ -33,22 +33,14 @@ SOIL = Isotropic3D(E=210e6, nu=0.3, density=7620.0)
 
 @dataclass
 class Scene:
-    """One discrete problem and what is known about its solution.
-
-    Attributes
-    ----------
-    name, kind, n : which scene, element kind such as ``8N``, and cells along an edge.
-    model : mesh, material, supports and loads.
-    exact : the exact field, or None.
-    energy : J, the energy of the exact solution, or None; stands in where no field is known.
-    """
+    """One discrete problem and what is known about its solution."""
 
     name: str
-    kind: str
-    n: int
+    kind: str  # of elements, such as 8N
+    n: int  # cells along an edge
     model: Model
     exact: fields.Field | None = None
-    energy: float | None = None
+    energy: float | None = None  # J of the exact solution, where no field is known
 
     def forces(self) -> Array:
         """Return the nodal forces (n, 3) in N of all loads."""
@@ -56,10 +48,7 @@ class Scene:
 
 
 def manufactured(kind: str, n: int, distortion: float = 0.0) -> Scene:
-    """Return the manufactured solution on the unit cube, all sides held at their exact displacement.
-
-    Inner corners move by up to `distortion`.
-    """
+    """Return the manufactured solution on the unit cube, all sides prescribed; inner corners moved."""
 
     def place(X: Array) -> Array:
         return X + distortion * np.prod(np.sin(np.pi * X), axis=1)[:, None] * (1, -0.7, 0.5)
@@ -94,10 +83,7 @@ def bending(kind: str, n: int) -> Scene:
 
 
 def cook(kind: str, n: int, material: Isotropic3D | None = None, plane_stress: bool = False) -> Scene:
-    """Return Cook's membrane, 100 N in shear on its right edge; one layer of thickness 1.
-
-    In plane strain, or free to change its thickness.
-    """
+    """Return Cook's membrane, 100 N in shear on its right edge; one layer of thickness 1."""
 
     def place(X: Array) -> Array:
         s, t, z = X.T

@@ -21,10 +21,7 @@ ROOF = Isotropic3D(E=4.32e8, nu=0.0)
 
 
 def plate(length: float, clamped: bool, n: int = 8) -> Callable[[str], tuple[Model, ...]]:
-    """Return a function: a quarter of a plate 2 × length × 0.01 under uniform load, n × n × 1 bricks.
-
-    The middle of the plate is at the origin.  A supported edge is held along z alone, through the thickness.
-    """
+    """Return a function: a quarter of a plate 2 × length × 0.01 under uniform load, n × n × 1 bricks."""
     size = (1.0, length / 2, THICKNESS)
 
     def models(kind: str) -> tuple[Model, ...]:

@@ -35,13 +35,7 @@ PROBLEMS: dict[str, Problem] = {problem.name: problem for family in FAMILIES for
 
 
 def chosen(names: Sequence[str] = ()) -> list[Problem]:
-    """Return the problems of some names, families or patterns such as ``*cylinder*``; all without names.
-
-    Raises
-    ------
-    InputError
-        A name fits no problem.
-    """
+    """Return the problems of names, families or patterns such as ``*cylinder*``; all without names."""
     if not names:
         return list(PROBLEMS.values())
     for name in names:
@@ -62,27 +56,12 @@ def verify(
     elements: Sequence[str] = (),
     progress: Callable[[str, float], None] | None = None,
 ) -> Iterator[Row]:
-    """Yield the rows of some problems for some elements.
-
-    Parameters
-    ----------
-    names : problems, families or patterns; all if there are none.
-    elements : names such as ``3D8N`` or ``My8N``; with them, problems without an element are left out.
-        Those of the library if there are none.
-    progress : called with the name of each problem and the share done.
-
-    Raises
-    ------
-    InputError
-        A name fits no problem, or there is no such element.
-    """
+    """Yield the rows of problems for elements, by default all for those of the library."""
     problems = chosen(names)
     solved.cache_clear()  # an element of this name may have been another one
     wanted = tuple(kind_of(name).__name__ for name in elements) or ELEMENTS
     for number, problem in enumerate(problems):
         if progress is not None:
             progress(problem.name, number / len(problems))
-        if elements and problem.takes is None:
-            continue
         for kind in problem.elements(tuple(map(element, wanted))):
             yield problem.row(kind)

@@ -161,14 +161,14 @@ def test_work_of_a_constant_force_is_force_times_way(engine):
     np.testing.assert_allclose(work, 1 + (q - start) @ load, rtol=1e-13)
 
 
-def test_convected_loads_turn_with_the_body(engine):
+def test_follower_loads_turn_with_the_body(engine):
     """A force along a body axis about which nothing turns it, and a torque about a principal axis."""
     q, u = np.zeros(12), np.zeros(6)
     q[:9] = exp([0, 0, 1.0]).T.ravel()
     J = np.diag([1.0, 2, 4])
     constant = (J, np.linalg.inv(J), np.array(2.0), NONE3, NONE6)
-    convected = np.array([3.0, 0, 0, 4, 0, 0])
-    rigid.steps(q, u, *constant, convected, 0.01, 100, "momentum_conserving")
+    follower = np.array([3.0, 0, 0, 4, 0, 0])
+    rigid.steps(q, u, *constant, follower, 0.01, 100, "momentum_conserving")
     axis = np.array([np.cos(1), np.sin(1), 0])
     np.testing.assert_allclose(u, [3, 0, 0, *(2 * axis)], atol=1e-13)
     np.testing.assert_allclose(q[9:], axis, atol=1e-13)
@@ -355,9 +355,9 @@ def test_two_halves_are_a_step(engine, integrator):
     q, u, constant = rigid_bodies(21)
     q2, u2 = q.copy(), u.copy()
     load = np.array([1.0, 2, 3, 4, 5, 6])
-    spatial, convected = np.concatenate([NONE3, load[3:]]), np.concatenate([load[:3], NONE3])
+    spatial, follower = np.concatenate([NONE3, load[3:]]), np.concatenate([load[:3], NONE3])
     for _ in range(5):
-        rigid.steps(q, u, *constant, NONE3, spatial, convected, 0.02, 1, integrator)
+        rigid.steps(q, u, *constant, NONE3, spatial, follower, 0.02, 1, integrator)
         qh = rigid.half_step(q2, u2, 0.02)
         rigid.finish_step(q2, u2, qh, np.tile(load, (21, 1)), *constant, 0.02, integrator)
     np.testing.assert_array_equal(q, q2)

@@ -158,7 +158,7 @@ def test_a_load_in_time_is_a_function_of_the_time(function):
 def test_compiled_functions_are_functions_too():
     subject = body()
     subject.add(kl.Force(subject.center, (1.0, 0, 0)), amplitude=np.sin)
-    assert subject.external_load(time=1.0)[3] == pytest.approx(np.sin(1.0))
+    assert subject.external_force(time=1.0)[3] == pytest.approx(np.sin(1.0))
 
 
 def test_until_takes_a_state_and_returns_one_answer():

@@ -310,22 +310,3 @@ def test_compiled_is_numpy(name, monkeypatch):
 def test_threads_change_no_bit(name):
     given = moved(name, cells=(11, 7, 4), prestress=30.0)
     same_on_all_threads(lambda: everything(*given))
-
-
-@compiled
-def test_element_with_its_own_geometry_takes_numpy():
-    with ELEMENTS.temporary():
-
-        class Half(ELEMENTS[NAMES[3]]):
-            @property
-            def _gauss(self):
-                dV, D = super()._gauss
-                return dV / 2, D
-
-    points, (first, _), q, dq = moved(NAMES[3])
-    own = ElementGroup(Half, first.rule, first.material, first.nodes, first.rows)
-    for change in (None, dq):
-        load = finite_strain.internal_load(points, [first], q, change)
-        np.testing.assert_allclose(
-            finite_strain.internal_load(points, [own], q, change), load / 2, atol=1e-11
-        )

@@ -159,12 +159,12 @@ def test_elements_of_others_are_computed_by_the_kernels(monkeypatch):
     assert fields.at_gauss(points, group, points).shape == (12, 27, 6)
 
 
-def test_an_element_with_its_own_strain_takes_it():
+def test_an_element_with_its_own_B_takes_it():
     with ELEMENTS.temporary():
 
         class Doubled8N(KinematicLinear3D8N):
-            def strain(self, u):
-                return 2 * super().strain(u)
+            def B(self, xi):
+                return 2 * super().B(xi)
 
     points, group = batch_of(Doubled8N)
     _, usual = batch_of(KinematicLinear3D8N)
@@ -184,61 +184,6 @@ def test_an_element_with_its_own_strain_takes_it():
         fields.internal_load(points, [group], u),
         4 * fields.internal_load(points, [usual], u),
         atol=1e-5,
-    )
-
-
-def test_an_element_with_its_own_volume_takes_it():
-    with ELEMENTS.temporary():
-
-        class Half8N(KinematicLinear3D8N):
-            @property
-            def dV(self):
-                return super().dV / 2
-
-    points, group = batch_of(Half8N)
-    _, usual = batch_of(KinematicLinear3D8N)
-    u = 1e-3 * points**2
-    np.testing.assert_allclose(fields.volumes(points, group), fields.volumes(points, usual) / 2, rtol=1e-13)
-    assert fields.totals(points, [group], u)[0] == pytest.approx(fields.totals(points, [usual], u)[0] / 2)
-    force = np.array([0.0, 0.0, -1.0])
-    np.testing.assert_allclose(
-        fields.body_force(points, group, force),
-        fields.body_force(points, usual, force) / 2,
-        atol=1e-14,
-    )
-
-
-def test_an_element_with_its_own_loads_and_masses_takes_them():
-    with ELEMENTS.temporary():
-
-        class Odd8N(KinematicLinear3D8N):
-            def body_force(self, b):
-                return 3 * super().body_force(b)
-
-            def internal_load(self, stress):
-                return 5 * super().internal_load(stress)
-
-            def lumped_mass(self, density):
-                return 7 * super().lumped_mass(density)
-
-    points, group = batch_of(Odd8N)
-    _, usual = batch_of(KinematicLinear3D8N)
-    for b in (np.array([1.0, 2.0, 3.0]), points):
-        np.testing.assert_allclose(
-            fields.body_force(points, group, b),
-            3 * fields.body_force(points, usual, b),
-            rtol=1e-12,
-        )
-    np.testing.assert_allclose(
-        mass_and_convection.lumped_mass(points, [group]),
-        7 * mass_and_convection.lumped_mass(points, [usual]),
-        rtol=1e-12,
-    )
-    once = fields.internal_load(points, [usual], 1e-3 * points**2)
-    np.testing.assert_allclose(
-        fields.internal_load(points, [group], 1e-3 * points**2),
-        5 * once,
-        atol=1e-12 * np.abs(once).max(),
     )
 
 

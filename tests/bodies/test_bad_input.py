@@ -209,8 +209,8 @@ def test_a_point_outside_of_elements():
         (lambda: kl.Force((NAN, 5, 5), (1, 0, 0)), kl.InputError, "material points"),
         (lambda: kl.Force((0, 0, 0), (1, NAN, 0)), kl.InputError, "a force must be finite"),
         (lambda: kl.Force((0, 0, 0), (1, 0)), kl.InputError, "a force must have three components"),
-        (lambda: kl.Force((0, 0, 0), (1, 0, 0), frame="body"), kl.InputError, "'spatial' or 'convected'"),
-        (lambda: kl.Torque((1, 0, 0), frame="body"), kl.InputError, "'spatial' or 'convected'"),
+        (lambda: kl.Force((0, 0, 0), (1, 0, 0), frame="body"), kl.InputError, "'spatial' or 'follower'"),
+        (lambda: kl.Torque((1, 0, 0), frame="body"), kl.InputError, "'spatial' or 'follower'"),
         (lambda: kl.Torque((1, NAN, 0)), kl.InputError, "a torque must be finite"),
         (
             lambda: kl.Spring((0, 0, 0), (1, 1, 1), -5.0),
@@ -274,16 +274,16 @@ def test_callbacks_that_return_nonsense(kind, function, words, refused):
     refused(body, lambda body: list(kl.integrate(body, 1e-4, 3)), kl.InputError, words)
 
 
-def test_nothing_pushes_or_holds_an_obstacle(refused):
-    floor = kl.Obstacle(kl.box())
+def test_nothing_pushes_or_holds_a_fixed_body(refused):
+    floor = kl.FixedBody(kl.box())
     refused(
-        floor, lambda body: body.add(kl.Gravity((0, 0, 1))), kl.ModelError, "loads do not affect an obstacle"
+        floor, lambda body: body.add(kl.Gravity((0, 0, 1))), kl.ModelError, "loads do not affect a fixed body"
     )
     refused(
         floor,
         lambda body: body.constrain(kl.FixPoint((0, 0, 0))),
         kl.ModelError,
-        "an obstacle needs no constraint",
+        "a fixed body needs no constraint",
     )
 
 

@@ -23,13 +23,13 @@ def herd(kind, integrator, count=5, damping=0.0):
         body.set_velocity(rng.uniform(-1, 1, 3), rng.uniform(-3, 3, 3))
         if i % 2:
             body.add(kl.Gravity((0, 0, -9.81)))
-            frame = "convected" if kind is kl.RigidBody else "spatial"  # F stretches a convected one
+            frame = "follower" if kind is kl.RigidBody else "spatial"  # F stretches a follower
             body.add(kl.Force(mesh.points[3], rng.uniform(-9, 9, 3), frame=frame), amplitude=2.0)
         if i == 3:
             body.add(kl.Force(body.center, (1.0, 2, 3)))
         if i == 4 and kind is kl.RigidBody:
             body.add(kl.Torque((1.0, 2, 3)))
-            body.add(kl.Torque((3.0, 2, 1), frame="convected"))
+            body.add(kl.Torque((3.0, 2, 1), frame="follower"))
         bodies.append(body)
     return bodies
 

@@ -506,6 +506,6 @@ def test_a_turned_body_does_as_the_body(brick):
         body = brick(cells=(1, 2, 2), **options)
         d = 1e-2 * rng.uniform(-1, 1, body.points.shape)
         turned = (body.points + d) @ R.T - body.points
-        f = body.internal_load(d.ravel()).reshape(-1, 3)
-        g = body.internal_load(turned.ravel()).reshape(-1, 3)
+        f = body.internal_force(d.ravel()).reshape(-1, 3)
+        g = body.internal_force(turned.ravel()).reshape(-1, 3)
         np.testing.assert_allclose(g, f @ R.T, atol=1e-11 * np.abs(f).max())

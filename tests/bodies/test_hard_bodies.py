@@ -47,7 +47,7 @@ def test_the_critical_step_with_damping_is_sharp():
         body.u[[0, 4, 8]] = 1e-9  # breathing
         for _ in range(200):
             half = body.q + share * h / 2 * body.u
-            force = -body.internal_load(half)
+            force = -body.internal_force(half)
             force[:9] -= 0.01 * body.stiffness(half) @ body.u[:9]
             kick = np.concatenate([np.linalg.solve(body.mass_matrix(), force[:9]), np.zeros(3)])
             body.u = body.u + share * h * kick
@@ -162,11 +162,11 @@ def test_a_form_is_named():
         kl.FiniteElementBody(kl.box(), RUBBER, formulation=3)
 
 
-def test_an_obstacle_has_a_mesh_and_stays_one():
+def test_a_fixed_body_has_a_mesh_and_stays_one():
     with pytest.raises(InputError, match="a Mesh is needed"):
-        kl.Obstacle(None)
-    with pytest.raises(ModelError, match="an obstacle has no mass"):
-        kl.convert(kl.Obstacle(kl.box(), RUBBER), kl.RigidBody)
+        kl.FixedBody(None)
+    with pytest.raises(ModelError, match="a fixed body has no mass"):
+        kl.convert(kl.FixedBody(kl.box(), RUBBER), kl.RigidBody)
 
 
 def test_each_of_many_bodies_may_have_its_own_force_and_torque():

@@ -48,7 +48,7 @@ def stirred(kind, seed=3):
 
 def resultant(body):
     """Return force and torque about the mass center of the loads: their powers on six rigid motions."""
-    load, u, powers = body.external_load(), body.u.copy(), []
+    load, u, powers = body.external_force(), body.u.copy(), []
     for unit in np.eye(6):
         body.set_velocity(unit[:3], unit[3:])
         powers.append(float(load @ body.u))
@@ -107,7 +107,7 @@ def test_a_force_in_space_has_its_moment(kind):
 def test_a_force_in_the_body_turns_with_it(kind):
     body = moved(block(kind))
     X, f = at(0.1, -0.2, 0.4), np.array([1.0, 2.0, -3.0])
-    body.add(kl.Force(X, f, frame="convected"), amplitude=2.0)
+    body.add(kl.Force(X, f, frame="follower"), amplitude=2.0)
     force, torque = resultant(body)
     np.testing.assert_allclose(force, 2 * TURN @ f, rtol=1e-12)
     np.testing.assert_allclose(torque, 2 * TURN @ np.cross(X - CENTER, f), rtol=1e-11)
@@ -117,11 +117,11 @@ def test_a_force_in_the_body_turns_with_it(kind):
 def test_a_force_in_the_body_stretches_with_it(kind):
     F = TURN @ np.diag([1.2, 0.9, 1.1])
     body = moved(block(kind), F)
-    body.add(kl.Force(at(0.1, 0.1, 0.1), (1.0, 0, 0), frame="convected"))
+    body.add(kl.Force(at(0.1, 0.1, 0.1), (1.0, 0, 0), frame="follower"))
     np.testing.assert_allclose(resultant(body)[0], F[:, 0], rtol=1e-12)
 
 
-@pytest.mark.parametrize("frame", ["spatial", "convected"])
+@pytest.mark.parametrize("frame", ["spatial", "follower"])
 def test_a_torque_on_a_rigid_body(frame):
     body = moved(block(kl.RigidBody))
     t = np.array([1.0, -2.0, 4.0])
@@ -163,7 +163,7 @@ def test_loads_add_up_and_an_amplitude_multiplies(kind):
     body.add(kl.Force(X, (1.0, 2, 3)), amplitude=lambda t: 1 + t)
     single.add(kl.Force(X, (1.0, 2, 3)))
     np.testing.assert_allclose(
-        body.external_load(time=0.5), 3.5 * single.external_load(), rtol=1e-13, atol=1e-13
+        body.external_force(time=0.5), 3.5 * single.external_force(), rtol=1e-13, atol=1e-13
     )
 
 
@@ -199,7 +199,7 @@ def test_loads_of_models_do_the_work_of_their_nodal_forces(kind, load):
     f = load.forces(body.mesh, block(kl.FiniteElementBody).groups)
     body.add(load)
     power = (f * body.velocity(body.mesh.points)).sum()
-    assert body.external_load() @ body.u == pytest.approx(power, rel=1e-11)
+    assert body.external_force() @ body.u == pytest.approx(power, rel=1e-11)
 
 
 def test_signs_of_tractions_and_pressures():
@@ -223,7 +223,7 @@ def test_both_pressures_agree_on_the_undeformed_body(kind):
         dead, following = block(kind), block(kind)
         dead.add(kl.Pressure(face, 7.0))
         following.add(kl.FollowerPressure(face, 7.0))
-        np.testing.assert_allclose(following.external_load(), dead.external_load(), atol=1e-13)
+        np.testing.assert_allclose(following.external_force(), dead.external_force(), atol=1e-13)
         inward = -np.eye(3)["xyz".index(face[0])] * (1 if face[1] == "+" else -1)
         assert resultant(dead)[0] @ inward > 0
 
@@ -280,7 +280,7 @@ def test_following_pressure_works_by_the_change_of_volume(kind):
         body.add(kl.FollowerPressure(face, 30.0))
     du = 1e-5 * body.u
     change = volume(body, body.q + du) - volume(body, body.q - du)
-    assert body.external_load() @ (2 * du) == pytest.approx(-30 * change, rel=1e-7)
+    assert body.external_force() @ (2 * du) == pytest.approx(-30 * change, rel=1e-7)
 
 
 # ---- potentials ------------------------------------------------------------------------------------
@@ -300,7 +300,7 @@ def test_a_load_is_the_slope_of_its_potential(kind, load):
     body = stirred(kind)
     q, v = body.q.copy(), body.u.copy()
     body.add(load, amplitude=1.5)
-    slope = body.external_load() @ v
+    slope = body.external_force() @ v
     potentials = []
     for side in (1, -1):
         body.set_configuration(q + side * 1e-5 * v)
@@ -312,7 +312,7 @@ def test_a_load_is_the_slope_of_its_potential(kind, load):
 def test_the_potential_of_a_rigid_body_too(load):
     body = stirred(kl.RigidBody)
     body.add(load, amplitude=1.5)
-    slope, q, R = float(body.external_load() @ body.u), body.q.copy(), body.rotation.copy()
+    slope, q, R = float(body.external_force() @ body.u), body.q.copy(), body.rotation.copy()
     potentials = []
     for t in (1e-5, -1e-5):
         turned = R @ exp(t * body.u[:3])
@@ -326,7 +326,7 @@ def test_loads_that_change_have_no_potential(kind):
     body = block(kind)
     body.add(kl.Gravity((0, 0, -9.81)), amplitude=kl.TimeSeries([0, 1], [1, 2]))
     body.add(kl.FollowerPressure("z+", 5.0))
-    body.add(kl.Force(CENTER, (1.0, 2, 3), frame="convected"))
+    body.add(kl.Force(CENTER, (1.0, 2, 3), frame="follower"))
     assert float(body.potential_energy()) == 0
 
 
@@ -361,7 +361,7 @@ def test_gravity_on_a_part_of_a_body_without_material_takes_its_mean_density():
     mesh = kl.box((2.0, 1.0, 1.0), (2, 1, 1))
     body = kl.RigidBody(mesh, mass_properties=kl.MassProperties(mass=8.0, inertia=np.eye(3)))
     body.add(kl.Gravity((0.0, 0.0, -10.0), where=[0]))  # one of two equal elements
-    np.testing.assert_allclose(body.external_load()[3:], [0.0, 0.0, -40.0], atol=1e-12)
+    np.testing.assert_allclose(body.external_force()[3:], [0.0, 0.0, -40.0], atol=1e-12)
 
 
 @each_kind
@@ -369,6 +369,6 @@ def test_a_load_that_a_function_of_time_gives_acts_as_the_one_of_that_time(kind)
     body, twin = block(kind), block(kind)
     body.add(kl.TimeDependentLoad(lambda t: kl.Traction("x+", (10.0 * t, 0, 5.0)) if t < 2 else None))
     twin.add(kl.Traction("x+", (15.0, 0, 5.0)))
-    np.testing.assert_allclose(body.external_load(time=1.5), twin.external_load(), atol=1e-14)
-    assert not body.external_load(time=3.0).any()
+    np.testing.assert_allclose(body.external_force(time=1.5), twin.external_force(), atol=1e-14)
+    assert not body.external_force(time=3.0).any()
     assert float(body.potential_energy()) == 0

@@ -30,7 +30,7 @@ def body_of(brick, kind, integrator, options, loads):
     body.set_velocity((1, 2, 3), (0.5, 8, -0.3))
     if loads != "free":
         body.add(kl.Gravity((0, 0, -9.81)))
-        body.add(kl.Force((0.2, 0.3, 0.5), (10.0, 0, 5), frame="convected"))
+        body.add(kl.Force((0.2, 0.3, 0.5), (10.0, 0, 5), frame="follower"))
     if loads == "changing":
         body.add(
             kl.Force((0.2, 0.3, 0.5), (0, 30.0, 5)), amplitude=kl.TimeSeries([0, 0.01, 0.02], [0, 1, -1])

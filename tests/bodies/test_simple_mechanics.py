@@ -289,7 +289,7 @@ def test_a_spring_swings_with_its_frequency(kind, integrator):
 def test_a_spring_without_a_length_is_relaxed_at_the_start(kind):
     body = cube(kind)
     body.add(kl.Spring((0.1, 0.1, 0.1), (1, 2, 3), 1e4))
-    assert np.abs(body.external_load()).max() < 1e-9
+    assert np.abs(body.external_force()).max() < 1e-9
     end(body, 1e-3, 5)
     np.testing.assert_allclose(body.mass_center(), 0, atol=1e-12)
 

@@ -18,7 +18,7 @@ LOADS = {
     "spring from its anchor": lambda: kl.Spring(INNER, INNER, 5e3, length=0.0),
     "curved spring": lambda: kl.Spring(INNER, (2.0, 1.0, 3.0), lambda s, rate: 1e3 * s + 4e3 * s**3 + rate),
     "damped spring": lambda: kl.Spring(INNER, (2.0, 1.0, 3.0), 5e3, damping=7.0),
-    "convected force": lambda: kl.Force(INNER, (1.0, -2.0, 3.0), "convected"),
+    "follower force": lambda: kl.Force(INNER, (1.0, -2.0, 3.0), "follower"),
 }
 
 

@@ -1,6 +1,5 @@
 """Bodies on the command line: summary, files, restart, interruption, and what goes wrong."""
 
-import json
 import os
 import re
 import subprocess
@@ -12,14 +11,12 @@ from children import interrupted
 
 import kratos_lite as kl
 
-SCENE = {
-    "mesh": {"box": {"size": [0.4, 0.6, 1.0], "cells": [1, 2, 2]}},
-    "material": {"E": 1e6, "nu": 0.3, "density": 1000.0},
-    "body": "pseudo-rigid",
-    "start": {"velocity": [1, 2, 3], "angular_velocity": [0.05, 10, 0.05]},
-    "loads": [{"type": "gravity", "acceleration": [0, 0, -9.81]}],
-    "time": {"step": 0.005, "steps": 20, "every": 5},
-}
+SCENE = """import kratos_lite as kl
+body = kl.{kind}(kl.box((0.4, 0.6, 1.0), (1, 2, 2)), kl.Isotropic3D(1e6, 0.3, 1000.0){options})
+body.set_velocity((1, 2, 3), (0.05, 10, 0.05))
+body.add(kl.Gravity((0, 0, -9.81)))
+dt, steps, every = 0.005, 20, 5
+"""
 
 
 @pytest.fixture
@@ -29,9 +26,9 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-def write(name="box.json", **changes):
+def write(more="", name="box.py", kind="PseudoRigidBody", options=""):
     with open(name, "w") as file:
-        json.dump({**SCENE, **changes}, file)
+        file.write(SCENE.format(kind=kind, options=options) + more)
 
 
 def names(folder):
@@ -39,7 +36,7 @@ def names(folder):
 
 
 def test_a_summary_with_the_numbers(run, folder):
-    done = run("solve", "box.json")
+    done = run("solve", "box.py")
     assert (done.code, done.err) == (0, "")
     rows = done.rows
     assert rows["body"] == "pseudo-rigid, 12 velocities, energy_momentum"
@@ -55,12 +52,12 @@ def test_a_summary_with_the_numbers(run, folder):
     assert rows["external work"].startswith(f"{-240 * 9.81 * fallen:.7g} J, of all loads")
     assert "dissipated" not in rows
     assert re.match(r"\S+ s, \S+ s in all", rows["time per step"])
-    assert names(folder) == ["box.json"]
+    assert names(folder) == ["box.py"]
 
 
 def test_with_damping_the_loss_is_no_drift(run, folder):
-    write(body={"kind": "pseudo-rigid", "damping": 1e-3}, loads=[])
-    scene, rows = run("info", "box.json").rows, run("solve", "box.json").rows
+    write("body.loads.clear()\n", options=", damping=1e-3")
+    scene, rows = run("info", "box.py").rows, run("solve", "box.py").rows
     lost = float(scene["energy"].split()[0]) - float(rows["sum of energies"].split()[0])
     assert lost > 1
     assert float(rows["dissipated"].split()[0]) == pytest.approx(lost, rel=1e-3)
@@ -68,12 +65,12 @@ def test_with_damping_the_loss_is_no_drift(run, folder):
 
 
 def test_missing_folders_are_made_by_a_run_alone(run, folder):
-    words = ("box.json", "-o", "a/b/o.csv", "--state", "c/end.npz", "-q")
-    write(output={"csv": "x/o.csv"})
-    assert run("check", "box.json").code == 0
-    assert names(folder) == ["box.json"]
+    words = ("box.py", "-o", "a/b/o.csv", "--state", "c/end.npz", "-q")
+    write("output = {'csv': 'x/o.csv'}\n")
+    assert run("check", "box.py").code == 0
+    assert names(folder) == ["box.py"]
     assert run("solve", *words).code == 0
-    assert names(folder) == ["a", "box.json", "c"]
+    assert names(folder) == ["a", "box.py", "c"]
     assert (folder / "a" / "b" / "o.csv").is_file()
 
 
@@ -81,11 +78,11 @@ def test_all_outputs_of_a_scene_lie_beside_it(run, folder):
     pytest.importorskip("matplotlib")
     keys = {"pvd": "o.pvd", "csv": "o.csv", "npz": "o.npz", "picture": "o.png", "state": "end.npz"}
     (folder / "inner").mkdir()
-    write("inner/box.json", output=keys)
-    done = run("solve", "inner/box.json")
+    write(f"output = {keys}\n", "inner/box.py")
+    done = run("solve", "inner/box.py")
     assert done.code == 0
     frames = [f"o_0000{i}.vtu" for i in range(5)]  # the start, and four states
-    assert names(folder / "inner") == sorted(["box.json", *keys.values(), *frames])
+    assert names(folder / "inner") == sorted(["box.py", *keys.values(), *frames])
     assert done.out.count("written") == 5
     assert (folder / "inner" / "o.png").read_bytes()[:4] == b"\x89PNG"
     assert np.load(folder / "inner" / "o.npz")["step"].tolist() == [0, 5, 10, 15, 20]
@@ -93,9 +90,9 @@ def test_all_outputs_of_a_scene_lie_beside_it(run, folder):
 
 
 def test_options_win_over_the_scene(run, folder):
-    write(output={"csv": "a.csv"})
-    assert run("solve", "box.json", "-o", "b.csv", "--steps", "3", "-q").out == ""
-    assert names(folder) == ["b.csv", "box.json"]
+    write("output = {'csv': 'a.csv'}\n")
+    assert run("solve", "box.py", "-o", "b.csv", "--steps", "3", "-q").out == ""
+    assert names(folder) == ["b.csv", "box.py"]
     assert [line.split(",")[0] for line in (folder / "b.csv").read_text().splitlines()[1:]] == [
         "0.0",
         "0.015",
@@ -103,34 +100,32 @@ def test_options_win_over_the_scene(run, folder):
 
 
 def test_a_restart_comes_to_the_same_end(run, folder):
-    run("solve", "box.json", "-q", "--state", "whole.npz")
-    run("solve", "box.json", "-q", "--steps", "10", "--state", "half.npz")
-    done = run("solve", "box.json", "--restart", "half.npz", "--steps", "10", "--state", "end.npz")
+    run("solve", "box.py", "-q", "--state", "whole.npz")
+    run("solve", "box.py", "-q", "--steps", "10", "--state", "half.npz")
+    done = run("solve", "box.py", "--restart", "half.npz", "--steps", "10", "--state", "end.npz")
     assert done.rows["time"] == "0.05 … 0.1 s, 10 steps"
     whole, end = kl.read_state("whole.npz"), kl.read_state("end.npz")
     assert (whole.time, whole.step) == (end.time, end.step)
     np.testing.assert_array_equal(whole.q, end.q)
-    write(restart="half.npz")
-    assert run("solve", "box.json", "--steps", "10", "--state", "again.npz", "-q").code == 0
+    write("case = kl.Case(body, kl.TimeIntegration(dt, 10, restart='half.npz'))\n")
+    assert run("solve", "box.py", "--state", "again.npz", "-q").code == 0
     np.testing.assert_array_equal(kl.read_state("again.npz").u, end.u)
 
 
 def test_a_restart_of_another_kind_is_refused(run, folder):
-    run("solve", "box.json", "-q", "--state", "half.npz")
-    write(body="rigid")
-    assert run("solve", "box.json", "--restart", "half.npz").refuses("state of a pseudo-rigid body")
-    assert run("solve", "box.json", "--restart", "none.npz").refuses("none.npz: there is no such file")
+    run("solve", "box.py", "-q", "--state", "half.npz")
+    write(kind="RigidBody")
+    assert run("solve", "box.py", "--restart", "half.npz").refuses("state of a pseudo-rigid body")
+    assert run("solve", "box.py", "--restart", "none.npz").refuses("none.npz: there is no such file")
 
 
 def test_an_explicit_step_that_is_too_long_is_refused_before_any_output(run, folder):
-    stiff = {"kind": "pseudo-rigid", "integrator": "DEF_EXP"}
-    write(body=stiff, time={"step": 0.1, "steps": 5})
+    stiff, time = ", integrator='DEF_EXP'", "dt, steps = 0.1, 5\n"
+    write(time, options=stiff)
     for command in ("solve", "check"):
-        assert run(command, "box.json").refuses(
-            "explicit integrator is not", "the critical step is 0.00584 s"
-        )
-    write(body=stiff, time={"step": 0.1, "steps": 5, "substeps": "auto"})
-    assert run("solve", "box.json", "-q").code == 0
+        assert run(command, "box.py").refuses("explicit integrator is not", "the critical step is 0.00584 s")
+    write(f"{time}substeps = 'auto'\n", options=stiff)
+    assert run("solve", "box.py", "-q").code == 0
 
 
 def test_what_exists_is_kept_when_a_run_fails(run, folder):
@@ -150,8 +145,8 @@ def test_what_exists_is_kept_when_a_run_fails(run, folder):
 
 @pytest.mark.skipif(os.name != "posix", reason="Ctrl-C is sent as a signal")
 def test_ctrl_c_keeps_what_is_there(folder):
-    write(body="finite-element", time={"step": 0.001, "steps": 1_000_000})
-    words = [sys.executable, "-m", "kratos_lite", "solve", "box.json", "-o", "o.pvd", "--state", "end.npz"]
+    write("dt, steps, every = 0.001, 1_000_000, 1\n", kind="FiniteElementBody")
+    words = [sys.executable, "-m", "kratos_lite", "solve", "box.py", "-o", "o.pvd", "--state", "end.npz"]
     process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     out, err = interrupted(process, folder / "o_00003.vtu")
     assert (process.returncode, out) == (130, "")
@@ -167,24 +162,24 @@ def test_ctrl_c_keeps_what_is_there(folder):
 
 
 def test_progress_is_shown_where_asked_for(run, folder):
-    write(time={"step": 1e-4, "steps": 3000})
-    done = run("solve", "box.json", "-q", "--progress")
+    write("dt, steps, every = 1e-4, 3000, 1\n")
+    done = run("solve", "box.py", "-q", "--progress")
     assert done.out == ""
     assert re.search(r"\rintegrate +\d+%", done.err)
 
 
 def test_check_and_info(run, folder):
-    done = run("check", "box.json")
+    done = run("check", "box.py")
     assert (done.code, done.err) == (0, "")
-    assert done.out == "box.json: pseudo-rigid body, 20 steps of 0.005 s, no errors\n"
-    done = run("info", "box.json")
-    assert done.rows["file"] == "box.json"
+    assert done.out == "box.py: pseudo-rigid body, 20 steps of 0.005 s, no errors\n"
+    done = run("info", "box.py")
+    assert done.rows["file"] == "box.py"
     assert done.rows["inertia xx, yy, zz"] == "27.2, 23.2, 10.4 kg m²"
     assert done.rows["critical step"].startswith("0.00584 s")
     assert done.rows["time"] == "from 0 s, 20 steps of 0.005 s"
-    write(bdoy="rigid", loads=[{"type": "gravty"}])
+    write("body.add(kl.Gravty())\n")
     for command in ("check", "info", "solve"):
-        assert run(command, "box.json").refuses("unknown key 'bdoy'. Did you mean body", "'gravty'")
+        assert run(command, "box.py").refuses("box.py:6: AttributeError: ", "'Gravty'")
 
 
 def test_a_script_is_a_scene(run, folder):
@@ -232,38 +227,36 @@ def test_many_bodies_of_a_script(run, folder):
 
 
 def test_bad_targets_are_refused_before_the_run(run, folder):
-    write(time={"step": 1e-9, "steps": 10**9})
-    assert run("solve", "box.json", "-o", "box.json/o.pvd").refuses("the folder box.json does not exist")
-    assert run("solve", "box.json", "-o", "none/o.txt").refuses("none/o.txt: states in time are written")
-    assert run("solve", "box.json", "-o", "o.vtu").refuses("o.vtu: states in time are written")
-    assert run("solve", "box.json", "--state", "o.csv").refuses("o.csv: the ending must be .npz")
-    assert run("solve", "box.json", "-o", "o.npz", "--state", "o.npz").refuses("another output")
-    assert run("solve", "box.json", "--steps", "0").refuses("--steps must be a whole number ≥ 1; got 0")
-    assert names(folder) == ["box.json"]
+    write("dt, steps = 1e-9, 10**9\n")
+    assert run("solve", "box.py", "-o", "box.py/o.pvd").refuses("the folder box.py does not exist")
+    assert run("solve", "box.py", "-o", "none/o.txt").refuses("none/o.txt: states in time are written")
+    assert run("solve", "box.py", "-o", "o.vtu").refuses("o.vtu: states in time are written")
+    assert run("solve", "box.py", "--state", "o.csv").refuses("o.csv: the ending must be .npz")
+    assert run("solve", "box.py", "-o", "o.npz", "--state", "o.npz").refuses("another output")
+    assert run("solve", "box.py", "--steps", "0").refuses("--steps must be a whole number ≥ 1; got 0")
+    assert names(folder) == ["box.py"]
 
 
 def test_what_bodies_do_not_take_is_refused(run, folder):
-    assert run("convert", "box.json", "a.mdpa").refuses("describes a body; only meshes and models")
-    assert run("solve", "none.json").refuses("none.json")
+    assert run("convert", "box.py", "a.mdpa").refuses("describes a body; only meshes and models")
+    assert run("solve", "none.py").refuses("none.py")
     for words in (["--fix", "z-:xyz"], ["--modes", "3"], ["--rotation", "z:1"], ["--integrator", "hht"]):
-        assert run("solve", "box.json", *words).refuses(
-            f"{words[0]} is for models; box.json describes a body"
-        )
-    assert run("solve", "box.json", "--json", "a.json").refuses("a body has no summary in .json")
-    with pytest.raises(kl.InputError, match=r"box\.json: describes a body; read it with kl\.read_case"):
-        kl.read("box.json")
+        assert run("solve", "box.py", *words).refuses(f"{words[0]} is for models; box.py describes a body")
+    assert run("solve", "box.py", "--json", "a.json").refuses("a body has no summary in .json")
+    with pytest.raises(kl.InputError, match=r"box\.py: describes a body; read it with kl\.read_case"):
+        kl.read("box.py")
 
 
 def test_time_of_a_body_is_that_of_the_option(run, folder):
-    done = run("solve", "box.json", "--time", "0.01:4:2", "-o", "a.npz")
+    done = run("solve", "box.py", "--time", "0.01:4:2", "-o", "a.npz")
     assert done.rows["time"] == "0 … 0.04 s, 4 steps"
     assert np.load("a.npz")["step"].tolist() == [0, 2, 4]
 
 
 def test_debug_shows_the_traceback(run, folder):
-    write(body="rigit")
-    with pytest.raises(kl.InputError, match="rigit"):
-        run("solve", "box.json", "--debug")
+    write("kl.Rigit()\n")
+    with pytest.raises(kl.InputError, match="Rigit"):
+        run("solve", "box.py", "--debug")
 
 
 def test_help_names_every_output(run):
@@ -277,5 +270,5 @@ def test_help_names_every_output(run):
 @pytest.mark.parametrize("command", ["info", "check"])
 def test_help_of_other_commands_names_scenes(run, command):
     text = " ".join(run(command, "--help").out.split())
-    assert "a .json file with a body, or a .py script with body, dt and steps" in text
-    assert re.search(rf"kratos-lite {command} examples/bodies/\w+\.json", text)
+    assert "a .py script with a case, or with body, dt and steps" in text
+    assert re.search(rf"kratos-lite {command} examples/bodies/\w+\.py", text)

@@ -2,20 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
 
-import kratos_lite as kl
-
-BODY = {
-    "mesh": {"box": {"size": [1, 1, 1]}},
-    "material": {"E": 1e6, "nu": 0.3, "density": 1000},
-    "body": "rigid",
-    "time": {"step": 0.01, "steps": 1},
-}
-GUST = Path(__file__).parents[2] / "examples" / "tower" / "gust.json"
+GUST = Path(__file__).parents[2] / "examples" / "tower" / "gust.py"
 
 
 @pytest.mark.parametrize(
@@ -52,38 +43,7 @@ def test_an_option_or_command_of_another_name_is_answered_with_ours(run, words, 
     assert hint in done.err
 
 
-@pytest.mark.parametrize(
-    ("change", "hint"),
-    [
-        ({"body": {"kind": "pseudo-rigid", "scheme": "x"}}, "It is called integrator here"),
-        ({"body": {"kind": "finite-element", "form": "TL"}}, "It is called formulation here"),
-        ({"march": BODY["time"]}, "It is called time here"),
-        (
-            {"loads": [{"type": "gravity", "acceleration": [0, 0, -1], "factor": 2}]},
-            "It is called amplitude here",
-        ),
-        (
-            {"loads": [{"type": "gravity", "acceleration": [0, 0, -1], "amplitude": {"factors": [1]}}]},
-            "It is called values here",
-        ),
-        ({"constraints": [{"type": "set_velocity"}]}, "It is called prescribed_velocity here"),
-    ],
-)
-def test_a_key_of_another_name_is_answered_with_ours(run, tmp_path, change, hint):
-    (tmp_path / "a.json").write_text(json.dumps(BODY | change))
-    assert run("check", tmp_path / "a.json").refuses("a.json:1:", hint)
-
-
-def test_the_ends_of_a_translation_are_called_boundaries(run, tmp_path):
-    kl.write(tmp_path / "box.mdpa", kl.box())
-    ale = {"translation": {"direction": "x", "rate": 1.0, "ends": "periodic"}}
-    (tmp_path / "a.json").write_text(
-        json.dumps({"model": "box.mdpa", "ale": ale, "material": BODY["material"]})
-    )
-    assert run("check", tmp_path / "a.json").refuses("a.json:1:", "It is called boundaries here")
-
-
 def test_converting_what_changes_in_time_speaks_of_no_format_that_nobody_named(run, tmp_path):
     done = run("convert", GUST, tmp_path / "a.vtu")
-    assert done.refuses("gust.json: a load that changes in time cannot be written")
+    assert done.refuses("gust.py: a load that changes in time cannot be written")
     assert ".mdpa" not in done.err

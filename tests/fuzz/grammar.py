@@ -6,7 +6,7 @@ import json
 from random import Random
 from typing import Any
 
-from tests.fuzz.seeds import BODY, KRATOS, MATERIALS, RUN, SOLVED, TIME, Seed
+from tests.fuzz.seeds import KRATOS, MATERIALS, SOLVED, Seed
 
 NODES = {
     4: "Tetrahedron4",
@@ -115,81 +115,6 @@ def _value(rng: Random) -> Any:
     return float(number(rng).replace("D", "e").replace("nan", "1e300").replace("inf", "-1e300"))
 
 
-def _vector(rng: Random) -> list[Any]:
-    return [_value(rng) for _ in range(rng.choice((3, 3, 3, 3, 3, 2, 4)))]
-
-
-def _time(rng: Random, keys: dict[str, Any]) -> dict[str, Any]:
-    time = {
-        **keys,
-        "step": rng.choice((1e-3, 1e-6, 0.1, 10.0, 1e-300, 1e30)),
-        "steps": rng.choice((1, 3, 20, 10**7)),
-    }
-    return time
-
-
-def run_file(rng: Random) -> dict[str, Any]:
-    """Return a run file of kratos_lite."""
-    found: dict[str, Any] = {key: value for key, value in RUN.items() if rng.random() < 0.7 or key == "model"}
-    found["fix"] = {side: rng.choice(("xyz", "x", {"z": _value(rng)})) for side in ("z-", "x-", "Top")}
-    found["gravity"] = _vector(rng)
-    if rng.random() < 0.3:
-        found["material"] = {"law": "Orthotropic3D", **{k: abs(_value(rng)) for k in ("Ex", "Ey", "Ez")}}
-    if rng.random() < 0.4:
-        names = (
-            "newmark",
-            "bossak",
-            "central_difference",
-            {"hht": _value(rng)},
-            {"newmark": _vector(rng)[:2]},
-        )
-        found["time"] = _time(rng, TIME) | {"integrator": rng.choice(names), "lumped": rng.random() < 0.5}
-    if rng.random() < 0.3:
-        axis = rng.choice(("x", "z", [0, 0, 0], [1, 1, 1]))
-        rotation = {"rotation": {"axis": axis, "rate": _value(rng)}}
-        translation = {"translation": {"direction": "x", "rate": _value(rng), "boundaries": "natural"}}
-        found["ale"] = rng.choice((rotation, translation))
-    return found
-
-
-def body(rng: Random) -> dict[str, Any]:
-    """Return a file with a body."""
-    kinds = (
-        "rigid",
-        "pseudo-rigid",
-        {"kind": "finite-element", "formulation": rng.choice(("BC", "TL", "modal"))},
-    )
-    found: dict[str, Any] = {
-        **BODY,
-        "body": rng.choice(kinds),
-        "time": _time(rng, {"every": rng.choice((1, 7))}),
-    }
-    found["mesh"] = {
-        "box": {"size": [abs(x) for x in _vector(rng)], "cells": rng.choice(([1, 1, 1], [2, 1, 3]))}
-    }
-    found["material"] = {
-        "E": abs(_value(rng)) * 1e6,
-        "nu": rng.choice((0.3, 0, 0.49, _value(rng))),
-        "density": 1e3,
-    }
-    found["start"] = {key: _vector(rng) for key in ("rotation", "velocity", "angular_velocity")}
-    loads = [
-        {"type": "gravity", "acceleration": _vector(rng)},
-        {"type": "spring", "point": _vector(rng), "anchor": _vector(rng), "stiffness": _value(rng)},
-        {"type": "follower_pressure", "on": "x+", "pressure": _value(rng)},
-        {"type": "torque", "torque": _vector(rng), "frame": rng.choice(("body", "space", "x"))},
-    ]
-    constraints = [
-        {"type": "fix_point", "points": _vector(rng)},
-        {"type": "fix_direction", "points": "x-", "direction": _vector(rng)},
-        {"type": "rigid_link", "point": _vector(rng), "anchor": _vector(rng)},
-        {"type": "prescribed_velocity", "points": [0, 0, 0], "direction": [1, 0, 0], "velocity": _value(rng)},
-    ]
-    found["loads"] = rng.sample(loads, rng.randrange(4))
-    found["constraints"] = rng.sample(constraints, rng.randrange(3))
-    return found
-
-
 def kratos(rng: Random) -> dict[str, Any]:
     """Return a run file of Kratos."""
     found = json.loads(json.dumps(KRATOS))
@@ -206,12 +131,17 @@ def kratos(rng: Random) -> dict[str, Any]:
     if rng.random() < 0.4:
         more = {"solver_type": "Dynamic", "scheme_type": rng.choice(("newmark", "bossak", "bdf2"))}
         found["solver_settings"] |= more | {"rayleigh_beta": _value(rng)}
+    if rng.random() < 0.3:
+        axis = rng.choice(("x", "z", [0, 0, 0], [1, 1, 1]))
+        rotation = {"rotation": {"axis": axis, "rate": _value(rng)}}
+        translation = {"translation": {"direction": "x", "rate": _value(rng), "boundaries": "natural"}}
+        found["ale"] = rng.choice((rotation, translation))
     return found
 
 
 def generated(rng: Random, mesh: bytes) -> Seed:
     """Return a random input of a random kind; `mesh` is a good .mdpa file."""
-    kind = rng.choice(("mdpa", "mdpa", "elem", "run file", "body", "kratos", "msh"))
+    kind = rng.choice(("mdpa", "mdpa", "elem", "kratos", "kratos", "msh"))
     if kind == "mdpa":
         return Seed(kind, {"mesh.mdpa": mdpa(rng)}, "mesh.mdpa")
     if kind == "elem":
@@ -224,12 +154,8 @@ def generated(rng: Random, mesh: bytes) -> Seed:
         text = ["$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes", str(len(rows)), *rows, "$EndNodes\n$Elements"]
         text += [str(len(lines)), *lines, "$EndElements\n"]
         return Seed(kind, {"a.msh": "\n".join(text).encode()}, "a.msh", SOLVED)
-    make = {"run file": run_file, "body": body, "kratos": kratos}[kind]
-    content = make(rng)
+    content = kratos(rng)
     files = {"run.json": json.dumps(content, indent=1).encode(), "mesh.mdpa": mesh}
     files["materials.json"] = json.dumps(MATERIALS).encode()
-    is_body = kind == "body"
-    in_time = (
-        is_body or "time" in content or content.get("solver_settings", {}).get("solver_type") == "Dynamic"
-    )
-    return Seed(kind, files, "run.json", (), not is_body, in_time)
+    in_time = content["solver_settings"]["solver_type"] == "Dynamic"
+    return Seed(kind, files, "run.json", in_time=in_time)

@@ -161,38 +161,19 @@ KRATOS = {
     },
 }
 MATERIALS = materials("Structure", 1000.0, 1e9, 0.3)
-RUN = {
-    "model": "mesh.mdpa",
-    "material": {"E": 210e6, "nu": 0.3, "density": 7620},
-    "fix": {"z-": "xyz", "Top": {"x": {"times": [0, 1], "values": [0, 0.001]}}},
-    "gravity": {"value": [0, 0, -9.81], "amplitude": {"times": [0, 1], "values": [0, 1]}},
-    "traction": {"z+": [1, 2, 3]},
-    "pressure": {"x+": 100.0},
-    "point_load": {"Parts": [1, 2, 3]},
-    "solver": {"type": "direct", "tolerance": 1e-9},
-}
-TIME = {"step": 0.001, "steps": 3, "every": 2, "integrator": {"hht": -0.05}, "rayleigh": [0.1, 1e-4]}
 ALE = {"rotation": {"axis": "z", "rate": 3.0, "acceleration": 0.1, "center": [0, 0, 0], "stiffening": True}}
-RAMP = {"times": [0, 1], "values": [0, 1]}
-BODY = {
-    "mesh": {"box": {"size": [1, 0.5, 0.2], "cells": [2, 1, 1], "element": "KinematicLinear3D8N"}},
-    "material": {"E": 1e6, "nu": 0.3, "density": 1000},
-    "body": "rigid",
-    "start": {"rotation": [0.1, 0, 0], "velocity": [1, 0, 0], "angular_velocity": [0, 0, 2]},
-    "loads": [
-        {"type": "gravity", "acceleration": [0, 0, -9.81]},
-        {
-            "type": "force",
-            "point": [0, 0, 0],
-            "force": [1, 0, 0],
-            "amplitude": {"times": [0, 1], "values": [0, 1]},
-        },
-        {"type": "pressure", "on": "x+", "pressure": 10},
-    ],
-    "constraints": [{"type": "fix_point", "points": [0, 0, 0]}],
-    "time": {"step": 0.001, "steps": 5, "every": 2},
+SCENE = """import kratos_lite as kl
+body = kl.{kind}(kl.box((1, 0.5, 0.2), (2, 1, 1)), kl.Isotropic3D(1e6, 0.3, 1000.0){options})
+body.set_velocity((1, 0, 0), (0, 0, 2))
+body.add(kl.Gravity((0, 0, -9.81)))
+body.constrain(kl.FixPoint((0, 0, 0)))
+dt, steps, every = 0.001, 5, 2
+"""
+BODIES = {
+    "RigidBody": "",
+    "PseudoRigidBody": "",
+    "FiniteElementBody": ", formulation='total_lagrangian', integrator='linearly_implicit'",
 }
-ELASTIC = {"kind": "finite-element", "formulation": "total_lagrangian", "integrator": "linearly_implicit"}
 
 
 @dataclass(frozen=True)
@@ -222,23 +203,20 @@ def seeds(folder: Path) -> list[Seed]:
     found = [Seed("mdpa", {"mesh.mdpa": mesh}, "mesh.mdpa"), Seed("elem", files, "set.elem")]
     dynamic = json.loads(json.dumps(KRATOS))
     dynamic["solver_settings"] |= {"solver_type": "Dynamic", "scheme_type": "bossak", "rayleigh_alpha": 0.1}
-    for name, settings, in_time in (("kratos", KRATOS, False), ("kratos", dynamic, True)):
+    for settings, in_time in ((KRATOS, False), (KRATOS | {"ale": ALE}, False), (dynamic, True)):
         inputs = {"run.json": _json(settings), "materials.json": _json(MATERIALS), "mesh.mdpa": mesh}
-        found.append(Seed(name, inputs, "run.json", (), True, in_time, ("run.json", "materials.json")))
-    for more in ({}, {"time": TIME}, {"ale": ALE}):
-        inputs = {"run.json": _json(RUN | more), "mesh.mdpa": mesh}
-        found.append(Seed("run file", inputs, "run.json", (), True, "time" in more, ("run.json",)))
-    for body in ("rigid", "pseudo-rigid", ELASTIC):
-        inputs = {"scene.json": _json(BODY | {"body": body}), "state.npz": _state(folder, body)}
-        found.append(Seed("body", inputs, "scene.json", (), False, True, ("scene.json",)))
+        found.append(Seed("kratos", inputs, "run.json", (), True, in_time, ("run.json", "materials.json")))
+    for kind, options in BODIES.items():
+        scene = SCENE.format(kind=kind, options=options).encode()
+        inputs = {"scene.py": scene, "state.npz": _state(folder, scene)}
         restart = ("--restart", "state.npz")
-        found.append(Seed("state", inputs, "scene.json", restart, False, True, ("state.npz",)))
+        found.append(Seed("state", inputs, "scene.py", restart, False, True, ("state.npz",)))
     return found + [_of_meshio(folder, *one) for one in MESHES]
 
 
-def _state(folder: Path, body: object) -> bytes:
-    path = folder / "scene.json"
-    path.write_bytes(_json(BODY | {"body": body}))
+def _state(folder: Path, scene: bytes) -> bytes:
+    path = folder / "scene.py"
+    path.write_bytes(scene)
     kl.write(folder / "state.npz", kl.State.of(kl.read_case(path).body))
     return (folder / "state.npz").read_bytes()
 

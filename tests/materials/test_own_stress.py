@@ -124,7 +124,7 @@ def test_the_equilibrium_of_a_report_is_that_of_the_stresses_of_the_result():
     result = model.solve()
     f = np.zeros_like(result.u)
     for nodes, stress in zip(model.mesh.blocks[0].nodes, result.stress(), strict=True):
-        f[nodes] += kl.KinematicLinear3D8N(model.mesh.points[nodes]).internal_load(stress)
+        f[nodes] += kl.KinematicLinear3D8N(model.mesh.points[nodes]).internal_force(stress)
     miss = np.abs(f - result.loads - result.reactions).sum()
     size = np.abs(result.loads).sum() + np.abs(result.reactions).sum()
     assert miss / size < 1e-12

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import json
 import sys
 import zipfile
 
@@ -59,33 +58,28 @@ def test_a_box_that_no_memory_holds_is_refused_at_once(element):
         kl.annulus(1.0, 2.0, 1.0, cells=(1e40, 3, 1))
 
 
-def scene(tmp_path, **more):
-    content = {
-        "mesh": {"box": {"size": [1, 1, 1]}},
-        "material": {"E": 1e6, "nu": 0.3, "density": 1000},
-        "body": "rigid",
-        "time": {"step": 0.01, "steps": 10},
-    }
-    path = tmp_path / "scene.json"
-    path.write_text(json.dumps(content | more))
+def scene(tmp_path, time, kind="Rigid", law="1e6, 0.3, 1000.0", options=""):
+    path = tmp_path / "scene.py"
+    path.write_text(
+        f"import kratos_lite as kl\nbody = kl.{kind}Body(kl.box(), kl.Isotropic3D({law}){options})\n{time}\n"
+    )
     return path
 
 
 def test_a_scene_with_an_absurd_number_of_steps_is_refused_at_its_place(tmp_path, run):
-    path = scene(tmp_path, time={"step": 1e-9, "steps": 10**15})
-    run("solve", path).refuses(
-        "scene.json:1:", "1000000000000000 steps are more than 1000000000; take longer ones"
+    assert run("solve", scene(tmp_path, "dt, steps = 1e-9, 10**15")).refuses(
+        "scene.py: ", "1000000000000000 steps are more than 1000000000; take longer ones"
     )
-    run("solve", scene(tmp_path), "--time", "1e-9:10000000000").refuses(
+    path = scene(tmp_path, "dt, steps = 0.01, 10")
+    assert run("solve", path, "--time", "1e-9:10000000000").refuses(
         "10000000000 steps are more than 1000000000"
     )
 
 
 def test_a_step_that_needs_absurdly_many_substeps_is_refused(tmp_path, run):
-    stiff = {"E": 1e30, "nu": 0.3, "density": 1e-3}
-    body = {"kind": "finite-element", "integrator": "explicit"}
-    path = scene(tmp_path, material=stiff, body=body, time={"step": 1.0, "steps": 1, "substeps": "auto"})
-    run("solve", path).refuses("more than 1000000 substeps", "take shorter steps")
+    time = "dt, steps, substeps = 1.0, 1, 'auto'"
+    path = scene(tmp_path, time, "FiniteElement", "1e30, 0.3, 1e-3", ", integrator='explicit'")
+    assert run("solve", path).refuses("more than 1000000 substeps", "take shorter steps")
 
 
 def zipped(path, **entries):

@@ -39,8 +39,8 @@ def test_mass_in_the_nodes_is_not_that_of_a_box():
 
 def test_a_load_of_twice_the_stiffness_is_found():
     class Broken(kl.FiniteElementBody):
-        def internal_load(self, q=None):
-            return 2 * super().internal_load(q)
+        def internal_force(self, q=None):
+            return 2 * super().internal_force(q)
 
     assert failed(Broken) == {"energy", "tangent"}
 

@@ -91,7 +91,7 @@ def test_an_element_is_checked_with_its_shape_and_forgotten(checked):
     ((name, findings),) = checked(WEDGE)
     assert name == "MyElement"
     assert not failures(findings)
-    assert len(findings) == 35
+    assert len(findings) == 34
     assert [list(registry) for registry in (ELEMENTS, SHAPES, MATERIALS)] == before
 
 
@@ -173,7 +173,7 @@ def test_a_shape_without_its_vtk_number_is_told_the_number_and_checked_all_the_s
     (finding,) = failures(findings)
     assert finding.check == "definition"
     assert "write vtk = 13 in the shape" in finding.detail
-    assert len(findings) == 35
+    assert len(findings) == 34
 
 
 @pytest.mark.parametrize(

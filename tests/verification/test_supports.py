@@ -238,7 +238,7 @@ def test_cells_of_several_kinds_in_one_mesh_pass_the_patch_test(order):
     for group in model.element_groups():
         stress = np.array([sigma[0, 0], sigma[1, 1], sigma[2, 2], sigma[0, 1], sigma[1, 2], sigma[0, 2]])
         element = group.at(points)
-        part = element.internal_load(np.tile(stress, (len(group), len(group.rule), 1)))
+        part = element.internal_force(np.tile(stress, (len(group), len(group.rule), 1)))
         np.add.at(forces, group.nodes, part)
     outside = np.zeros_like(points)
     for face in mesh.boundary:  # the same forces from the outside: traction σ n on every boundary face

@@ -152,7 +152,7 @@ def body_integrator(body: Body) -> BodyIntegrator[Any]:
     """Return the integrator that a body names.
 
     >>> import kratos_lite as kl
-    >>> body_integrator(kl.Obstacle(kl.box())).name
+    >>> body_integrator(kl.FixedBody(kl.box())).name
     'uniform'
     """
     for kind in type(body).__mro__:

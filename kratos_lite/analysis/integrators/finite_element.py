@@ -55,8 +55,8 @@ class _Kick(_FiniteElement):
         """Take a step; see `BodyIntegrator.step`."""
         qh = body.q + h / 2 * body.u
         solve = self.solver(body, qh, h)
-        load = body.external_load(qh, body.time + h / 2, v)
-        force = load - body.internal_load(qh)
+        load = body.external_force(qh, body.time + h / 2, v)
+        force = load - body.internal_force(qh)
         if body.damping:
             force -= body.damping * body.damping_load(qh, body.u)
 
@@ -126,7 +126,7 @@ def _balanced(
     v, last = u.copy(), np.inf
     for _ in range(NEWTON_MAX):
         dq = h / 2 * (u + v)
-        load = body.external_load(q + dq / 2, body.time + h / 2, loading)
+        load = body.external_force(q + dq / 2, body.time + h / 2, loading)
         force = load + extra - body.load_over(q, dq, ratio)
         step = solve(h * force - body.times_mass(v - u))
         size, scale = float(np.abs(step).max()), float(np.abs(v).max())

@@ -51,7 +51,7 @@ class _PseudoRigid(BodyIntegrator[PseudoRigidBody]):
     def step(self, body: PseudoRigidBody, h: float, v: Array) -> Array:
         """Take a step; see `BodyIntegrator.step`."""
         qh = body.q + h / 2 * body.u
-        load = body.external_load(qh, body.time + h / 2, v)
+        load = body.external_force(qh, body.time + h / 2, v)
 
         def advance(extra: Array) -> Step:
             q, u = body.q.copy(), body.u.copy()

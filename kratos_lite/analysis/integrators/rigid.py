@@ -21,7 +21,7 @@ from kratos_lite.analysis.integrators.base import BodyIntegrator
 from kratos_lite.analysis.integrators.kernels import StepKernel, compiled
 from kratos_lite.bodies.constraint_projection import Step, constrained_step
 from kratos_lite.bodies.linear_algebra import apply, first, length, solve, transposed
-from kratos_lite.bodies.rigid import Obstacle, RigidBody
+from kratos_lite.bodies.rigid import FixedBody, RigidBody
 from kratos_lite.bodies.rotations import exp, hat, right_jacobian, rotation_of, set_rotation
 from kratos_lite.typing import Array, Mask
 
@@ -46,7 +46,7 @@ class _Rigid(BodyIntegrator[RigidBody]):
     def step(self, body: RigidBody, h: float, v: Array) -> Array:
         """Take a step; see `BodyIntegrator.step`."""
         qh = half_step(body.q, body.u, h)
-        load = body.external_load(qh, body.time + h / 2, v)
+        load = body.external_force(qh, body.time + h / 2, v)
 
         def advance(extra: Array) -> Step:
             q, u = body.q.copy(), body.u.copy()
@@ -74,19 +74,19 @@ class RigidImplicit(_Rigid):
     name = "implicit"
 
 
-class Uniform(BodyIntegrator[Obstacle]):
-    """Motion with the velocity as it is, of obstacles."""
+class Uniform(BodyIntegrator[FixedBody]):
+    """Motion with the velocity as it is, of fixed bodies."""
 
     name = "uniform"
-    bodies = Obstacle
+    bodies = FixedBody
 
-    def free_steps(self, body: Obstacle, h: float, count: int) -> bool:
+    def free_steps(self, body: FixedBody, h: float, count: int) -> bool:
         """Take steps."""
         for _ in range(count):
             self.step(body, h, body.u)
         return True
 
-    def step(self, body: Obstacle, h: float, v: Array) -> Array:
+    def step(self, body: FixedBody, h: float, v: Array) -> Array:
         """Take a step."""
         body.q[...] = half_step(body.q, body.u, 2 * h)
         return np.zeros_like(body.u)
@@ -144,7 +144,7 @@ def steps(
     mass: float | Array,
     acceleration: Array,
     spatial: Array,
-    convected: Array,
+    follower: Array,
     h: float,
     count: int,
     method: str = "momentum_conserving",
@@ -157,7 +157,7 @@ def steps(
     ----------
     acceleration : (..., 3) m/s² of gravity.
     spatial : (..., 6) spatial torque and force.
-    convected : (..., 6) referential torque, and a force that turns with the body.
+    follower : (..., 6) referential torque, and a force that turns with the body.
     work : (...) J, which grows by the work of the loads.
 
     Raises
@@ -165,7 +165,7 @@ def steps(
     SolveError
         As `finish_step`.
     """
-    arrays = (q, u, inertia, inverse, np.asarray(mass), acceleration, spatial, convected)
+    arrays = (q, u, inertia, inverse, np.asarray(mass), acceleration, spatial, follower)
     KERNEL.steps(_step, arrays, h, count, method, tolerance, work)
 
 
@@ -177,15 +177,15 @@ def _step(
     mass: Array,
     acceleration: Array,
     spatial: Array,
-    convected: Array,
+    follower: Array,
     h: float,
     *numbers: Any,
 ) -> tuple[Array, int]:
     """Take a step under constant loads; return the load, and the first body that failed or -1."""
     qh, load = half_step(q, u, h), np.empty(u.shape)
     R = rotation_of(qh)
-    load[..., :3] = transposed(R, spatial[..., :3]) + convected[..., :3]
-    load[..., 3:] = mass[..., None] * acceleration + spatial[..., 3:] + apply(R, convected[..., 3:])
+    load[..., :3] = transposed(R, spatial[..., :3]) + follower[..., :3]
+    load[..., 3:] = mass[..., None] * acceleration + spatial[..., 3:] + apply(R, follower[..., 3:])
     return load, _finish(q, u, qh, load, inertia, inverse, mass, h, *numbers)
 
 

@@ -37,7 +37,7 @@ class Constraint(ABC):
     Attributes
     ----------
     points : (m, 3) m, in the undeformed body.
-    positional : whether it is about positions, so that it also holds a body at rest.
+    positional : whether it is about positions, so that it also constrains a body at rest.
     turning : whether its directions change as the body moves.
     reactions : (m, 3) N, mean force on the points over the last step.
 
@@ -67,72 +67,24 @@ class Constraint(ABC):
 
     @abstractmethod
     def directions(self, x: Array) -> Array:
-        """Return the directions along which points are held.
-
-        Parameters
-        ----------
-        x : (m, 3) m, where the points are.
-
-        Returns
-        -------
-        (m, r, 3) float.
-        """
+        """Return the directions (m, r, 3) along which points at x (m, 3) are constrained."""
 
     @abstractmethod
     def gap(self, x: Array, v: Array, time: float, h: float) -> Array:
-        """Return by how much the points miss the constraint.
-
-        Lengths are divided by h/2, the time in which the velocity at the end of a step closes them.
-
-        Parameters
-        ----------
-        x, v : (m, 3), positions in m and velocities in m/s.
-        time, h : time and length of the step in s.
-
-        Returns
-        -------
-        (m, r) float, m/s.
-        """
+        """Return by how much points x (m, 3) miss the constraint, a length over h/2, (m, r) in m/s."""
+        # In h/2 the velocity at the end of a step closes the gap.
 
     def starting_velocities(self, v: Array, time: float, h: float) -> Array:
-        """Return the velocities along the directions with which the points start.
-
-        Parameters
-        ----------
-        v : (m, r) m/s, those that they have.
-        time, h : time and length of the steps to come in s.
-
-        Returns
-        -------
-        (m, r) float, m/s.
-        """
+        """Return the velocities (m, r) in m/s along the directions with which the points start, v now."""
         return np.zeros_like(v)
 
     def begin(self, body: FreeBody, h: float) -> None:  # noqa: B027 - most have nothing to prepare
-        """Prepare a step.
-
-        Parameters
-        ----------
-        body : in its state before the step.
-        h : length of the step in s.
-        """
+        """Prepare a step of h s of a body in its state before it."""
 
     # ---- what is the same for all ----------------------------------------------------------------
 
     def bind(self, body: FreeBody) -> None:
-        """Take hold of a body where it is now.
-
-        Parameters
-        ----------
-        body : a single one.
-
-        Raises
-        ------
-        MeshError
-            A point lies outside the body.
-        ModelError
-            The body is a batch of bodies, or the constraint is already bound to another body.
-        """
+        """Take hold of a single body where it is now; ModelError for a batch, or if it holds another body."""
         if body.q.ndim > 1:
             raise ModelError("a constraint holds a single body; integrate bodies with constraints one by one")
         if self._body is not None and self._body is not body:
@@ -150,17 +102,7 @@ class Constraint(ABC):
         return len(self.points)
 
     def jacobian_entries(self, body: FreeBody, q: Array) -> Entries:
-        """Return what is not 0 of H: points move along their directions with H u.
-
-        Parameters
-        ----------
-        body : the one that is held.
-        q : its configuration.
-
-        Returns
-        -------
-        rows (k,), dofs (k,) and values (k,) of H (m r, dofs).
-        """
+        """Return rows, dofs and values (k,) of H (m r, dofs): points move along their directions with H u."""
         directions = self.directions(body.position(self.points, q))
         row, dof, value = [], [], []
         for i, X in enumerate(self.points):
@@ -173,17 +115,7 @@ class Constraint(ABC):
         return np.concatenate(row), np.concatenate(dof), np.concatenate(value)
 
     def jacobian(self, body: FreeBody, q: Array) -> Array:
-        """Return H as a full matrix; it is kept where it is always the same.
-
-        Parameters
-        ----------
-        body : the one that is held.
-        q : its configuration.
-
-        Returns
-        -------
-        (m r, dofs) float.
-        """
+        """Return H (m r, dofs) as a full matrix; it is kept where it is always the same."""
         if self._jacobian is not None:
             return self._jacobian
         row, dof, value = self.jacobian_entries(body, q)
@@ -194,32 +126,11 @@ class Constraint(ABC):
         return H
 
     def turning_stiffness(self, x: Array, multipliers: Array) -> Array:
-        """Return the derivative of the reactions as the directions change with the places.
-
-        Parameters
-        ----------
-        x : (m, 3) m, where the points are.
-        multipliers : (m, r) N, along the directions.
-
-        Returns
-        -------
-        (m, 3, 3) float, N/m.
-        """
+        """Return the derivative (m, 3, 3) in N/m of the reactions by places, which turn directions."""
         return np.zeros((len(x), 3, 3))
 
     def tangent_entries(self, body: FreeBody, q: Array, multipliers: Array) -> list[Entries]:
-        """Return the derivative of the generalized reactions with respect to q.
-
-        Parameters
-        ----------
-        body : the one that is held.
-        q : its configuration.
-        multipliers : (m r,) N, along the directions.
-
-        Returns
-        -------
-        list of rows (k,), columns (k,) and values (k,).
-        """
+        """Return rows, columns and values (k,) of the derivative of the reactions by q; [] if none."""
         if not self.turning:
             return []
         x = body.position(self.points, q)
@@ -231,29 +142,11 @@ class Constraint(ABC):
         return entries
 
     def gaps(self, body: FreeBody, q: Array, u: Array, time: float, h: float) -> Array:
-        """Return the gaps of a body; see `gap`.
-
-        Parameters
-        ----------
-        body : the one that is held.
-        q, u : its configuration and velocity.
-        time, h : time and length of the step in s.
-
-        Returns
-        -------
-        (m r,) float, m/s.
-        """
+        """Return the gaps (m r,) in m/s of a body; see `gap`."""
         x, v = body.position(self.points, q), body.velocity(self.points, q, u)
         return self.gap(x, v, time, h).ravel()
 
     def set_reactions(self, body: FreeBody, q: Array, multipliers: Array) -> None:
-        """Note the reactions.
-
-        Parameters
-        ----------
-        body : the one that is held.
-        q : its configuration.
-        multipliers : (m r,) N, along the directions.
-        """
+        """Take note of the reactions of multipliers (m r,) in N along the directions."""
         directions = self.directions(body.position(self.points, q))
         self.reactions = np.einsum("mr,mri->mi", multipliers.reshape(directions.shape[:2]), directions)

@@ -9,20 +9,18 @@ import numpy as np
 from kratos_lite.assembly import finite_strain
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.bodies.formulations import base
 from kratos_lite.bodies.formulations.base import Formulation
 from kratos_lite.bodies.linear_algebra import Solve
 from kratos_lite.bodies.rotations import polar
+from kratos_lite.solvers import plan
 from kratos_lite.solvers.mass import Mass
 from kratos_lite.typing import Array
 
 
 class Corotational(Formulation):
-    """Small strains seen from one rotation R of the body, that of its mean deformation gradient.
+    """Small strains seen from one rotation R of the body, that of its mean deformation gradient."""
 
-    f = R K0 R^T d with d = (Z + q) - R Z, Z = X less a point amid the body; K0 is constant, and so are the
-    factors of M + c K0.
-    """
+    # f = R K0 R^T d, d = (Z + q) - R Z, Z = X less a point amid the body; K0 and factors of M + c K0 stay.
 
     name = "corotational"
     aliases = ("BC",)
@@ -92,4 +90,4 @@ class Corotational(Formulation):
         return rotated
 
     def _inverse(self, c: float) -> Solve:
-        return self._factorized(self.K0, c, iterate=self.points.size > base.FACTORIZED_ONCE_MAX)
+        return self._factorized(self.K0, c, iterate=self.points.size > plan.REPEATED_LIMIT)

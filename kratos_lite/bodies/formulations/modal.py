@@ -16,12 +16,7 @@ from kratos_lite.typing import Array
 
 
 class Modal(Corotational):
-    """The co-rotational formulation with the lowest modes of the free body, the six rigid ones among them.
-
-    Parameters
-    ----------
-    modes : number of modes, at least 6; 12 if not given.
-    """
+    """The co-rotational formulation with the lowest modes of the free body, the six rigid ones among them."""
 
     name = "modal"
     aliases = ("BC-MODAL",)

@@ -22,7 +22,7 @@ Generalized: TypeAlias = Callable[[Array, Array, float], Array]
 """Gives the generalized force (..., dofs) at a configuration, a velocity and a time."""
 Tangent: TypeAlias = Callable[[Array, Array, float], Entries]
 """Gives the derivative of a generalized force with respect to q, in the velocities at rest."""
-FRAMES = ("spatial", "convected")
+FRAMES = ("spatial", "follower")
 
 
 def no_potential(q: Array) -> Array:
@@ -32,35 +32,21 @@ def no_potential(q: Array) -> Array:
 
 @dataclass(eq=False)
 class AppliedLoad:
-    """A load as it acts on one body.
-
-    Attributes
-    ----------
-    generalized : the generalized force for the amplitude 1.
-    acceleration : (3,) m/s² if the load is gravity, alike everywhere.
-    spatial, convected : generalized force (..., dofs) fixed in space, or in a rigid body, if that is all.
-    tangent : its derivative with respect to q, of single deformable bodies; None where it does not depend on
-        q, or where a function of the user does not tell.
-    potential_energy : of a conservative load for the amplitude 1, (...) in J.
-    follows_velocity : whether it may depend on the velocity.
-    amplitude : function of the time in s.
-    steady : whether the amplitude never changes.
-    ends : point of the body and anchor in space of a spring, for pictures.
-    """
+    """A load as it acts on one body, of the generalized force for the amplitude 1."""
 
     generalized: Generalized
-    acceleration: Array | None = None
-    spatial: Array | None = None
-    convected: Array | None = None
-    tangent: Tangent | None = None
-    potential_energy: Callable[[Array], Array] = no_potential
+    acceleration: Array | None = None  # (3,) m/s² of gravity
+    spatial: Array | None = None  # (..., dofs), if it is fixed in space
+    follower: Array | None = None  # (..., dofs), if it is fixed in a rigid body
+    tangent: Tangent | None = None  # derivative by q of single deformable bodies
+    potential_energy: Callable[[Array], Array] = no_potential  # (...) J
     follows_velocity: bool = False
-    amplitude: Callable[[float], float] = lambda time: 1.0
-    steady: bool = True
-    ends: tuple[Array, Array] | None = None
+    amplitude: Callable[[float], float] = lambda time: 1.0  # of the time in s
+    steady: bool = True  # the amplitude never changes
+    ends: tuple[Array, Array] | None = None  # of a spring, for pictures
 
     @classmethod
-    def constant(cls, mass: Array, acceleration: Array, spatial: Array, convected: Array) -> AppliedLoad:
+    def constant(cls, mass: Array, acceleration: Array, spatial: Array, follower: Array) -> AppliedLoad:
         """Return constant loads on many bodies, for compiled steps alone."""
 
         def generalized(q: Array, u: Array, time: float) -> Array:
@@ -69,7 +55,7 @@ class AppliedLoad:
         def potential(q: Array) -> Array:
             return np.asarray(-(mass * (acceleration * q[..., 9:]).sum(axis=-1)))
 
-        return cls(generalized, acceleration, spatial, convected, potential_energy=potential)
+        return cls(generalized, acceleration, spatial, follower, potential_energy=potential)
 
     def __call__(self, q: Array, u: Array, time: float) -> Array:
         """Return the generalized force (..., dofs) at a configuration, a velocity and a time."""
@@ -85,7 +71,7 @@ class AppliedLoad:
     @property
     def is_constant(self) -> bool:
         """Whether compiled steps can take it as it is."""
-        return self.steady and any(x is not None for x in (self.acceleration, self.spatial, self.convected))
+        return self.steady and any(x is not None for x in (self.acceleration, self.spatial, self.follower))
 
     def potential(self, q: Array) -> Array:
         """Return the potential energy (...) in J; 0 for loads without one, or whose amplitude changes."""

@@ -23,7 +23,7 @@ class Force(BodyLoad):
     ----------
     point : (3,) m, in the undeformed body.
     force : (3,) N.
-    frame : ``spatial`` keeps its direction in space, ``convected`` moves with the body (times Λ or F).
+    frame : ``spatial`` keeps its direction in space, ``follower`` moves with the body (times Λ or F).
     """
 
     def __init__(self, point: ArrayLike, force: ArrayLike, frame: str = "spatial") -> None:
@@ -34,11 +34,11 @@ class Force(BodyLoad):
         """Return the load on a body; MeshError if the point lies outside."""
         X, f = self.point, fitting(self.force, body.q.shape[:-1], 1, "a force")
         body.locate(X)
-        if self.frame == "convected":
+        if self.frame == "follower":
             return AppliedLoad(
-                lambda q, u, t: body.generalized_force(X, body.convected(f, X, q), q),
-                convected=body.body_fixed_force(X, f),
-                tangent=lambda q, u, t: _convected_tangent(body, X, f, q),
+                lambda q, u, t: body.generalized_force(X, body.push_forward(f, X, q), q),
+                follower=body.body_fixed_force(X, f),
+                tangent=lambda q, u, t: _follower_tangent(body, X, f, q),
             )
         central = body.jacobian_is_constant or bool((np.abs(X - body.center) == 0).all())
         return AppliedLoad(
@@ -54,7 +54,7 @@ class Torque(BodyLoad):
     Parameters
     ----------
     torque : (3,) N m.
-    frame : ``spatial`` keeps its direction in space, ``convected`` turns with the body.
+    frame : ``spatial`` keeps its direction in space, ``follower`` turns with the body.
     """
 
     def __init__(self, torque: ArrayLike, frame: str = "spatial") -> None:
@@ -65,8 +65,8 @@ class Torque(BodyLoad):
         t = fitting(self.torque, body.q.shape[:-1], 1, "a torque")
         body.generalized_torque(t, body.q)  # an error where bodies of the kind take none
         fixed = np.broadcast_to(np.concatenate([t, np.zeros_like(t)], axis=-1), body.u.shape)
-        if self.frame == "convected":
-            return AppliedLoad(lambda q, u, time: fixed, convected=fixed)
+        if self.frame == "follower":
+            return AppliedLoad(lambda q, u, time: fixed, follower=fixed)
         return AppliedLoad(lambda q, u, time: body.generalized_torque(t, q), spatial=fixed)
 
 
@@ -150,7 +150,7 @@ class Spring(BodyLoad):
         return self.stiffness * elongation + self.damping * rate
 
 
-def _convected_tangent(body: FreeBody, X: Array, force: Array, q: Array) -> Entries:
+def _follower_tangent(body: FreeBody, X: Array, force: Array, q: Array) -> Entries:
     """Return the derivative of a force that moves with a body, whose F is linear in q."""
     dofs, H = body.jacobian(X, q)
     zero = np.zeros_like(q)
@@ -158,13 +158,13 @@ def _convected_tangent(body: FreeBody, X: Array, force: Array, q: Array) -> Entr
     for dof in dofs:
         one = zero.copy()
         one[dof] = 1.0
-        columns.append(body.convected(force, X, one) - body.convected(force, X, zero))
+        columns.append(body.push_forward(force, X, one) - body.push_forward(force, X, zero))
     return block_entries(dofs, dofs, H.T @ np.transpose(columns))
 
 
 def _checked_frame(frame: str) -> str:
     if frame not in FRAMES:
-        raise InputError(f"frame must be 'spatial' or 'convected'; got {frame!r}")
+        raise InputError(f"frame must be 'spatial' or 'follower'; got {frame!r}")
     return frame
 
 

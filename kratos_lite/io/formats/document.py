@@ -29,36 +29,26 @@ class Properties:
 
 @dataclass(eq=False)
 class Data:
-    """Values of one variable on nodes, elements or conditions.
+    """Values of one variable on nodes, elements or conditions."""
 
-    Attributes
-    ----------
-    variable : e.g. ``DISPLACEMENT_X``.
-    ids : (m,) int ids as written in the file.
-    fixed : (m,) bool, True where the degree of freedom is fixed (nodal data only).
-    values : (m,) or (m, k) float; empty for flags.
-    line : line of the ``Begin``.
-    source : name of the file, if it is not the file of the mesh.
-    """
-
-    variable: str
-    ids: Ints
-    fixed: Mask
-    values: Array
-    line: int = 0
-    source: str = ""
+    variable: str  # e.g. ``DISPLACEMENT_X``.
+    ids: Ints  # (m,) int ids as written in the file.
+    fixed: Mask  # (m,) bool, True where the degree of freedom is fixed (nodal data only).
+    values: Array  # (m,) or (m, k) float; empty for flags.
+    line: int = 0  # line of the ``Begin``.
+    source: str = ""  # name of the file, if it is not the file of the mesh.
 
 
 @dataclass(frozen=True)
 class Constraint:
-    """One linear multi-point constraint: u[slave] = sum(weights · u[masters]) + constant.
+    """One linear multi-point constraint: u[dependent] = sum(weights · u[independents]) + constant.
 
     Degrees of freedom are (node id, variable name) pairs.
     """
 
     id: int
-    slave: tuple[int, str]
-    masters: tuple[tuple[int, str], ...]
+    dependent: tuple[int, str]
+    independents: tuple[tuple[int, str], ...]
     weights: tuple[float, ...]
     constant: float
     line: int = 0

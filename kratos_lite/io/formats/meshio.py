@@ -44,22 +44,11 @@ _OPTIONS = {
 
 
 def read_meshio(path: str | Path) -> Document:
-    """Read the mesh of any format that meshio knows; the ending says which.
+    """Return the mesh of any format that meshio knows, in m; groups, cell sets and node sets become parts.
 
-    Solid cells become elements ``Element3D…N``, which say no formulation, triangles and quadrilaterals
-    conditions ``SurfaceCondition3D…N``.  Lines and points are kept when a named group holds them.  Groups,
-    cell sets and node sets become parts.  The number of the physical group (or material) of a solid cell
-    is its property id, or 1; the properties are empty.  Lengths are taken to be m.  meshio tells no ids:
-    nodes and elements are counted from 1, unless the data NODE_ID and ELEMENT_ID of our own files name them.
-
-    Parameters
-    ----------
-    path : file such as ``part.msh``, ``.inp``, ``.bdf``, ``.med``, ``.vtk`` or ``.vtu``.
-
-    Raises
-    ------
-    InputError
-        The ending is unknown, the file cannot be read, it holds no solid cells, or some that no element has.
+    Solid cells become elements ``Element3D…N``, which say no formulation, faces conditions
+    ``SurfaceCondition3D…N``.  Lines and points are kept when a named group holds them.  The number of the
+    physical group (or material) of a solid cell is its property id, or 1.
     """
     path = Path(path)
     if path.exists() and not path.is_file():
@@ -76,21 +65,7 @@ def write_meshio(
     point_data: Mapping[str, NDArray[Any]] | None = None,
     cell_data: Mapping[str, NDArray[Any]] | None = None,
 ) -> None:
-    """Write the elements of a mesh in the format of meshio that the ending says, as a whole or not at all.
-
-    Parameters
-    ----------
-    path : file to write, such as ``beam.vtk``, ``.msh``, ``.inp`` or ``.xdmf``.
-    mesh : points in m and element blocks; blocks of unknown kinds are left out.
-    point_data, cell_data : numbers on all nodes and on all elements by name; some formats keep none.
-
-    Raises
-    ------
-    InputError
-        The ending is unknown, or the format cannot hold this mesh, or the file cannot be written.
-    SolveError
-        A number is not finite.
-    """
+    """Write a mesh and numbers on nodes and elements in the format of the ending; all or nothing."""
     path = Path(path)
     check_ending(path)
     refuse_nan(path, "a coordinate", mesh.points)

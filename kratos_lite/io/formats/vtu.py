@@ -44,30 +44,10 @@ def write_vtu(
     cell_data: Mapping[str, Numbers] | None = None,
     mode: str = "binary",
 ) -> None:
-    """Write a mesh and its results for ParaView, VTK or meshio, as a whole or not at all.
+    """Write a mesh in m and its results for ParaView, VTK or meshio, all or nothing; numbers are not rounded.
 
-    The numbers are stored unrounded in every mode.  Blocks of a kind without a shape are
-    left out, together with their rows of `cell_data`.
+    Data on nodes (n, …) and elements (m, …) have 1, 3 (vector), 6 (xx yy zz xy yz xz) or 3×3 components.
 
-    Parameters
-    ----------
-    path : the `.vtu` file to write.
-    mesh : points in m and element blocks.
-    point_data : (n,) or (n, k) numbers on the nodes by name; k = 3 is a vector, k = 6 a stress or strain
-        xx, yy, zz, xy, yz, xz, and (n, 3, 3) a tensor.
-    cell_data : the same on the elements, with one row per element through all blocks in order.
-    mode : ``binary`` is quickest, ``compressed`` takes the least room, ``ascii`` can be read by eye.
-
-    Raises
-    ------
-    InputError
-        The mode is unknown, an array has the wrong number of rows or holds no real numbers, or the
-        file cannot be written.
-    SolveError
-        A number is not finite.
-
-    Examples
-    --------
     >>> import numpy as np
     >>> from kratos_lite.shapes.tetrahedra import Tetrahedron4
     >>> mesh = Mesh(Tetrahedron4.nodes, {"KinematicLinear3D4N": [[0, 1, 2, 3]]})
@@ -153,20 +133,8 @@ def _text(array: Numbers) -> str:
 
 
 def write_pvd(path: str | Path, steps: Iterable[tuple[float, str]]) -> None:
-    """Write the index of a time series: ParaView opens it and plays the steps.
+    """Write the index of a time series: times in s, and names of `.vtu` files from the folder of `path`.
 
-    Parameters
-    ----------
-    path : the `.pvd` file to write.
-    steps : time in s and name of the `.vtu` file, relative to the folder of `path`.
-
-    Raises
-    ------
-    InputError
-        The file cannot be written.
-
-    Examples
-    --------
     >>> write_pvd(getfixture("tmp_path") / "swing.pvd", [(0.0, "swing_0.vtu"), (0.1, "swing_1.vtu")])
     """
     sets = [
@@ -178,7 +146,7 @@ def write_pvd(path: str | Path, steps: Iterable[tuple[float, str]]) -> None:
 
 def checked(data: Mapping[str, Numbers], rows: int, place: str) -> Named:
     """Return arrays of (rows, …) little-endian numbers of one of the types of the file."""
-    found = []
+    arrays = []
     for name, values in data.items():
         array = np.asarray(values)
         if array.ndim == 0 or len(array) != rows:
@@ -187,8 +155,8 @@ def checked(data: Mapping[str, Numbers], rows: int, place: str) -> Named:
             raise InputError(f"{name}: expected real or whole numbers; got {array.dtype}")
         small = array.dtype.kind == "b" or array.dtype == np.int32
         kind = "<f8" if array.dtype.kind == "f" else "<i4" if small else "<i8"
-        found.append((name, array.astype(kind, copy=False)))
-    return found
+        arrays.append((name, array.astype(kind, copy=False)))
+    return arrays
 
 
 def _header(groups: dict[str, Named], n_points: int, n_cells: int, mode: str, places: Iterator[str]) -> str:

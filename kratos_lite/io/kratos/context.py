@@ -42,29 +42,19 @@ def interval_of(settings: Settings) -> Interval:
         end = FOREVER if value[1] == "End" else value[1]
         if is_number(end):
             return Interval(float(value[0]), float(end))
-    raise settings.error("interval", f'interval must be [number, number or "End"]; got {shown(value)}')
+    raise settings.error("interval", f'must be [number, number or "End"]; got {shown(value)}')
 
 
 @dataclass(frozen=True, eq=False)
 class RunContext:
-    """The mesh and the time steps that processes and checks refer to.
+    """The mesh and the time steps that processes and checks refer to."""
 
-    Attributes
-    ----------
-    mesh : the mesh.
-    root : name of the model part that holds everything.
-    folder : folder of the run file.
-    times : start time and the time of every step, s.
-    moved : Kratos would move the nodes with the displacement.
-    outside : files outside the folder may be named.
-    """
-
-    mesh: Mesh
-    root: str
-    folder: Path
-    times: Sequence[float] = (0.0, 1.0)
-    moved: bool = True
-    outside: bool = False
+    mesh: Mesh  # the mesh.
+    root: str  # name of the model part that holds everything.
+    folder: Path  # folder of the run file.
+    times: Sequence[float] = (0.0, 1.0)  # start time and the time of every step, s.
+    moved: bool = True  # Kratos would move the nodes with the displacement.
+    outside: bool = False  # files outside the folder may be named.
 
     def part(self, settings: Settings, key: str = "model_part_name") -> Part:
         """Return the part that a key names; the root's name may stand before it, or alone for all."""
@@ -85,7 +75,7 @@ def times_of(problem: Settings, solver: Settings) -> list[float]:
     stepping.expect(not table, "time_step_table", "time_step_table is not supported; give time_step")
     step = stepping.number("time_step")
     time, end = problem.number("start_time"), problem.number("end_time")
-    stepping.expect(step > 0, "time_step", f"time_step must be > 0 s; got {step:g}")
+    stepping.expect(step > 0, "time_step", f"must be > 0 s; got {step:g}")
     text = f"no step is solved: end_time {end:g} must be > start_time {time:g}"
     problem.expect(time < end, "end_time", text)
     text = f"time_step {step:g} s makes more than {MAX_STEPS} steps; enlarge it"

@@ -45,22 +45,8 @@ _CONSTANTS = {"pi": np.pi, "e": np.e}
 
 
 def evaluate(text: str, variables: Mapping[str, ArrayLike], python: bool = False) -> Array:
-    """Return the value of an expression, broadcast over the variables.
+    """Return the value of an expression, broadcast over its variables; ValueError where it is none.
 
-    Parameters
-    ----------
-    text : numbers, ``+ - * / % ^ **``, brackets, ``a if b < c else d``, ``pi``, ``e``, and sin cos tan
-        asin acos atan atan2 sinh cosh tanh exp sqrt log log10 ln floor ceil abs pow min max.
-    variables : values by name, such as ``x``, ``y``, ``z``, ``t``.
-    python : read the text as Python does, not as Kratos does.
-
-    Raises
-    ------
-    ValueError
-        If the text is anything else, or a value is not finite.
-
-    Examples
-    --------
     >>> evaluate("0.5*x^2 + t", {"x": [1.0, 2.0], "t": 1.0})
     array([1.5, 3. ])
     """
@@ -107,27 +93,27 @@ class _Expression:
     def value(self, node: ast.expr) -> Any:
         match node:
             case ast.Constant(value=float(number)):
-                found: Any = np.float64(number)
+                value: Any = np.float64(number)
             case ast.Name():
-                found = self._named(node.id, self.names)
+                value = self._named(node.id, self.names)
             case ast.BinOp(op=ast.Pow()) | ast.UnaryOp() if not self.python:
-                found = reduce(np.power, self._powers(node))
+                value = reduce(np.power, self._powers(node))
             case ast.UnaryOp(op=ast.UAdd() | ast.USub() as op):
-                found = self.operators[type(op)](self.value(node.operand))
+                value = self.operators[type(op)](self.value(node.operand))
             case ast.BinOp(left=left, op=op, right=right) if type(op) in self.operators:
-                found = self.operators[type(op)](self.value(left), self.value(right))
+                value = self.operators[type(op)](self.value(left), self.value(right))
             case ast.Call(func=ast.Name(id=name), keywords=[]):
-                found = self._call(name, [self.value(argument) for argument in node.args])
+                value = self._call(name, [self.value(argument) for argument in node.args])
             case ast.IfExp(test=ast.Compare(left=left, ops=[op], comparators=[right])) if (
                 type(op) in self.operators
             ):
                 if node is not self.root and not self.python:
                     raise ValueError(f"expression {self.text!r}: {ONE_IF}")
                 condition = self.operators[type(op)](self.value(left), self.value(right))
-                found = np.where(condition, self.value(node.body), self.value(node.orelse))
+                value = np.where(condition, self.value(node.body), self.value(node.orelse))
             case _:
                 raise SyntaxError
-        return found
+        return value
 
     def _powers(self, node: ast.expr) -> list[Any]:
         """Return what Kratos raises to each other from the left, each with the signs before it."""

@@ -19,17 +19,7 @@ from kratos_lite.mesh import Block, Mesh, with_rows
 def materials_of(
     settings: Settings, context: RunContext, document: Document, notes: list[str]
 ) -> dict[int, LinearMaterial]:
-    """Return the materials by properties id, and put the properties into the document.
-
-    Elements of the parts get the properties id, and the variables join those of the mesh file.
-
-    Raises
-    ------
-    InputError
-        With the place of a part without elements, an unknown law or an impossible constant.
-    ModelError
-        If elements are left without material.
-    """
+    """Return the materials by properties id; the document gets these ids and the variables of the file."""
     entries = settings.sections("properties")
     settings.expect(entries, "properties", "the materials file needs a list of 'properties'")
     found: dict[int, LinearMaterial] = {}
@@ -43,14 +33,14 @@ def materials_of(
 
 def _assign(entry: Settings, context: RunContext, document: Document, number: int) -> None:
     """Give the elements of the part their properties id."""
-    rows, parts = context.part(entry).elements, context.mesh.parts
-    filled = [len(rows) > 0, *(len(part.elements) > 0 for part in parts.values())]
+    elements, parts = context.part(entry).elements, context.mesh.parts
+    filled = [len(elements) > 0, *(len(part.elements) > 0 for part in parts.values())]
     is_there, *filled = filled
     have = [f"{context.root} (all)", *(name for name, some in zip(parts, filled, strict=True) if some)]
     text = f"part {entry.text('model_part_name')!r} has no elements to carry a material; parts with elements"
     entry.expect(is_there, "model_part_name", f"{text} are {', '.join(have)}")
     mask = np.zeros(context.mesh.n_elements, dtype=bool)
-    mask[rows] = True
+    mask[elements] = True
     blocks = [
         replace(block, properties=np.where(mask[at], number, block.properties))
         for block, at in with_rows(document.mesh.blocks)
@@ -90,7 +80,7 @@ def _number(variables: Settings, key: str) -> Any:
     if key.rsplit(".", 1)[-1] in ELASTIC | {"DENSITY"}:
         return variables.number(key)
     fits = all(map(is_number, value)) if isinstance(value, list) else is_number(value)
-    text = f"{key} must be a number or a list of numbers; got {shown(value)}"
+    text = f"must be a number or a list of numbers; got {shown(value)}"
     variables.expect(fits or key not in USED, key, text)
     return value
 

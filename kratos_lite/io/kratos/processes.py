@@ -35,28 +35,17 @@ NORMALS = ("automatic_inwards_normal", "automatic_outwards_normal")
 
 @dataclass(eq=False)
 class Action:
-    """One component that a process sets, fixes or both.
+    """One component that a process sets, fixes or both."""
 
-    Attributes
-    ----------
-    settings : its parameters, for messages.
-    rows : node or condition rows.
-    component : scalar variable, such as ``DISPLACEMENT_X``.
-    factors : the value is their product, each a number or an expression; empty to leave it as it is.
-    interval : when it acts.
-    steps : in which steps that is; step 0 is the start, before the first solution.
-    on_conditions : set conditions, not nodes.
-    fixed : hold the component in the steps in which it acts.
-    """
-
-    settings: Settings
-    rows: Ints
-    component: str
+    settings: Settings  # its parameters, for messages.
+    indices: Ints  # node or condition indices.
+    component: str  # scalar variable, such as ``DISPLACEMENT_X``.
+    # the value is their product, each a number or an expression; empty to leave it as it is.
     factors: tuple[Value, ...]
-    interval: Interval
-    steps: list[int]
-    on_conditions: bool = False
-    fixed: bool = False
+    interval: Interval  # when it acts.
+    steps: list[int]  # in which steps that is; step 0 is the start, before the first solution.
+    on_conditions: bool = False  # set conditions, not nodes.
+    fixed: bool = False  # hold the component in the steps in which it acts.
 
     def mentions(self, names: str) -> bool:
         """Return whether an expression uses one of these names of one letter."""
@@ -81,14 +70,14 @@ class Action:
 
     def put(self, values: Variables, places: tuple[Array, Array], time: float) -> None:
         """Set the values that they are at a time in s; places are those of nodes and conditions."""
-        value = self.value(places[self.on_conditions][self.rows], time)
+        value = self.value(places[self.on_conditions][self.indices], time)
         fields = values.conditional if self.on_conditions else values.nodal
-        fields.put(self.component, self.rows, value)
+        fields.put(self.component, self.indices, value)
 
 
 def _value(settings: Settings, value: Any, key: str) -> Value:
     is_formula = isinstance(value, str)
-    expected = f"{key} must be a number or an expression in x, y, z, t; got {shown(value)}"
+    expected = f"must be a number or an expression in x, y, z, t; got {shown(value)}"
     settings.expect(is_formula or is_number(value), key, expected)
     return value if is_formula else float(value)
 
@@ -96,7 +85,7 @@ def _value(settings: Settings, value: Any, key: str) -> Value:
 def _three(settings: Settings, key: str) -> list[Any]:
     value = settings.get(key)
     fits = isinstance(value, list) and len(value) == 3
-    settings.expect(fits, key, f"{key} must be a list of three entries; got {shown(value)}")
+    settings.expect(fits, key, f"must be a list of three entries; got {shown(value)}")
     return list(value)
 
 
@@ -128,20 +117,13 @@ def _kept(settings: Settings) -> list[Factors]:
 
 @dataclass(frozen=True)
 class Process:
-    """A kind of process: what it sets, and of what.
+    """A kind of process: what it sets, and of what."""
 
-    Attributes
-    ----------
-    factors : the factors of each component from the parameters; None leaves the component alone.
-    keys : parameters of its own.
-    on_conditions : it acts on conditions, and fixes nothing.
-    is_vector : it sets three components.
-    """
-
+    # the factors of each component from the parameters; None leaves the component alone.
     factors: Callable[[Settings], list[Factors]]
-    keys: tuple[str, ...] = ("value",)
-    on_conditions: bool = False
-    is_vector: bool = True
+    keys: tuple[str, ...] = ("value",)  # parameters of its own.
+    on_conditions: bool = False  # it acts on conditions, and fixes nothing.
+    is_vector: bool = True  # it sets three components.
 
 
 DIRECTION = ("modulus", "direction")
@@ -164,17 +146,17 @@ def actions_of(entry: Settings, module: str, context: RunContext) -> list[Action
     refuse_local_axes(settings)
     settings.check_keys([*COMMON, *process.keys, "entities" if process.on_conditions else "constrained"])
     name, part = _variable(settings, process), context.part(settings)
-    rows, interval = part.conditions if process.on_conditions else part.nodes, interval_of(settings)
+    indices, interval = part.conditions if process.on_conditions else part.nodes, interval_of(settings)
     names = [f"{name}_{axis}" for axis in "XYZ"] if process.is_vector else [name]
-    found = zip(names, process.factors(settings), _fixed(settings, process), strict=False)
+    components = zip(names, process.factors(settings), _fixed(settings, process), strict=False)
     steps = [step for step, time in enumerate(context.times) if time in interval]
     later = [step for step in steps if step]
     actions = []
-    for component, factors, fix in found:
+    for component, factors, fix in components:
         if factors or (fix and factors is not None):
             acting = steps if factors and not process.on_conditions else later
             conditions = process.on_conditions
-            actions.append(Action(settings, rows, component, factors, interval, acting, conditions, fix))
+            actions.append(Action(settings, indices, component, factors, interval, acting, conditions, fix))
     return actions
 
 
@@ -202,7 +184,7 @@ def _fixed(settings: Settings, process: Process) -> list[bool]:
     flags = value if by_axis and isinstance(value, list) else [value] * 3
     fits = len(flags) == 3 and all(isinstance(flag, bool) for flag in flags)
     words = "true, false or a list of three of them" if by_axis else "true or false"
-    settings.expect(fits, "constrained", f"constrained must be {words}; got {shown(value)}")
+    settings.expect(fits, "constrained", f"must be {words}; got {shown(value)}")
     return flags
 
 
@@ -218,7 +200,7 @@ def notes_of(actions: Sequence[Action], context: RunContext) -> list[str]:
     notes = []
     for action in actions:
         where = action.settings.path.removesuffix(".Parameters")
-        if not action.steps or (context.mesh.whole and not len(action.rows)):
+        if not action.steps or (context.mesh.whole and not len(action.indices)):
             why = "its part has none to act on" if action.steps else "its interval holds no step"
             notes.append(f"{where}: {action.component} is never set: {why}")
         elif context.moved and action.steps[-1] > 1 and action.mentions("xyz"):
@@ -252,12 +234,12 @@ def _hold(actions: Sequence[Action], last: int, values: Variables) -> None:
     supports = [action for action in actions if action.fixed and action.steps]
     for action in supports:
         if action.steps[0] < last:
-            values.fix(action.component, action.rows, False)
+            values.fix(action.component, action.indices, False)
     for action in supports:
         # What is fixed at the start, before the first step, stays so through that step.
         if action.steps[-1] == last or (action.steps == [0] and last == 1):
             _check_history(action, last)
-            values.fix(action.component, action.rows)
+            values.fix(action.component, action.indices)
 
 
 def _check_history(action: Action, last: int) -> None:

@@ -66,14 +66,14 @@ def _apply_prestress(model: Model, properties: Properties) -> None:
     Source: Isotropic3D of KratosStructuralApplication, σ = C ε - PRESTRESS_FACTOR · PRESTRESS.
     """
     factor = float(_numbers(properties, "PRESTRESS_FACTOR", 1.0, (), "one number"))
-    found = {
+    stresses = {
         name: _numbers(properties, name, 0.0, (6,), "six components xx yy zz xy yz xz")
         for name in PRESTRESS
         if name in properties.values
     }
-    if len(found) == 2 and (found["PRESTRESS"] != found["INSITU_STRESS"]).any():
+    if len(stresses) == 2 and (stresses["PRESTRESS"] != stresses["INSITU_STRESS"]).any():
         raise InputError("PRESTRESS and INSITU_STRESS are two names of one stress, but differ; keep one")
-    for stress in list(found.values())[:1]:
+    for stress in list(stresses.values())[:1]:
         model.add_prestress(-factor * stress, properties.id)
 
 

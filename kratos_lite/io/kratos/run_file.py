@@ -15,12 +15,12 @@ from kratos_lite.io.formats.part_files import part_files, read_part
 from kratos_lite.io.kratos.context import RunContext, module_of, times_of
 from kratos_lite.io.kratos.expected_values import COMPARISONS, Comparison
 from kratos_lite.io.kratos.materials import materials_of
+from kratos_lite.io.kratos.motion import add_motion
 from kratos_lite.io.kratos.processes import PROCESSES, Action, actions_of, run
 from kratos_lite.io.kratos.time_dependent import ProcessesInTime
 from kratos_lite.io.kratos.time_integration import DYNAMIC, DYNAMIC_KEYS, time_integration_of
 from kratos_lite.io.kratos.to_model import check_elements, model_from
 from kratos_lite.io.kratos.variables import Variables
-from kratos_lite.io.readers.motion import add_motion
 from kratos_lite.io.settings import Settings, find_file, read_settings
 from kratos_lite.materials import LinearMaterial
 
@@ -45,28 +45,21 @@ OUTPUTS = ("save_restart_process", "timer_process", "print_info_in_file_process"
 
 
 def read_kratos_project(
-    settings: Settings,
-    folder: Path,
+    path: Path,
     allow_outside: bool = False,
     *,
     initial_displacement: bool = True,
     part: int | None = None,
 ) -> Case:
-    """Return what a Kratos run file says.
-
-    Parameters
-    ----------
-    settings : the run file.
-    folder : its folder.
-    allow_outside : let it name files outside the folder.
-    initial_displacement : as of `kratos_lite.read`; what moves starts from it.
-    part : number of the part file to read in place of the whole mesh.
-
-    Raises
-    ------
-    InputError, ModelError
-        With the place of what is wrong, or of what is not a linear solid.
-    """
+    """Return the case of a Kratos run file; errors name what is wrong, or no linear solid."""
+    settings, folder = read_settings(path), path.parent
+    if "properties" in settings:
+        raise settings.error("properties", "this is a materials file; read the run file that names it")
+    if not {"solver_settings", "problem_data"} & settings.values.keys():
+        text = (
+            "this is no run file of Kratos, which has 'solver_settings'; write a Python script with a 'case'"
+        )
+        raise settings.error("", text)
     solver = settings.section("solver_settings", required=True)
     times = times_of(settings.section("problem_data", required=True), solver)
     dynamic = solver.text("solver_type") in DYNAMIC
@@ -123,8 +116,8 @@ def _check_solver(solver: Settings) -> list[str]:
     )
     solver.expect(kind in ("Static", "static", *DYNAMIC), "solver_type", text + "for frequencies")
     size = solver.integer("domain_size")
-    solver.expect(size == 3, "domain_size", f"domain_size must be 3; got {size}")
-    text = f"analysis_type must be 'linear' or 'non_linear'; got {analysis!r}"
+    solver.expect(size == 3, "domain_size", f"must be 3; got {size}")
+    text = f"must be 'linear' or 'non_linear'; got {analysis!r}"
     solver.expect(analysis in ("linear", "non_linear"), "analysis_type", text)
     for key in OTHER_PHYSICS:
         text = f"{key} is not supported; kratos_lite solves for displacements of all elements"
@@ -184,7 +177,7 @@ def _read_processes(
     """Return what the processes do and check; all that are unknown are reported together."""
     actions: list[Action] = []
     checks: list[Comparison] = []
-    problems = Problems(settings.source)
+    problems = Problems()
     for section in (settings.section("processes"), settings.section("output_processes")):
         # Kratos keeps the lists in alphabetical order; later processes replace earlier values.
         for key in sorted(section.values):
@@ -200,7 +193,6 @@ def _read_processes(
                 else:
                     known = [*PROCESSES, *COMPARISONS]
                     text = f"unknown process {module!r}.{nearest(module, known)} Known are {', '.join(known)}"
-                    places = entry.values.places
-                    problems.add(text, *(places.get("python_module") or places["name"]))
+                    problems.add(str(entry.error("", text)))
     problems.raise_if_any()
     return actions, checks

@@ -26,11 +26,11 @@ def time_integration_of(settings: Settings, processes: ProcessesInTime) -> TimeI
     """Return the time integration of a dynamic run file; InputError with the place of what is wrong."""
     solver, problem = settings.section("solver_settings"), settings.section("problem_data")
     times = times_of(problem, solver)
-    text = f"start_time must be 0 for dynamic solutions; got {times[0]:g}: shift the times"
+    text = f"must be 0 for dynamic solutions; got {times[0]:g}: shift the times"
     problem.expect(times[0] == 0, "start_time", text)
     rayleigh = tuple(solver.number(key, 0.0) for key in ("rayleigh_alpha", "rayleigh_beta"))
     for key, value in zip(("rayleigh_alpha", "rayleigh_beta"), rayleigh, strict=True):
-        solver.expect(value >= 0, key, f"{key} must be ≥ 0; got {value:g}")
+        solver.expect(value >= 0, key, f"must be ≥ 0; got {value:g}")
     with naming(settings.source):
         for name in ("displacement", "velocity"):
             if (value := getattr(processes, name)) is not None:
@@ -58,7 +58,7 @@ def _integrator(solver: Settings) -> ModelIntegrator:
             "the option --integrator central_difference then integrates explicitly",
         )
     kind, beta = solver.text("scheme_type", "bossak"), solver.number("newmark_beta", 0.25)
-    text = f"newmark_beta must be 0.25, which is stable; got {beta:g}"
+    text = f"must be 0.25, which is stable; got {beta:g}"
     solver.expect(beta == 0.25, "newmark_beta", text)
     try:
         if kind == "newmark":
@@ -66,7 +66,7 @@ def _integrator(solver: Settings) -> ModelIntegrator:
         if kind == "bossak":
             return Bossak(solver.number("damp_factor_m", -0.3))
     except InputError as error:
-        raise solver.error("damp_factor_m", f"{solver.name('damp_factor_m')}: {error}") from None
+        raise solver.error("damp_factor_m", str(error)) from None
     raise solver.error(
         "scheme_type", f"scheme_type {kind!r} is not supported; take 'newmark' or 'bossak' (Kratos' default)"
     )

@@ -36,9 +36,9 @@ def document_from(model: Model) -> Document:
         "a support that moves in time": bool(model.supports.motions),
         "a load that changes in time": any(isinstance(load, TimeDependentLoad) for load in model.loads),
     }
-    for what, given in unwritten.items():
-        if given:
-            raise InputError(f"{what} cannot be written to a file of a model; leave it to the run file")
+    for what, is_present in unwritten.items():
+        if is_present:
+            raise InputError(f"{what} cannot be written to a file of a model; leave it to a script")
     mesh, start = model.mesh, _initial_displacement(model)
     gravity, others = _split_loads(model)
     numbers, properties = _properties(model, gravity)
@@ -62,15 +62,15 @@ def _blocks(model: Model, numbers: Ints) -> list[Block]:
     if model.chosen():
         for group in groups:
             names[group.rows] = group.element.__name__
-    found = []
-    for block, rows in with_rows(mesh.blocks):
-        mine = names[rows]
-        ends = [0, *(np.flatnonzero(mine[1:] != mine[:-1]) + 1).tolist(), len(mine)]
+    blocks = []
+    for block, indices in with_rows(mesh.blocks):
+        block_names = names[indices]
+        ends = [0, *(np.flatnonzero(block_names[1:] != block_names[:-1]) + 1).tolist(), len(block_names)]
         for first, last in pairwise(ends):
             if last > first:
-                part = replace(block, properties=numbers[rows], lines=None).take(np.arange(first, last))
-                found.append(replace(part, name=str(mine[first])))
-    return found
+                part = replace(block, properties=numbers[indices], lines=None).take(np.arange(first, last))
+                blocks.append(replace(part, name=str(block_names[first])))
+    return blocks
 
 
 def _split_loads(model: Model) -> tuple[Array, list[Any]]:
@@ -83,7 +83,7 @@ def _split_loads(model: Model) -> tuple[Array, list[Any]]:
 def _properties(model: Model, gravity: Array) -> tuple[Ints, dict[int, Properties]]:
     """Return the property id of each element, one per material and prestress, and the Properties."""
     numbers = np.zeros(model.mesh.n_elements, dtype=np.int64)
-    found: dict[int, Properties] = {}
+    properties: dict[int, Properties] = {}
     known: list[tuple[LinearMaterial, list[float]]] = []
     for group in model.element_groups():
         if group.rule is not group.element.rule:
@@ -95,8 +95,8 @@ def _properties(model: Model, gravity: Array) -> tuple[Ints, dict[int, Propertie
             known += [] if kind in known else [kind]
             number = known.index(kind) + 1
             numbers[group.rows[which.ravel() == i]] = number
-            found[number] = Properties(number, _values(group.material, gravity, stress))
-    return numbers, found
+            properties[number] = Properties(number, _values(group.material, gravity, stress))
+    return numbers, properties
 
 
 def _values(material: LinearMaterial, gravity: Array, prestress: Array) -> dict[str, Any]:
@@ -123,31 +123,31 @@ def _initial_displacement(model: Model) -> list[Data]:
     if u0[fixed].any():
         what = "an initial displacement of prescribed degrees of freedom"
         raise InputError(f"{what} cannot be written: their DISPLACEMENT in a file is what is prescribed")
-    found = []
+    data = []
     for axis, letter in enumerate("XYZ"):
-        if len(rows := np.flatnonzero(u0[:, axis])):
-            free, ids = np.zeros(len(rows), dtype=bool), model.mesh.node_ids[rows]
-            found.append(Data(f"DISPLACEMENT_{letter}", ids, free, u0[rows, axis]))
-    return found
+        if len(indices := np.flatnonzero(u0[:, axis])):
+            free, ids = np.zeros(len(indices), dtype=bool), model.mesh.node_ids[indices]
+            data.append(Data(f"DISPLACEMENT_{letter}", ids, free, u0[indices, axis]))
+    return data
 
 
 def _fixed(model: Model) -> list[Data]:
-    found, supports = [], model.supports
+    data, supports = [], model.supports
     for axis, letter in enumerate("XYZ"):
-        if len(rows := np.flatnonzero(supports.fixed[:, axis])):
-            held, ids = np.ones(len(rows), dtype=bool), model.mesh.node_ids[rows]
-            found.append(Data(f"DISPLACEMENT_{letter}", ids, held, supports.values[rows, axis]))
-    return found
+        if len(indices := np.flatnonzero(supports.fixed[:, axis])):
+            fixed, ids = np.ones(len(indices), dtype=bool), model.mesh.node_ids[indices]
+            data.append(Data(f"DISPLACEMENT_{letter}", ids, fixed, supports.values[indices, axis]))
+    return data
 
 
 def _point_loads(mesh: Mesh, forces: Array, properties: int) -> tuple[list[Block], list[Data]]:
-    rows = np.flatnonzero((forces != 0).any(axis=1))
-    if not len(rows):
+    indices = np.flatnonzero((forces != 0).any(axis=1))
+    if not len(indices):
         return [], []
-    block = Block("PointLoadCondition3D1N", rows[:, None], properties=properties, shape=Point1)
-    free = np.zeros(len(rows), dtype=bool)
+    block = Block("PointLoadCondition3D1N", indices[:, None], properties=properties, shape=Point1)
+    free = np.zeros(len(indices), dtype=bool)
     names = [f"POINT_LOAD_{axis}" for axis in "XYZ"]
-    return [block], [Data(n, mesh.node_ids[rows], free, forces[rows, i]) for i, n in enumerate(names)]
+    return [block], [Data(n, mesh.node_ids[indices], free, forces[indices, i]) for i, n in enumerate(names)]
 
 
 def _parts(mesh: Mesh) -> dict[str, Part]:

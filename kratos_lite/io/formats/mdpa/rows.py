@@ -24,24 +24,14 @@ Words = list[re.Match[bytes]]
 
 @dataclass(frozen=True)
 class Layout:
-    """What a row holds.
+    """What a row holds."""
 
-    Attributes
-    ----------
-    word : what a row describes, e.g. ``element``.
-    kinds : one letter a column: i id, p property id (may be 0), b true or false, r real.
-    counted : what stands after the first `head` columns, e.g. ``nodes``.
-    head : number of leading columns that are not counted in messages.
-    needs : who asks for the width, e.g. ``KinematicLinear3D8N needs 8``.
-    alone : each row stands on its own line, also where strict reading allows several.
-    """
-
-    word: str
-    kinds: str
-    counted: str = "values"
-    head: int = 1
-    needs: str = ""
-    alone: bool = False
+    word: str  # what a row describes, e.g. ``element``.
+    kinds: str  # one letter a column: i id, p property id (may be 0), b true or false, r real.
+    counted: str = "values"  # what stands after the first `head` columns, e.g. ``nodes``.
+    head: int = 1  # number of leading columns that are not counted in messages.
+    needs: str = ""  # who asks for the width, e.g. ``KinematicLinear3D8N needs 8``.
+    alone: bool = False  # each row stands on its own line, also where strict reading allows several.
 
 
 @dataclass(eq=False)
@@ -59,20 +49,17 @@ def read_rows(source: Source, span: Span, layout: Layout) -> Rows:
     return (None if is_small else _compiled(source, span, layout)) or _exact(source, span, layout)
 
 
-def width_of_first_line(source: Source, span: Span) -> int:
-    """Return the number of words on the first line that has any, or 0."""
+def first_line(source: Source, span: Span) -> bytes:
+    """Return the first line that has words; nothing where there is none."""
     first = next(source.words(span), None)
-    if first is None:
-        return 0
-    end = source.data.find(b"\n", first.start(), span[1])
-    return len(source.data[first.start() : end if end >= 0 else span[1]].split())
+    return source.data[first.start() : source.line_end(first.start(), span[1])] if first else b""
 
 
 def _compiled(source: Source, span: Span, layout: Layout) -> Rows | None:
     """Return the rows if each stands plain on a line of its own, else None."""
     text = kernels("text")
-    found = text.rows(source.data, *span, layout.kinds, source.line(span[0])) if text else None
-    return Rows(*found) if found else None
+    columns = text.rows(source.data, *span, layout.kinds, source.line(span[0])) if text else None
+    return Rows(*columns) if columns else None
 
 
 def _exact(source: Source, span: Span, layout: Layout) -> Rows:

@@ -73,8 +73,8 @@ class Source(TextSource):
 
     def line_end(self, at: int, end: int) -> int:
         """Return the end of the line at an offset, or of the piece of text that ends before it."""
-        found = self.data.find(b"\n", at, end)
-        return found if found >= 0 else end
+        line_end = self.data.find(b"\n", at, end)
+        return line_end if line_end >= 0 else end
 
     def each(self, span: Span, what: str, read: Callable[[int, int], tuple[T, int]]) -> Iterator[T]:
         """Yield what `read` makes of a piece of text, row by row; after a mistake go on with the next line.
@@ -97,13 +97,7 @@ class Source(TextSource):
 
 
 def scan(source: Source) -> Frame:
-    """Return the root of the tree of blocks.
-
-    Raises
-    ------
-    InputError
-        Blocks are not closed, closed by another name, not allowed where they stand, or nested too deep.
-    """
+    """Return the root of the tree of blocks."""
     root = Frame("", 0)
     stack, cursor = [root], 0
     for offset in statements(source.data):
@@ -132,18 +126,18 @@ def scan(source: Source) -> Frame:
 def statements(data: bytes) -> list[int]:
     """Return the offsets of the words Begin and End."""
     text = kernels("text") if len(data) > SMALL else None
-    found: list[int] = []
+    offsets: list[int] = []
     for word in (b"Begin", b"End"):
         if text:
-            found += text.find_word(data, word)
+            offsets += text.find_word(data, word)
             continue
         at = data.find(word)
         while at >= 0:
             after = at + len(word)
             if (at == 0 or data[at - 1] in b" \t\n\v\f") and data[after : after + 1] in b" \t\n\v\f":
-                found.append(at)
+                offsets.append(at)
             at = data.find(word, after)
-    return sorted(found)
+    return sorted(offsets)
 
 
 def _open(source: Source, offset: int, stack: list[Frame]) -> tuple[Frame, int]:

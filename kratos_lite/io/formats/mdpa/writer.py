@@ -27,31 +27,12 @@ Lines = Iterator[str]
 
 
 def write_mdpa(path: str | Path, document: Document) -> list[Note]:
-    """Write a document, as a whole or not at all; gzipped if the name ends with ``.gz``.
+    """Write a document for Kratos and kratos_lite, all or nothing; return notes on what Kratos does not know.
 
-    Numbers are written with the digits that give exactly the same number again.  ``KinematicLinear3D8N``,
-    ``TotalLagrangian3D8N``, ``Face3D4N`` and their kin get the names by which Kratos knows them, such as
-    ``SmallDisplacementElement3D8N`` and ``SurfaceLoadCondition3D4N``, ``BBar3D8N`` becomes
-    ``SmallDisplacementBbarElement3D8N``; ``EnhancedStrain3D8N`` and others that Kratos does not have are
-    written by their own names.  ``Element3D8N``, which names no formulation, becomes the plain element of
-    Kratos, whose ``Element3D8N`` is empty.  Elements keep theirs where a prestress
-    or the displacement of free nodes is their initial state, which the present elements of Kratos ignore.
-    A constraint between different variables is written as kratos_lite reads it; Kratos 10.4.4 takes the
-    variable of each master from the word before in the header, so it reads such a constraint differently.
+    Numbers are written with the digits that give exactly the same number again, elements and conditions by
+    the names of Kratos; elements keep theirs where a prestress or an initial displacement, which the present
+    elements of Kratos ignore, is their initial state.
 
-    Returns
-    -------
-    list of Note
-        Elements and conditions that are written though Kratos does not know them, and elements without a
-        formulation, which get the plain one.
-
-    Raises
-    ------
-    InputError
-        The document holds what the format cannot: a number that is not finite, a name with blanks.
-
-    Examples
-    --------
     >>> path = getfixture("tmp_path") / "one.mdpa"
     >>> _ = write_mdpa(path, Document(Mesh([[0.1, 0, 0]], node_ids=[7])))
     >>> print(path.read_text().strip())
@@ -213,24 +194,24 @@ def _cells(kind: str, block: Block, mesh: Mesh, name: str) -> Lines:
 
 def _constraints(constraints: list[Constraint]) -> Lines:
     """Give the constraints, those of the same variables in one block."""
-    # Kratos misreads a block whose constraints have different numbers of masters.
+    # Kratos misreads a block whose constraints have different numbers of independent nodes.
     for (_, *words), group in groupby(constraints, key=_header):
         rows = []
         for c in group:
             constant, *weights = (_array(f"constraint {c.id}", np.array(x)) for x in (c.constant, *c.weights))
-            nodes = " ".join(str(node) for node, _ in (c.slave, *c.masters))
+            nodes = " ".join(str(node) for node, _ in (c.dependent, *c.independents))
             rows.append(f"{c.id} {constant} [{','.join(weights)}] {nodes}")
         yield from _block(" ".join(["Constraints", *map(_name, map(str, words))]), rows)
 
 
 def _header(constraint: Constraint) -> tuple[int | str, ...]:
-    """Return the number of masters, the name and the variables of the header.
+    """Return the number of independent nodes, the name and the variables of the header.
 
-    Kratos misreads a header with more than the slave's variable where one is enough.
+    Kratos misreads a header with more than the dependent node's variable where one is enough.
     """
-    variables = [constraint.slave[1], *(variable for _, variable in constraint.masters)]
+    variables = [constraint.dependent[1], *(variable for _, variable in constraint.independents)]
     shown = variables[:1] if len(set(variables)) == 1 else variables
-    return (len(constraint.masters), constraint.name, *shown)
+    return (len(constraint.independents), constraint.name, *shown)
 
 
 def _data(data: Data, is_nodal: bool) -> Lines:

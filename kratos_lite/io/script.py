@@ -1,4 +1,4 @@
-"""Scripts: plain Python that defines `body`, `dt` and `steps`."""
+"""Scripts: plain Python that defines a `case`, or `body`, `dt` and `steps`."""
 
 from __future__ import annotations
 
@@ -11,13 +11,15 @@ from pathlib import Path
 from typing import Any
 
 from kratos_lite.bodies import Body
-from kratos_lite.bodies.batched import together
+from kratos_lite.bodies.batched import batch
 from kratos_lite.errors import InputError, KratosLiteError, nearest
 from kratos_lite.io.case import Case, Outputs, TimeIntegration
-from kratos_lite.io.readers.body_file import OUTPUTS, outputs_of
+from kratos_lite.io.writers.endings import SERIES
 
 NEEDED = ("body", "dt", "steps")
-"""Names that a script defines."""
+"""Names that a script without a `case` defines."""
+OUTPUTS = (*(ending[1:] for ending in SERIES), "picture", "state")
+"""Keys of `output` in a script without a `case`."""
 
 
 def is_script(path: Path) -> bool:
@@ -28,29 +30,37 @@ def is_script(path: Path) -> bool:
         return False
     targets = [t for node in tree.body if isinstance(node, ast.Assign) for t in node.targets]
     names = {name.id for target in targets for name in ast.walk(target) if isinstance(name, ast.Name)}
-    return names.issuperset(NEEDED)
+    return "case" in names or names.issuperset(NEEDED)
 
 
 def read_script(path: Path) -> Case:
     """Run a script, with ``__name__ == "case"``, and return the case that it defines.
 
-    It may also define `every`, `substeps` and `output`, a dictionary such as ``{"csv": "swing.csv"}``.
-
-    Raises
-    ------
-    InputError
-        With file and line of what is wrong.
+    It defines `case`; or `body`, `dt` and `steps`, and if wanted `every`, `substeps` and `output`, a
+    dictionary such as ``{"csv": "swing.csv"}``.  Errors are InputError with file and line.
     """
     if not path.is_file():
         raise InputError(f"{path}: there is no such file")
     names = _run(path)
+    case = names["case"] if "case" in names else _case_of_body(path, names)
+    if not isinstance(case, Case):
+        raise InputError(f"{path}: case must be a kl.Case; got {case!r}")
+    case.files = [path, *case.files]
+    if case.is_of_model and case.model.mesh.source:
+        case.files.append(Path(case.model.mesh.source))
+    return case
+
+
+def _case_of_body(path: Path, names: dict[str, Any]) -> Case:
     missing = [name for name in NEEDED if name not in names]
     if missing:
         hint = nearest(missing[0], [name for name in names if not name.startswith("__")])
-        raise InputError(f"{path}: a script defines {', '.join(NEEDED)}; {missing[0]!r} is missing.{hint}")
+        raise InputError(
+            f"{path}: a script defines case, or {', '.join(NEEDED)}; {missing[0]!r} is missing.{hint}"
+        )
     body = names["body"]
     if isinstance(body, Sequence):
-        body = together(body)
+        body = batch(body)
     if not isinstance(body, Body):
         raise InputError(f"{path}: body must be a body such as kl.RigidBody, or a list of them; got {body!r}")
     given = {name: names[name] for name in ("every", "substeps") if name in names}
@@ -58,22 +68,24 @@ def read_script(path: Path) -> Case:
         time = TimeIntegration(names["dt"], names["steps"], **given, place=str(path))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    return Case(body, time, outputs=_outputs(path, names.get("output", {})), files=[path])
+    return Case(body, time, outputs=_outputs(path, names.get("output", {})))
 
 
 def _outputs(path: Path, output: Any) -> Outputs:
-    """Return the files to write; they count from the folder of the script."""
+    """Return the files to write, named from the folder of the script."""
     if not isinstance(output, dict) or not all(isinstance(name, (str, Path)) for name in output.values()):
         raise InputError(f'{path}: output must be a dict such as {{"pvd": "swing.pvd"}}; got {output!r}')
     for key in output:
         if key not in OUTPUTS:
             hint = nearest(str(key), OUTPUTS)
             raise InputError(f"{path}: unknown output {key!r}.{hint} There are {', '.join(OUTPUTS)}")
-    return outputs_of({key: str(path.parent / name) for key, name in output.items()})
+    paths = {key: str(path.parent / name) for key, name in output.items()}
+    results = [name for key, name in paths.items() if key not in ("picture", "state")]
+    return Outputs(results, picture=paths.get("picture"), state=paths.get("state"))
 
 
 def _run(path: Path) -> dict[str, Any]:
-    """Run a file beside its own modules; it gets no arguments, and an error has its place in one line."""
+    """Run a file beside its own modules, without arguments; an error gets its place, in one line."""
     folder, words = str(path.parent.absolute()), sys.argv
     sys.path.insert(0, folder)
     sys.argv = [str(path)]

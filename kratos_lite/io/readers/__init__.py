@@ -1,1 +1,0 @@
-"""Readers: what each format of a run says, as a `Case`."""
