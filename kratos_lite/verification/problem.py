@@ -49,6 +49,11 @@ class Problem:
             raise ValueError(f"{self.name}: {self.source!r} names none of the sources")
 
     @property
+    def question(self) -> object:
+        """What is solved: rows of the same question share it."""
+        return self.name
+
+    @property
     def cited(self) -> str:
         """The word of the source in `SOURCES`."""
         return self.source.replace(":", ",").partition(",")[0]
@@ -108,11 +113,16 @@ class StaticProblem(Problem):
         super().__post_init__()
         object.__setattr__(self, "of", self._solved)
 
+    @property
+    def question(self) -> object:
+        """The models: rows of the same ones share their results."""
+        return self.models
+
     def _solved(self, element: str) -> float:
         return self.measure(*solved(self.models, element))
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=1)
 def solved(models: Callable[[str], tuple[Model, ...]], element: str) -> tuple[Result, ...]:
     """Return the results of the models of a problem; others that have the same models share them."""
     return tuple(model.solve("direct") for model in models(element))
