@@ -174,16 +174,16 @@ def write_system(scene: Scene, path: Path) -> None:
     model = scene.model
     constraints = model.supports.constraint_map
     system = ConstrainedSystem(model.mesh.points, model.element_groups(), constraints, solver="direct")
-    free, K = system.reduced.free.reshape(-1, 3), system.K
+    free, K = system.constraint_map.free.reshape(-1, 3), system.K
     assert (free == 3 * (free[:, :1] // 3) + np.arange(3)).all(), "a node is held along some axes alone"
-    load = system.gather(scene.forces()) - K @ system.reduced.c
-    A = system.reduced.reduce_matrix(K.scipy().tocsr()).tobsr((3, 3))
+    load = system.gather(scene.forces()) - K @ system.constraint_map.c
+    A = system.constraint_map.reduce_matrix(K.scipy().tocsr()).tobsr((3, 3))
     A.sort_indices()
     np.savez(
         path,
         data=A.data,
         indices=A.indices,
         indptr=A.indptr,
-        load=system.reduced.reduce(load),
+        load=system.constraint_map.reduce(load),
         points=system.points[free[:, 0] // 3],
     )

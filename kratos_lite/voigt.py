@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 NAMES = ("XX", "YY", "ZZ", "XY", "YZ", "ZX")
 PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
 """Tensor indices of the six components."""
+HALF_SHEAR = np.array([1, 1, 1, 0.5, 0.5, 0.5])
+"""Factors from engineering strains to the components of the tensor."""
 
 
 def tensor(stress: ArrayLike) -> Array:

@@ -7,6 +7,8 @@ from typing import Any
 
 from sphinx.util.docutils import SphinxDirective
 
+from kratos_lite.analysis.fields import FIELDS
+from kratos_lite.analysis.named_values import NAMES
 from kratos_lite.io.formats.mdpa.scan import LISTS, TOP
 from kratos_lite.io.kratos import (
     expected_values,
@@ -62,6 +64,15 @@ def _processes() -> list[str]:
     return _table(*rows, head="| process | keys of its `Parameters` |")
 
 
+def _fields() -> list[str]:
+    rows = []
+    for key, field in FIELDS.items():
+        variable = [field.kratos] if field.listed and field.kratos else []
+        pictures = [name for name, (of, _) in NAMES.items() if of == key]
+        rows.append((f"`{key}`", field.unit or "–", _code(variable), ", ".join(field.where), _code(pictures)))
+    return _table(*rows, head="| field | unit | in files | where | in pictures |")
+
+
 TABLES: dict[str, Callable[[], list[str]]] = {
     "blocks": lambda: [_code(TOP)],
     "lists": lambda: [_code(LISTS)],
@@ -72,5 +83,6 @@ TABLES: dict[str, Callable[[], list[str]]] = {
     "functions": lambda: [_code(sorted(expressions._FUNCTIONS))],
     "solver_settings": lambda: [_code(sorted(run_file.HARMLESS))],
     "dynamic": lambda: [_code(time_integration.DYNAMIC_KEYS)],
+    "fields": _fields,
     "ale": lambda: _table(*((f"`{k}`", _code(v)) for k, v in motion.KEYS.items()), head="| motion | keys |"),
 }

@@ -16,7 +16,7 @@ from kratos_lite.typing import Array, Ints, Mask
 from kratos_lite.voigt import acoustic_tensor
 
 FLAT = 1e-6
-"""Share of the length of the frame by which a cut face may be uneven."""
+"""Fraction of the length of the frame by which a cut face may be uneven."""
 
 
 def cut_nodes(mesh: Mesh, direction: Array, moving: Mask) -> tuple[Ints, Ints]:

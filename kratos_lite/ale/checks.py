@@ -9,7 +9,7 @@ from kratos_lite.ale.motion import Motion
 from kratos_lite.voigt import acoustic_tensor
 
 NEAR_CRITICAL = 0.9
-"""Share of the critical rate from which a warning is given."""
+"""Fraction of the critical rate from which a warning is given."""
 
 
 def wave_speeds(terms: MotionMatrices) -> tuple[float, float, float]:

@@ -12,7 +12,7 @@ from kratos_lite.assembly import gauss_point_fields
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.mass_and_convection import inertia_matrices
 from kratos_lite.assembly.sparsity_pattern import Pattern
-from kratos_lite.solvers.constrained_system import among
+from kratos_lite.solvers.constrained_system import select
 from kratos_lite.solvers.mass import Mass
 from kratos_lite.typing import Array, Ints, Mask
 from kratos_lite.voigt import tensor
@@ -53,7 +53,7 @@ class MotionMatrices:
         self.motion, self.points = motion, points
         self.pattern, self.mass = pattern, mass
         self.moving = np.ones(len(points), dtype=bool) if moving is None else moving
-        self.groups = among(groups, self.moving)
+        self.groups = select(groups, self.moving)
         self._made: dict[str, Array] = {}
 
     @property

@@ -38,7 +38,7 @@ from kratos_lite.validation import finite, number
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 LEAK = 1e-2
-"""Share of the velocity that may pass through the boundary before a warning is given."""
+"""Fraction of the velocity that may pass through the boundary before a warning is given."""
 TOO_LEAKY = 0.2
 """Share from which a body is not one of revolution, or not straight, at all."""
 
@@ -248,7 +248,7 @@ class Motion(Attachment):
 
         Returns
         -------
-        The largest share, 0 … 1.
+        The largest fraction, 0 … 1.
         """
         return leak(mesh, self.field, self.moving(mesh), self.open_faces(mesh))
 
@@ -262,10 +262,10 @@ class Motion(Attachment):
         """
         if structure.motion is not None:
             raise ModelError("the model has a motion already; there is one")
-        share = self.leak(structure.mesh)
-        if share > TOO_LEAKY:
+        fraction = self.leak(structure.mesh)
+        if fraction > TOO_LEAKY:
             raise ModelError(
-                f"the body is not {self.alike[0]} the axis {self.direction.tolist()}: {share:.0%} of the "
+                f"the body is not {self.alike[0]} the axis {self.direction.tolist()}: {fraction:.0%} of the "
                 f"velocity passes through its boundary; {self.cure}"
             )
         self._bind(structure)
@@ -285,9 +285,9 @@ class Motion(Attachment):
         -------
         One sentence each.
         """
-        share = self.leak(structure.mesh)
-        found = [f"{share:.1%} of the velocity passes {self.leak_cure}"] if share > LEAK else []
-        return found + check_ties(structure, self.moving(structure.mesh), self.field, self.travels)
+        fraction = self.leak(structure.mesh)
+        warnings = [f"{fraction:.1%} of the velocity passes {self.leak_cure}"] if fraction > LEAK else []
+        return warnings + check_ties(structure, self.moving(structure.mesh), self.field, self.travels)
 
 
 def _unit(direction: ArrayLike | str) -> Array:

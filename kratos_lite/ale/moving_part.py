@@ -19,18 +19,18 @@ def moving_nodes(mesh: Mesh, part: WhereElements) -> Mask:
     """Return the nodes (n,) of the elements of a part; ModelError if it shares one with other elements."""
     if part is None:
         return mesh.used_nodes()
-    mine = np.zeros(mesh.n_elements, dtype=bool)
-    mine[mesh.elements(part)] = True
-    if not mine.any():
+    in_part = np.zeros(mesh.n_elements, dtype=bool)
+    in_part[mesh.elements(part)] = True
+    if not in_part.any():
         raise ModelError("a part in motion needs one element at least; got none")
     moving, resting = np.zeros((2, mesh.n_nodes), dtype=bool)
     for block, at in with_rows(mesh.blocks):
-        moving[block.nodes[mine[at]]] = True
-        resting[block.nodes[~mine[at]]] = True
+        moving[block.nodes[in_part[at]]] = True
+        resting[block.nodes[~in_part[at]]] = True
     shared = np.flatnonzero(moving & resting)
     if len(shared):
         raise ModelError(
-            f"{mine.sum()} moving elements share {len(shared)} nodes with elements at rest, such as node "
+            f"{in_part.sum()} moving elements share {len(shared)} nodes with elements at rest, such as node "
             f"{mesh.node_ids[shared[0]]}: material cannot both flow and rest in one place; give each side "
             "its own nodes, and tie those along the normal of the face with model.constrain"
         )

@@ -107,15 +107,15 @@ class Rotation(Motion):
 
     def warnings(self, structure: Structure, groups: Sequence[ElementGroup]) -> list[str]:
         """Return the warnings about the motion of a structure, except those about its rate."""
-        found = super().warnings(structure, groups)
+        warnings = super().warnings(structure, groups)
         if any(lame_constants(group.material.C) is None for group in groups):
-            found.append("an anisotropic material is not axisymmetric unless its axes turn with the angle")
+            warnings.append("an anisotropic material is not axisymmetric unless its axes turn with the angle")
         moving = self.moving(structure.mesh)
         c = self.field(structure.mesh.points[moving])
-        is_held = np.abs(c[structure.supports.fixed[moving]]).max(initial=0.0) > 1e-9 * np.abs(c).max()
-        if not self.stiffening and not is_held:
-            found.append(
+        is_constrained = np.abs(c[structure.supports.fixed[moving]]).max(initial=0.0) > 1e-9 * np.abs(c).max()
+        if not self.stiffening and not is_constrained:
+            warnings.append(
                 "nothing holds the rotation about the axis: in the linear theory a free rotor is unstable at "
                 "any rate; fix the hub, or take stiffening=True"
             )
-        return found
+        return warnings

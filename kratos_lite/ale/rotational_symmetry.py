@@ -11,27 +11,27 @@ from kratos_lite.errors import ModelError
 HARMONICS = 12
 """Waves around the axis, or along the frame, that are looked for."""
 UNEVEN = 1e-2
-"""Share of a harmonic that is too much."""
+"""Fraction of a harmonic that is too much."""
 
 
 def check_materials(terms: MotionMatrices) -> None:
     """Raise ModelError if density or stiffness is not spread evenly about the axis, or along the frame."""
     if len({id(group.material) for group in terms.groups}) < 2:
         return
-    volume, *found = _harmonics(terms)
-    for what, values in zip(("density", *["stiffness"] * 3), found, strict=True):
-        share = np.abs(values[1:] / values[0] - volume[1:] / volume[0])
-        n = int(np.argmax(share))
-        if share[n] > UNEVEN:
+    volume, *integrals = _harmonics(terms)
+    for what, values in zip(("density", *["stiffness"] * 3), integrals, strict=True):
+        deviation = np.abs(values[1:] / values[0] - volume[1:] / volume[0])
+        n = int(np.argmax(deviation))
+        if deviation[n] > UNEVEN:
             raise ModelError(
                 f"the {what} of the body is not spread evenly {terms.motion.alike[1]} (harmonic {n + 1} is "
-                f"{share[n]:.1%}): shape, density and stiffness must be alike wherever the material moves to"
+                f"{deviation[n]:.1%}): shape, density and stiffness must be alike wherever material moves to"
             )
 
 
 def _harmonics(terms: MotionMatrices) -> NDArray[np.complex128]:
     """Return the integrals (5, 13) of 1, density and measures of C times r² e^{i n φ}, n = 0 … 12."""
-    found = np.zeros((5, HARMONICS + 1), dtype=complex)
+    integrals = np.zeros((5, HARMONICS + 1), dtype=complex)
     for group in terms.groups:
         C = group.material.C
         bulk, trace = C[:3, :3].sum(), np.trace(C)
@@ -41,5 +41,5 @@ def _harmonics(terms: MotionMatrices) -> NDArray[np.complex128]:
             element = group.at(terms.points, chunk)
             r, wave = terms.motion.phase(element.gauss_points(), terms.moving_points)
             powers = [((element.dV * r * r) * wave**n).sum() for n in range(HARMONICS + 1)]
-            found += measures[:, None] * powers
-    return found
+            integrals += measures[:, None] * powers
+    return integrals

@@ -20,7 +20,7 @@ from kratos_lite.validation import choice
 BOUNDARIES = ("absorbing", "periodic", "fixed", "natural")
 """What the two cut faces of a moving frame do."""
 FREE_BOUNDARIES = 0.7
-"""Share of the speed of Rayleigh waves at which frames with free or absorbing boundaries become critical."""
+"""Fraction of the Rayleigh speed from which frames with free or absorbing boundaries are critical."""
 
 
 class Translation(Motion):

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kratos_lite import voigt
+from kratos_lite.analysis.fields import FIELDS
 from kratos_lite.analysis.report import vector
 from kratos_lite.analysis.result import Result
 from kratos_lite.assembly.gauss_point_fields import volumes
@@ -85,8 +86,8 @@ class Comparison(Tabular):
         left = f", {self.outside} of them outside the second mesh and left out" if self.outside else ""
         return [
             ("compared", f"{len(self.nodes) + self.outside} nodes{left}; {how}"),
-            ("displacement", self.displacement.row("m")),
-            ("stress", self.stress.row("Pa")),
+            ("displacement", self.displacement.row(FIELDS["displacement"].unit)),
+            ("stress", self.stress.row(FIELDS["stress"].unit)),
             ("strain energy", f"{first:.6e} J and {second:.6e} J{change}"),
         ]
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kratos_lite import voigt
+from kratos_lite.analysis.fields import FIELDS
+from kratos_lite.analysis.integration_point_values import QUANTITIES, GaussPoints
 from kratos_lite.assembly.element_groups import ElementGroup, group_of_element
 from kratos_lite.assembly.gauss_point_fields import at_gauss, in_order, totals
 from kratos_lite.errors import InputError
@@ -64,7 +66,7 @@ class ElementFields:
 
             return in_order(self.groups, [extrapolated(points, g, u, stress=stress) for g in self.groups])
         if place == "node":
-            return self._recovery.nodal(u, stress=stress)
+            return self._nodal_stress if stress else self._recovery.nodal(u, stress=False)
         return self._averages(stress)[place == "averaged"]
 
     def at_located(self, located: Located, *, stress: bool = True, recovered: bool = False) -> Array:
@@ -150,13 +152,24 @@ class ElementFields:
         >>> bar.solve().stress("element")[:, 2].round(9).tolist()
         [5.0]
         """
-        if isinstance(at, str) and at == "node":
-            return self._nodal_stress
         return self._field(at, stress=True)
 
     @cached_property
     def _nodal_stress(self) -> Array:
-        return np.asarray(self._field("node", stress=True))
+        return self._recovery.nodal(self._strained)
+
+    @cached_property
+    def without_prestress(self) -> ElementFields:
+        """The same fields, with the stresses that the strains make."""
+        if all(group.prestress is None for group in self.groups):
+            return self
+        groups = [replace(group, prestress=None) for group in self.groups]
+        return ElementFields(self.mesh, groups, self._strained)
+
+    @property
+    def elastic(self) -> tuple[Array, Array]:
+        """Recovered strains and stresses (n, 6) in Pa without prestress."""
+        return self.strain("node"), self.without_prestress.stress("node")
 
     def stress_of_material(self, row: int) -> Array:
         """Return recovered stresses at the nodes of one material, which those of its neighbors do not change.
@@ -175,10 +188,46 @@ class ElementFields:
                 stress[region.nodes] = values
         return stress
 
-    def _derived(self, function: Callable[[Array], Array], at: str) -> Any:
-        """Return a function of the stresses at a place, of each element where these are a list."""
-        stress = self.stress(at)
-        return [function(s) for s in stress] if isinstance(stress, list) else function(stress)
+    def field(self, name: str, at: str = "gauss") -> Any:
+        """Return a field by its name in the table of fields.
+
+        Parameters
+        ----------
+        name : such as ``"stress"``, ``"von_mises"`` or ``"strain_energy_density"``.
+        at : as for `strain`, where the field has values there.  In an element a density is the mean over its
+            volume, an invariant is that of the mean stress.
+
+        Returns
+        -------
+        Shaped as by `strain`, with as many components as the field has; (m,), (n,), … of a scalar.
+
+        Raises
+        ------
+        InputError
+            There is no such field or place.
+
+        Examples
+        --------
+        >>> import kratos_lite as kl
+        >>> bar = kl.Model(kl.box((1, 1, 1)), kl.Isotropic3D(E=1e6, nu=0.0))
+        >>> bar.fix("z-")
+        >>> bar.add(kl.Traction("z+", (0, 0, 2e3)))
+        >>> bar.solve().field("strain_energy_density", "element").round(9).tolist()  # σ² / 2E in J/m³
+        [2.0]
+        """
+        field = FIELDS[choice(name, "a field", FIELDS)]
+        if name in ("strain", "stress"):
+            return self._field(at, stress=name == "stress")
+        if field.of:
+            tensor = self.field(field.of, at)
+            return [field.function(t) for t in tensor] if isinstance(tensor, list) else field.function(tensor)
+        place = choice(at, f"the place of the field {name}", field.where)
+        if "gauss" not in field.where or place == "node":
+            return self.u if name == "displacement" else field.at(self)
+        placed = [GaussPoints(self.mesh.points, group, self.u, self._strained) for group in self.groups]
+        if place == "gauss":
+            return in_order(self.groups, [field.at(values) for values in placed])
+        return in_order(self.groups, [values.mean(field.at(values)) for values in placed])
 
     def von_mises(self, at: str = "gauss") -> Any:
         """Return von Mises stresses.
@@ -196,7 +245,7 @@ class ElementFields:
         InputError
             There is no such place.
         """
-        return self._derived(voigt.von_mises, at)
+        return self.field("von_mises", at)
 
     def tresca(self, at: str = "gauss") -> Any:
         """Return Tresca stresses σ1 - σ3, twice the largest shear stress.
@@ -214,7 +263,7 @@ class ElementFields:
         InputError
             There is no such place.
         """
-        return self._derived(voigt.tresca, at)
+        return self.field("tresca", at)
 
     def principal_stresses(self, at: str = "gauss") -> Any:
         """Return principal stresses σ1 ≥ σ2 ≥ σ3.
@@ -241,7 +290,7 @@ class ElementFields:
         >>> (bar.solve().principal_stresses("element").round(9) + 0.0).tolist()
         [[0.0, 0.0, -5.0]]
         """
-        return self._derived(voigt.principal_values, at)
+        return self.field("principal_stresses", at)
 
     def principal_directions(self, at: str = "gauss") -> Any:
         """Return unit vectors along the principal axes of the stress.
@@ -261,7 +310,7 @@ class ElementFields:
         InputError
             There is no such place.
         """
-        return self._derived(voigt.principal_directions, at)
+        return self.field("principal_directions", at)
 
     def at_integration_points(self, name: str, element: int | None = None) -> Any:
         """Return a quantity at the integration points by its name in Kratos.
@@ -313,8 +362,6 @@ class ElementFields:
         >>> bool(abs(energy / result.energy() - 1) < 1e-12)
         True
         """
-        from kratos_lite.analysis.integration_point_values import QUANTITIES, GaussPoints  # rarely needed
-
         quantity = QUANTITIES[choice(name, "a quantity at integration points", QUANTITIES)]
         groups = self.groups if element is None else [group_of_element(self.mesh, self.groups, element)]
         made = [quantity(GaussPoints(self.mesh.points, g, self.u, self._strained)) for g in groups]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError
@@ -13,10 +13,8 @@ from kratos_lite.typing import Ints, Mask, Progress
 from kratos_lite.validation import choice
 
 if TYPE_CHECKING:
-    from kratos_lite.distributed.petsc_system import PetscSystem
     from kratos_lite.solvers.constraint_map import ConstraintMap
 
-System: TypeAlias = "ConstrainedSystem | PetscSystem"
 ENGINES = ("own", "petsc")
 
 
@@ -63,7 +61,7 @@ def system_of(
     progress: Progress | None,
     engine: str,
     petsc: str | None,
-) -> System:
+) -> ConstrainedSystem:
     """Return the constrained system of some elements of a model, for an engine.
 
     Components `held` (n, 3) of what supports leave free are 0, too.
@@ -91,14 +89,8 @@ def system_of(
         groups,
         constraints,
         started(),
+        petsc,
         solver=solver,
         tolerance=tolerance,
-        options=petsc,
         progress=progress,
     )
-
-
-def release(system: System) -> None:
-    """Release what PETSc holds of a system."""
-    if not isinstance(system, ConstrainedSystem):
-        system.destroy()

@@ -18,6 +18,7 @@ from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.linear_solver import LinearSolver
 from kratos_lite.solvers.mass import Mass
+from kratos_lite.solvers.plan import Plan, repeated
 from kratos_lite.typing import Array, Progress
 from kratos_lite.validation import finite
 
@@ -26,9 +27,6 @@ if TYPE_CHECKING:
 
 Solve: TypeAlias = Callable[[Array, Array], Array]
 """Takes nodal forces and prescribed displacements (3a,), returns displacements (3a,)."""
-
-DIRECT_MAX = 30_000
-"""Up to this many unknowns matrices are factorized, as they are needed many times."""
 
 
 class EquationsOfMotion:
@@ -118,7 +116,7 @@ class EquationsOfMotion:
     def held(self) -> NDArray[np.bool_]:
         """Which degrees of freedom (3a,) supports or constraints hold."""
         held = np.ones(self.size, dtype=bool)
-        held[self.system.reduced.free] = False
+        held[self.system.constraint_map.free] = False
         return held
 
     def load(self, time: float) -> Array:
@@ -187,8 +185,8 @@ class EquationsOfMotion:
         system, load = self.system, self.system.scatter(self.terms.centrifugal.ravel())
         cure = "let it turn about a principal axis through its center of mass"
         self.free_motions.check([load], moving=True, cure=cure)
-        held = system.reduced.holding(self.free_motions.held[system.nodes])
-        equations = LinearSolver(self.K, held, system.points, "direct", "")
+        held = system.constraint_map.holding(self.free_motions.held[system.nodes])
+        equations = LinearSolver(self.K, held, system.points, Plan("direct"))
         u0 = equations.solve(system.gather(load), 1e-12, system.progress, np.zeros_like(held.c)).x
         return self.terms.stiffening(u0.reshape(-1, 3))
 
@@ -276,10 +274,9 @@ class EquationsOfMotion:
         return not (acceleration or (rate and (c or damped)))
 
     def _solver(self, A: BlockMatrix, symmetric: bool) -> Solve:
-        reduced = self.system.reduced
-        iterate = symmetric and len(reduced.free) > DIRECT_MAX
-        method = "amg" if iterate else "direct"
-        equations = LinearSolver(A, reduced, self.system.points, method, "", symmetric=symmetric)
+        constraints = self.system.constraint_map
+        plan = repeated("auto", len(constraints.free), symmetric)
+        equations = LinearSolver(A, constraints, self.system.points, plan, symmetric=symmetric)
         return lambda f, prescribed: equations.solve(f, 1e-13, self.system.progress, prescribed).x
 
 

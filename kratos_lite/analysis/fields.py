@@ -1,56 +1,167 @@
-"""Fields of a result: of nodes and elements under their Kratos names, and columns of a table of its nodes."""
+"""Fields: the one table of what a result holds, which files, tables, pages and pictures read."""
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from operator import attrgetter
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
 
 from kratos_lite import voigt
-from kratos_lite.analysis.columns import stress_columns, vector_columns
+from kratos_lite.errors import KratosLiteError
 from kratos_lite.mesh import Mesh
 from kratos_lite.mesh.vtk import mesh_fields
 from kratos_lite.typing import Array, Numbers
 
+AXES = ("x", "y", "z")
+COMPONENTS = tuple(name.lower() for name in voigt.NAMES)
+PARTS: dict[str, tuple[str, ...]] = {
+    "scalar": (),
+    "vector": AXES,
+    "tensor": COMPONENTS,
+    "principal": ("1", "2", "3"),
+    "axes": (),
+}
+"""Kinds of fields and their parts; tensors are in Voigt order, principal values in descending order."""
+NODES, ELEMENTS, STATES = ("node",), ("element",), ("state",)
+INTERPOLATED = ("node", "gauss", "point")
+INTEGRATED = ("gauss", "element", "node", "point")
+EVERYWHERE = ("gauss", "element", "node", "averaged", "raw", "point")
 
-class Solution(Protocol):
-    """What fields are made of, a `Result`."""
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """A field of results."""
+
+    name: str  # in headings and legends
+    kratos: str  # its variable in Kratos and in files for ParaView, which hold it if there is one
+    unit: str  # in SI
+    kind: str  # a key of `PARTS`
+    # ``point`` is any point of the mesh, ``state`` the nodes in a state; others as of `ElementFields.stress`
+    where: tuple[str, ...]
+    function: Callable[[Any], Array]  # of the values at a place, such as `PointValues`; or of the tensor `of`
+    of: str = ""  # key of the tensor whose invariant it is
+    symbol: str = ""  # before the names of its parts, as in ``sxx``; pictures show no parts without it
+    listed: bool = True  # whether files and tables hold it
+    log: bool = False  # whether pictures show it on a logarithmic scale
+
+    @property
+    def nodal_place(self) -> str:
+        """Where pictures show it: at nodes if it is known there."""
+        return "node" if "node" in self.where else "element"
+
+    def at(self, values: Any) -> Array:
+        """Return the field (..., parts) from the values at a place."""
+        return self.function(getattr(values, self.of) if self.of else values)
+
+    def columns(self, values: Array) -> dict[str, Numbers]:
+        """Return the columns of a table from values (..., parts), by headers in ASCII.
+
+        >>> import numpy as np
+        >>> list(FIELDS["displacement"].columns(np.zeros((1, 3))))
+        ['displacement x [m]', 'displacement y [m]', 'displacement z [m]']
+        """
+        parts, unit = PARTS[self.kind], self.unit.replace("³", "3")
+        if not parts:
+            return {f"{self.name} [{unit}]": values.ravel()}
+        flat = values.reshape(-1, len(parts))
+        return {f"{self.name} {part} [{unit}]".lstrip(): flat[:, i] for i, part in enumerate(parts)}
+
+
+def _strain_energy_density(at: Any) -> Array:
+    """Return ½ ε:C:ε: no part of it is the work of the prestress."""
+    strain, stress = at.elastic
+    return (strain * stress).sum(axis=-1) / 2
+
+
+def _error_of_elements(result: Any) -> Array:
+    return np.asarray(result.error().per_element)
+
+
+def _principal_strains(strain: Array) -> Array:
+    return voigt.principal_values(strain * voigt.HALF_SHEAR)
+
+
+FIELDS: dict[str, Field] = {
+    "displacement": Field(
+        "displacement", "DISPLACEMENT", "m", "vector", INTERPOLATED, attrgetter("displacement"), symbol="u"
+    ),
+    "reaction": Field("reaction", "REACTION", "N", "vector", NODES, attrgetter("reactions")),
+    "stress": Field(
+        "stress", "CAUCHY_STRESS_VECTOR", "Pa", "tensor", EVERYWHERE, attrgetter("stress"), symbol="s"
+    ),
+    "von_mises": Field(
+        "von Mises stress", "VON_MISES_STRESS", "Pa", "scalar", EVERYWHERE, voigt.von_mises, "stress"
+    ),
+    "tresca": Field("Tresca stress", "", "Pa", "scalar", EVERYWHERE, voigt.tresca, "stress"),
+    "principal_stresses": Field(
+        "principal stress", "", "Pa", "principal", EVERYWHERE, voigt.principal_values, "stress", "s"
+    ),
+    "principal_directions": Field(
+        "principal axes", "", "", "axes", EVERYWHERE, voigt.principal_directions, "stress", listed=False
+    ),
+    "strain": Field(
+        "strain", "GREEN_LAGRANGE_STRAIN_VECTOR", "", "tensor", EVERYWHERE, attrgetter("strain"),
+        symbol="e", listed=False,
+    ),
+    "principal_strains": Field(
+        "principal strain", "", "", "principal", EVERYWHERE, _principal_strains, "strain", "e", listed=False
+    ),
+    "strain_energy_density": Field(
+        "strain energy density", "STRAIN_ENERGY", "J/m³", "scalar", INTEGRATED, _strain_energy_density
+    ),
+    "error": Field(
+        "estimated error", "ENERGY_NORM_ERROR", "√J", "scalar", ELEMENTS, _error_of_elements, log=True
+    ),
+    "velocity": Field("velocity", "VELOCITY", "m/s", "vector", STATES, attrgetter("v")),
+    "acceleration": Field("acceleration", "ACCELERATION", "m/s²", "vector", STATES, attrgetter("a")),
+}  # fmt: skip
+PLACE = Field("", "", "m", "vector", INTERPOLATED, attrgetter("points"))
+
+
+@runtime_checkable
+class Fields(Protocol):
+    """What a result offers."""
 
     mesh: Mesh
     u: Array
-    reactions: Array
 
-    def stress(self, at: str) -> Any:
-        """Return stresses in Pa, of elements (m, 6) or recovered at nodes (n, 6)."""
-
-    def error(self) -> Any:
-        """Return the estimated error."""
+    def field(self, name: str, at: str) -> Any:
+        """Return a field at a place."""
 
 
-def fields(result: Solution) -> tuple[dict[str, Numbers], dict[str, Numbers]]:
-    """Return point data and cell data of a result, as files and viewers hold them."""
-    points, cells = mesh_fields(result.mesh)
-    nodal, mean = result.stress("node"), result.stress("element")
-    points = {
-        "DISPLACEMENT": result.u,
-        "REACTION": result.reactions,
-        "CAUCHY_STRESS_VECTOR": nodal,
-        "VON_MISES_STRESS": voigt.von_mises(nodal),
-        **points,
-    }
-    cells = {
-        "CAUCHY_STRESS_VECTOR": mean,
-        "VON_MISES_STRESS": voigt.von_mises(mean),
-        "ENERGY_NORM_ERROR": result.error().per_element,
-        **cells,
-    }
+def listed(place: str) -> dict[str, Field]:
+    """Return the fields of a place that files and tables hold."""
+    return {name: field for name, field in FIELDS.items() if field.listed and place in field.where}
+
+
+def fields(result: Fields) -> tuple[dict[str, Numbers], dict[str, Numbers]]:
+    """Return point data and cell data of a result by Kratos's names, as files and viewers hold them."""
+    points, cells = (
+        {field.kratos: result.field(name, place) for name, field in listed(place).items() if field.kratos}
+        | ids
+        for place, ids in zip(("node", "element"), mesh_fields(result.mesh), strict=True)
+    )
     return points, cells
 
 
-def nodal_columns(result: Solution) -> dict[str, Numbers]:
-    """Return ids, places, displacements, reactions and recovered stresses of the nodes."""
-    return {
-        "node": result.mesh.node_ids,
-        **vector_columns("", result.mesh.points, "m"),
-        **vector_columns("displacement", result.u, "m"),
-        **vector_columns("reaction", result.reactions, "N"),
-        **stress_columns(result.stress("node")),
-    }
+def nodal_columns(result: Fields) -> dict[str, Numbers]:
+    """Return ids, places and the fields of the nodes."""
+    columns = {"node": result.mesh.node_ids, **PLACE.columns(result.mesh.points)}
+    for name, field in listed("node").items():
+        columns |= field.columns(result.field(name, "node"))
+    return columns
+
+
+def data_frame(columns: Mapping[str, Numbers]) -> Any:
+    """Return columns as a data frame of pandas; KratosLiteError if pandas is not installed."""
+    try:
+        from pandas import DataFrame
+    except ImportError as error:
+        raise KratosLiteError(
+            "data frames need pandas: pip install pandas; kl.write('values.csv', ...) writes the same table "
+            "without it"
+        ) from error
+    return DataFrame(columns)

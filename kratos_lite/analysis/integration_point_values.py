@@ -9,28 +9,21 @@ from functools import cached_property
 import numpy as np
 
 from kratos_lite import voigt
+from kratos_lite.analysis.fields import FIELDS
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.assembly.gauss_point_fields import at_gauss
+from kratos_lite.assembly.gauss_point_fields import at_gauss, volumes
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.typing import Array
 
 
 @dataclass(eq=False)
 class GaussPoints:
-    """The g Gauss points of m elements.
+    """The g Gauss points of m elements."""
 
-    Attributes
-    ----------
-    points : (n, 3) in m, the nodes of the mesh.
-    group : the elements.
-    u : (n, 3) in m, the displacement.
-    strained : (n, 3) in m, the displacement without its stress-free part.
-    """
-
-    points: Array
-    group: ElementGroup
-    u: Array
-    strained: Array
+    points: Array  # (n, 3) in m, the nodes of the mesh
+    group: ElementGroup  # the elements
+    u: Array  # (n, 3) in m, the displacement
+    strained: Array  # (n, 3) in m, the displacement without its stress-free part
 
     @cached_property
     def element(self) -> KinematicLinear:
@@ -42,30 +35,31 @@ class GaussPoints:
         """Shape functions (g, k)."""
         return self.element._N(self.group.rule)
 
+    @property
     def strain(self) -> Array:
-        """Return ε (m, g, 6), engineering shear."""
+        """ε (m, g, 6), engineering shear."""
         return at_gauss(self.points, self.group, self.strained, stress=False)
 
-    def strain_tensor(self) -> Array:
-        """Return ε (m, g, 3, 3)."""
-        return voigt.tensor(self.strain() * [1, 1, 1, 0.5, 0.5, 0.5])
-
+    @property
     def stress(self) -> Array:
-        """Return σ (m, g, 6) in Pa, with the prestress."""
+        """σ (m, g, 6) in Pa, with the prestress."""
         return at_gauss(self.points, self.group, self.strained)
 
-    def stress_tensor(self) -> Array:
-        """Return σ (m, g, 3, 3) in Pa."""
-        return voigt.tensor(self.stress())
+    @property
+    def elastic(self) -> tuple[Array, Array]:
+        """ε and the stress (m, g, 6) in Pa without prestress."""
+        strain = self.strain
+        return strain, self.group.stress(strain)
 
-    def von_mises(self) -> Array:
-        """Return the von Mises stress (m, g) in Pa."""
-        return voigt.von_mises(self.stress())
+    @property
+    def displacement(self) -> Array:
+        """Displacement (m, g, 3) in m."""
+        return self.N @ self.u[self.group.nodes]
 
-    def energy_density(self) -> Array:
-        """Return ½ ε:C:ε (m, g) in J/m³."""
-        strain = self.strain()
-        return (strain * self.group.stress(strain)).sum(axis=-1) / 2
+    def mean(self, values: Array) -> Array:
+        """Return the means over the volume of each element (m, ...) of values (m, g, ...)."""
+        volume = volumes(self.points, self.group)
+        return np.asarray(np.einsum("mg,mg...->m...", volume / volume.sum(axis=1, keepdims=True), values))
 
     def elasticity(self) -> Array:
         """Return C (m, g, 6, 6) in Pa of the material."""
@@ -87,26 +81,27 @@ class GaussPoints:
         """Return ξ (m, g, 3)."""
         return np.tile(self.group.rule.points, (len(self.group), 1, 1))
 
-    def displacement(self) -> Array:
-        """Return u (m, g, 3) in m."""
-        return self.N @ self.u[self.group.nodes]
-
     def B(self) -> Array:
         """Return B (m, g, 6, 3k) in 1/m."""
         return self.element._operator(self.group.material.C)
 
 
+def _stress_tensor(at: GaussPoints) -> Array:
+    return voigt.tensor(at.stress)
+
+
+def _strain_tensor(at: GaussPoints) -> Array:
+    return voigt.tensor(at.strain * voigt.HALF_SHEAR)
+
+
 QUANTITIES: dict[str, Callable[[GaussPoints], Array]] = {
-    "CAUCHY_STRESS_VECTOR": GaussPoints.stress,
-    "CAUCHY_STRESS_TENSOR": GaussPoints.stress_tensor,
-    "PK2_STRESS_VECTOR": GaussPoints.stress,
-    "PK2_STRESS_TENSOR": GaussPoints.stress_tensor,
-    "STRESSES": GaussPoints.stress,
-    "VON_MISES_STRESS": GaussPoints.von_mises,
-    "GREEN_LAGRANGE_STRAIN_VECTOR": GaussPoints.strain,
-    "GREEN_LAGRANGE_STRAIN_TENSOR": GaussPoints.strain_tensor,
-    "STRAIN": GaussPoints.strain,
-    "STRAIN_ENERGY": GaussPoints.energy_density,
+    **{field.kratos: field.at for field in FIELDS.values() if field.kratos and "gauss" in field.where},
+    "CAUCHY_STRESS_TENSOR": _stress_tensor,
+    "PK2_STRESS_VECTOR": FIELDS["stress"].at,
+    "PK2_STRESS_TENSOR": _stress_tensor,
+    "STRESSES": FIELDS["stress"].at,
+    "GREEN_LAGRANGE_STRAIN_TENSOR": _strain_tensor,
+    "STRAIN": FIELDS["strain"].at,
     "CONSTITUTIVE_MATRIX": GaussPoints.elasticity,
     "JACOBIAN": GaussPoints.jacobian,
     "JACOBIAN_0": GaussPoints.jacobian,
@@ -114,7 +109,6 @@ QUANTITIES: dict[str, Callable[[GaussPoints], Array]] = {
     "INTEGRATION_COORDINATES": GaussPoints.place,
     "INTEGRATION_POINT_GLOBAL": GaussPoints.place,
     "INTEGRATION_POINT_LOCAL": GaussPoints.reference_place,
-    "DISPLACEMENT": GaussPoints.displacement,
     "STRAIN_INTERPOLATION_OPERATOR": GaussPoints.B,
 }
 """What is known at Gauss points by Kratos's names; strains are small, so that all stress measures agree.

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from kratos_lite.analysis.columns import COMPONENTS
 from kratos_lite.analysis.element_fields import ElementFields
+from kratos_lite.analysis.fields import COMPONENTS, FIELDS
 from kratos_lite.analysis.point_values import PointValues
 from kratos_lite.mesh.crossings import crossings
 from kratos_lite.quadrature.gauss import legendre
@@ -79,8 +79,8 @@ class LineValues(PointValues):
     @property
     def linear(self) -> Array:
         """Membrane and bending stress σ_m + σ_b (1 - 2 x / t) together, (n, 6) in Pa."""
-        share = self.distance[:, None] / self.distance[-1]
-        return self.membrane + self.bending * (1 - 2 * share)
+        fraction = self.distance[:, None] / self.distance[-1]
+        return self.membrane + self.bending * (1 - 2 * fraction)
 
     @property
     def peak(self) -> Array:
@@ -88,7 +88,7 @@ class LineValues(PointValues):
         return self.stress - self.linear
 
     def columns(self) -> dict[str, Numbers]:
-        """Return distance, coordinates, displacements and stresses, with units in the headers.
+        """Return distance, coordinates and fields, with units in the headers.
 
         Returns
         -------
@@ -110,8 +110,7 @@ class LineValues(PointValues):
         Parameters
         ----------
         path : picture to write; .png, .pdf or .svg.
-        values : ``von_mises``, ``tresca``, ``s1``, ``s2``, ``s3``, ``sxx`` … ``szx``, ``displacement``,
-            ``ux``, ``uy``, ``uz``, or strains ``e1`` … ``ezx``.
+        values : a field by its name in pictures, as for `kratos_lite.plot`, but for reactions and errors.
         title : above the picture.
         size : width and height in inches, at 150 dots per inch.
 
@@ -126,12 +125,12 @@ class LineValues(PointValues):
         KratosLiteError
             matplotlib is missing.
         """
-        from kratos_lite.analysis.named_values import NAMES, local_values  # pictures alone need these
+        from kratos_lite.analysis.named_values import NAMES, named_values  # pictures alone need these
         from kratos_lite.view.canvas import checked_size, save
-        from kratos_lite.view.curves import curves_figure
+        from kratos_lite.view.curves import line_figure
 
-        choice(values, "values", [name for name in NAMES if name not in ("reaction", "error")])
-        shown = local_values(values, self.displacement, lambda: self.strain, lambda: self.stress)
+        choice(values, "values", [n for n, (field, _) in NAMES.items() if "point" in FIELDS[field].where])
+        shown = named_values(values, lambda name: getattr(self, name))
         curves = {shown.title: shown.numbers}
         if shown.unit == "Pa":
             seen = np.abs(shown.numbers) > ZERO * np.abs(self.stress).max()
@@ -140,9 +139,7 @@ class LineValues(PointValues):
             i = COMPONENTS.index(values[1:])
             curves["membrane and bending"] = self.linear[:, i]
             curves["membrane"] = np.full(len(self.distance), self.membrane[i])
-        figure = curves_figure(
-            self.distance, curves, unit=shown.unit, title=title, size=checked_size(size) or (6, 4)
-        )
+        figure = line_figure(self.distance, curves, shown.unit, title, checked_size(size) or (6, 4))
         if path is not None:
             save(figure, path)
         return figure

@@ -13,7 +13,8 @@ from kratos_lite.errors import InputError
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers import direct
 from kratos_lite.solvers.constraint_map import rigid_modes
-from kratos_lite.solvers.eigen import DENSE_MODES, modes
+from kratos_lite.solvers.eigen import modes
+from kratos_lite.solvers.plan import DENSE_MODES
 from kratos_lite.solvers.quadratic_eigen import Pencil, neutral_motions
 from kratos_lite.typing import Array, Complexes, Progress
 from kratos_lite.validation import whole_number
@@ -53,7 +54,7 @@ def complex_modes(
 
 def _rigid_motions(e: EquationsOfMotion) -> Array:
     """Return the rigid motions (q, k) that supports and constraints leave to the model as a whole."""
-    constraints = e.system.reduced
+    constraints = e.system.constraint_map
     rigid = rigid_modes(e.system.points)
     rigid = rigid / np.linalg.norm(rigid, axis=0)
     missed = constraints.transform(rigid[constraints.free]) - rigid
@@ -158,12 +159,12 @@ def _dense(K: Any, H: Any) -> Array:
 
 def reduced(equations: EquationsOfMotion, A: BlockMatrix) -> Any:
     """Return T^T A T on the free degrees of freedom as CSR."""
-    return equations.system.reduced.reduce_matrix(A.scipy().tocsr())
+    return equations.system.constraint_map.reduce_matrix(A.scipy().tocsr())
 
 
 def expanded(equations: EquationsOfMotion, shapes: Any) -> Any:
     """Return shapes on the free degrees of freedom (q, k) as nodal ones (k, n, 3), 0 where held."""
     system, count = equations.system, shapes.shape[1]
     out = np.zeros((count, system.n_nodes, 3), dtype=shapes.dtype)
-    out[:, system.nodes] = system.reduced.transform(shapes).T.reshape(count, -1, 3)
+    out[:, system.nodes] = system.constraint_map.transform(shapes).T.reshape(count, -1, 3)
     return out

@@ -43,13 +43,7 @@ def path_figure(body: Body, given: dict[str, Any]) -> Any:
         rows[:, 0],
         {name: rows[:, i] for i, name in enumerate(ENERGIES, 1) if rows[:, i].any()},
     )
-    return trajectory_figure(
-        path,
-        view=given["view"],
-        title=given["title"] or "",
-        unit="energy in J",
-        size=given["size"] or (8, 8),
-    )
+    return trajectory_figure(path, given["view"], given["title"] or "", given["size"] or (8, 8))
 
 
 def states_of(body: Body, states: Any) -> list[State]:

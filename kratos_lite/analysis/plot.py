@@ -20,8 +20,8 @@ from kratos_lite.shapes import Shape
 from kratos_lite.validation import number, short, whole_number
 from kratos_lite.view import canvas
 from kratos_lite.view.camera import View
+from kratos_lite.view.curves import convergence_figure
 from kratos_lite.view.figure import figure_of
-from kratos_lite.view.history import history_figure
 from kratos_lite.view.reference_cell import element_figure
 
 OF_STATES = 120
@@ -57,10 +57,9 @@ def plot(
         `states`; the ``report`` of a solution to a requested error, error against unknowns; or the class of
         an element or a shape, with its node numbers (from 0) and Gauss points.
     path : picture to write; .png, .pdf or .svg.
-    values : what colors the surface: (n,) numbers of nodes, (m,) of elements; of a result also a name:
-        ``displacement``, ``ux``, ``uy``, ``uz``, ``reaction``, ``von_mises``, ``tresca``, principal stresses
-        ``s1``, ``s2``, ``s3``, components ``sxx``, ``syy``, ``szz``, ``sxy``, ``syz``, ``szx``, the same of
-        the strain as ``e1`` … ``ezx``, or ``error``, the estimate of each element.
+    values : what colors the surface: (n,) numbers of nodes, (m,) of elements; of a result also the name of a
+        field, such as ``displacement``, ``reaction``, ``von_mises``, ``tresca`` or ``error``, or of a part of
+        one: ``ux``, stresses ``sxx`` … ``szx``, principal ones ``s1`` … ``s3``, strains ``exx``, ``e1``, …
     displacement : (n, 3) m, in place of that of a result; the undeformed edges are drawn thin.
     modes : (n, 3) or (k, n, 3), shapes of modes of a mesh or model, side by side; the largest displacement of
         each is shown as a tenth of the body.
@@ -223,9 +222,7 @@ def _history(report: Report, given: dict[str, Any]) -> Any:
         np.array([getattr(s, name) for s in report.history]) for name in ("unknowns", "error")
     )
     title, size = given["title"] or "", given["size"] or (6, 4)
-    return history_figure(
-        unknowns, errors, goal=report.error_asked, of=report.error_of, title=title, size=size
-    )
+    return convergence_figure(unknowns, errors, report.error_asked, report.error_of, title, size)
 
 
 def _element(kind: type, points: ArrayLike | None) -> Any:

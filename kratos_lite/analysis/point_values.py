@@ -5,15 +5,18 @@ from __future__ import annotations
 from functools import cached_property
 from typing import Any
 
-from kratos_lite import voigt
-from kratos_lite.analysis.columns import data_frame, stress_columns, vector_columns
 from kratos_lite.analysis.element_fields import ElementFields
+from kratos_lite.analysis.fields import FIELDS, PLACE, data_frame, listed
+from kratos_lite.errors import nearest
 from kratos_lite.mesh.locate import Located
 from kratos_lite.typing import Array, Numbers
 
 
 class PointValues:
     """Values of a result at points (...) of its mesh, each computed when it is first asked for.
+
+    Beside the attributes below, it has every field that the table of fields knows at points: ``von_mises``,
+    ``tresca``, ``principal_stresses``, ``principal_directions``, ``strain_energy_density``, …
 
     Those of a face between elements, where strains jump, are of the element in the lowest row.
 
@@ -55,38 +58,34 @@ class PointValues:
         return self._fields.at_located(self._located, recovered=self._recovered)
 
     @property
-    def von_mises(self) -> Array:
-        """Von Mises stresses (...) in Pa."""
-        return voigt.von_mises(self.stress)
+    def elastic(self) -> tuple[Array, Array]:
+        """Strains and stresses (..., 6) in Pa without prestress, both recovered, or both of B u."""
+        strain, stress = (
+            self._fields.without_prestress.at_located(self._located, stress=stress, recovered=self._recovered)
+            for stress in (False, True)
+        )
+        return strain, stress
 
-    @property
-    def tresca(self) -> Array:
-        """Tresca stresses σ1 - σ3 (...) in Pa, twice the largest shear stress."""
-        return voigt.tresca(self.stress)
+    def __getattr__(self, name: str) -> Array:
+        if name not in FIELDS or "point" not in FIELDS[name].where:
+            raise AttributeError(f"{type(self).__name__} has no field {name!r}.{nearest(name, FIELDS, 1)}")
+        return FIELDS[name].at(self)
 
-    @property
-    def principal_stresses(self) -> Array:
-        """Principal stresses σ1 ≥ σ2 ≥ σ3 (..., 3) in Pa."""
-        return voigt.principal_values(self.stress)
-
-    @property
-    def principal_directions(self) -> Array:
-        """Unit vectors along the principal axes of the stress, rows (..., 3, 3) as σ1 ≥ σ2 ≥ σ3."""
-        return voigt.principal_directions(self.stress)
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *FIELDS]
 
     def columns(self) -> dict[str, Numbers]:
-        """Return coordinates, displacements and stresses of the points in a row, with units in the headers.
+        """Return coordinates and fields of the points in a row, with units in the headers.
 
         Returns
         -------
         dict of str to (k,) array
             ``kl.write("values.csv", values)`` writes them.
         """
-        return {
-            **vector_columns("", self.points.reshape(-1, 3), "m"),
-            **vector_columns("displacement", self.displacement.reshape(-1, 3), "m"),
-            **stress_columns(self.stress.reshape(-1, 6)),
-        }
+        columns = PLACE.columns(self.points)
+        for field in listed("point").values():
+            columns |= field.columns(field.at(self))
+        return columns
 
     def to_dataframe(self) -> Any:
         """Return the columns as a data frame of pandas.

@@ -8,7 +8,6 @@ from functools import cached_property
 
 import numpy as np
 
-from kratos_lite.analysis.engines import System
 from kratos_lite.analysis.nodal_loads import external_loads, initial_loads
 from kratos_lite.analysis.solution_checks import Phases
 from kratos_lite.assembly.element_groups import ElementGroup
@@ -18,6 +17,7 @@ from kratos_lite.model.free_motions import FreeMotions
 from kratos_lite.model.loads import Load
 from kratos_lite.model.structure import Structure
 from kratos_lite.model.supports import Supports
+from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.typing import Array, Ints, Mask
 
 
@@ -90,7 +90,7 @@ class Equations:
     `prescribed` (3a,) is what supports prescribe where it differs from that of the system.
     """
 
-    system: System
+    system: ConstrainedSystem
     components: Mask
     n_at_rest: int
     prescribed: Array | None = None

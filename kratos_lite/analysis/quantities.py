@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
 
-from kratos_lite import voigt
+from kratos_lite.analysis.fields import COMPONENTS
 from kratos_lite.assembly.element_groups import ElementGroup, add_nodal
 from kratos_lite.assembly.gauss_point_fields import body_force, volumes
 from kratos_lite.elements.tables import tabulate
@@ -21,8 +21,6 @@ from kratos_lite.validation import choice, finite
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
-
-COMPONENTS = tuple(name.lower() for name in voigt.NAMES)
 
 
 class Solved(Protocol):

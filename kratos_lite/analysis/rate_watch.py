@@ -7,8 +7,9 @@ import logging
 import numpy as np
 
 from kratos_lite.ale.checks import critical_rate_estimate, near_critical
-from kratos_lite.analysis.equations_of_motion import DIRECT_MAX, EquationsOfMotion
+from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.modal import critical_rates
+from kratos_lite.solvers.plan import REPEATED_LIMIT
 
 _log = logging.getLogger("kratos_lite")
 
@@ -29,11 +30,11 @@ class RateWatch:
     def __init__(self, e: EquationsOfMotion) -> None:
         self.equations, self.critical = e, np.inf
         self.of_mesh: float | None = None
-        free = len(e.system.reduced.free)
+        free = len(e.system.constraint_map.free)
         self._done = e.terms is None or not free or (e.terms.motion.steady and not e.rates(0.0)[0])
         if e.terms is None or self._done:
             return
-        if free <= DIRECT_MAX and not e.free_motions.any:
+        if free <= REPEATED_LIMIT and not e.free_motions.any:
             self.critical = self.of_mesh = float(critical_rates(e, 1)[0])
         else:
             self.critical = critical_rate_estimate(e.terms)

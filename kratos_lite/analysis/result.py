@@ -291,7 +291,7 @@ class Result(ElementFields, Tabular):
         KratosLiteError
             pandas is not installed.
         """
-        from kratos_lite.analysis.columns import data_frame
+        from kratos_lite.analysis.fields import data_frame
 
         return data_frame(self.columns())
 

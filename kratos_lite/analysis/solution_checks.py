@@ -13,9 +13,10 @@ from kratos_lite.errors import InputError, SolveError
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.checks import equilibrium
 from kratos_lite.model.structure import Structure
-from kratos_lite.solvers.linear_solver import Solution, choose
+from kratos_lite.solvers.linear_solver import Solution
+from kratos_lite.solvers.plan import METHODS
 from kratos_lite.typing import Array, Progress
-from kratos_lite.validation import function_or_none
+from kratos_lite.validation import choice, function_or_none
 
 
 class Phases:
@@ -44,7 +45,7 @@ def check_arguments(solver: str, tolerance: float) -> None:
     """Raise InputError for an unknown solver, or a tolerance beyond 0 … 1."""
     if isinstance(tolerance, bool) or not isinstance(tolerance, (float, int)) or not 0 < tolerance < 1:
         raise InputError(f"tolerance must be a number between 0 and 1; got {tolerance!r}")
-    choose(solver, 0)
+    choice(solver, "solver", METHODS)
 
 
 def quality(solution: Solution, balance: tuple[float, float]) -> dict[str, Any]:

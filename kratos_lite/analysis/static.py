@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kratos_lite.analysis.engines import System, engine_of, release, system_of
+from kratos_lite.analysis.engines import engine_of, system_of
 from kratos_lite.analysis.nodal_loads import stress_load
 from kratos_lite.analysis.origin import Origin
 from kratos_lite.analysis.prepared import (
@@ -34,7 +34,7 @@ from kratos_lite.model import checks
 from kratos_lite.model.equal import equal_loads
 from kratos_lite.model.loads import Load
 from kratos_lite.model.structure import Structure
-from kratos_lite.solvers.constrained_system import among
+from kratos_lite.solvers.constrained_system import ConstrainedSystem, select
 from kratos_lite.solvers.linear_solver import Solution
 from kratos_lite.typing import Array, Mask, Progress
 from kratos_lite.validation import finite
@@ -89,7 +89,7 @@ class StaticAnalysis:
         self._prepare()
 
     @property
-    def system(self) -> System | None:
+    def system(self) -> ConstrainedSystem | None:
         """The system that is solved, or None as long as nothing has moved."""
         return self._equations.system if self._equations else None
 
@@ -198,7 +198,10 @@ class StaticAnalysis:
         if known is None or (moving & ~known.components).any():
             components = moving if known is None else moving | known.components
             nodes = components[state.component] & state.used
-            every, groups = among(state.groups, nodes), among(state.groups, nodes & ~self._dirichlet.at_rest)
+            every, groups = (
+                select(state.groups, nodes),
+                select(state.groups, nodes & ~self._dirichlet.at_rest),
+            )
             how = state.free.held, self.solver, self.tolerance, self.progress, self.engine, self.petsc
             system = system_of(self.model, groups, *how)  # which may be refused; the one before stays then
             self.release()
@@ -250,7 +253,7 @@ class StaticAnalysis:
     def release(self) -> None:
         """Release the matrix and what is made of it; another solution makes them anew."""
         if self._equations is not None:
-            release(self._equations.system)
+            self._equations.system.destroy()
         self._equations = None
 
     def adjoint(self, load: Array, motion: Array) -> Array:
@@ -308,7 +311,7 @@ class StaticAnalysis:
         """Return displacements (n, 3) that are 0 but for what is prescribed."""
         return np.where(self.model.supports.fixed, self.model.supports.values, 0.0)
 
-    def _complete(self, u: Array, system: System, moving: Mask) -> Array:
+    def _complete(self, u: Array, system: ConstrainedSystem, moving: Mask) -> Array:
         """Fill in what is prescribed on nodes without equations; parts that nothing moves stay at rest."""
         if len(system.nodes) < len(u):
             rest = self._at_rest()

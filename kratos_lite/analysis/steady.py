@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from kratos_lite.ale.checks import critical_rate_estimate, near_critical
 from kratos_lite.analysis.derived_quantities import motion_summary
-from kratos_lite.analysis.equations_of_motion import DIRECT_MAX, EquationsOfMotion
+from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.modal import critical_rates, critical_rates_beside
 from kratos_lite.analysis.nodal_loads import initial_loads, stress_load
 from kratos_lite.analysis.report import Report
@@ -16,6 +16,7 @@ from kratos_lite.model.equal import equal_loads
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.direct import Factorization
 from kratos_lite.solvers.linear_solver import LinearSolver
+from kratos_lite.solvers.plan import repeated
 from kratos_lite.typing import Progress
 
 
@@ -42,8 +43,8 @@ def solve_steady(
     with phase("assemble"):
         A, symmetric = e.matrix(0.0, 0.0, 0.0, 1.0), e.is_symmetric(0.0, 0.0)
     with phase("solve"):
-        method, why = _way(e, solver, symmetric)
-        equations = LinearSolver(A, e.system.reduced, e.system.points, method, why, symmetric=symmetric)
+        plan = repeated(solver, len(e.system.constraint_map.free), symmetric)
+        equations = LinearSolver(A, e.system.constraint_map, e.system.points, plan, symmetric=symmetric)
         solution = equations.solve(forces, tolerance, progress)
     with phase("verify"):
         u = solution.x
@@ -63,7 +64,7 @@ def solve_steady(
             limit = critical_rate_estimate(e.terms) if critical is None else critical
             warnings += near_critical(e.terms.motion, 0.0, limit, critical is not None)
     report = Report(
-        unknowns=len(e.system.reduced.free),
+        unknowns=len(e.system.constraint_map.free),
         total_load=nodal.sum(axis=0),
         total_reaction=reactions.sum(axis=0),
         **quality(solution, balance),
@@ -77,18 +78,6 @@ def solve_steady(
     result = Result(model.mesh, e.groups, e.system.scatter(u), reactions, nodal, report, u0)
     report.motion = motion_summary(e, result, critical)
     return result
-
-
-def _way(e: EquationsOfMotion, solver: str, symmetric: bool) -> tuple[str, str]:
-    """Return how the equations are solved, and why so."""
-    if not symmetric:
-        return "direct", "the matrix of a motion with damping is not symmetric"
-    n = len(e.system.reduced.free)
-    if solver in ("direct", "amg"):
-        return solver, "asked for"
-    if n <= DIRECT_MAX:
-        return "direct", f"{n} unknowns ≤ {DIRECT_MAX}: the factors give critical rates, too"
-    return "amg", f"{n} unknowns > {DIRECT_MAX}: multigrid takes least memory"
 
 
 def _critical_rate(e: EquationsOfMotion, factors: Factorization | None) -> float:

@@ -8,7 +8,8 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from kratos_lite.analysis.named_values import MOTIONS, Fields, motion_values, named_values
+from kratos_lite.analysis.fields import Fields
+from kratos_lite.analysis.named_values import MOTIONS, named_values, nodal_values
 from kratos_lite.analysis.state import State
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh
@@ -156,11 +157,12 @@ def _values(result: Fields | None, mesh: Mesh, u: Array | None, given: dict[str,
     if isinstance(values, str) or (values is None and result is not None):
         name = DEFAULT if values is None else values
         if u is not None and name in MOTIONS:
-            named = motion_values(u, name)
+            shape = u
+            named = named_values(name, lambda _: shape)
         elif result is None:
-            raise InputError(f"a mesh or a model has no values {name!r}; solve it, or give an array")
+            raise InputError(f"a mesh or a model has no field {name!r}; solve it, or give an array")
         else:
-            named = named_values(result, name)
+            named = nodal_values(result, name)
         return named if unit is None else replace(named, unit=unit)
     if values is None:
         return None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,25 +27,17 @@ class BlockMatrix:
 
     It needs no sparse library as long as it is only multiplied; `scipy` gives the same matrix, on
     the same memory, to those that factorize or slice.
-
-    Attributes
-    ----------
-    data : (nnz, 3, 3) float.
-    indices : (nnz,) int32, column of each block.
-    indptr : (n + 1,) int32, where the blocks of each row start.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> A = BlockMatrix(2.0 * np.eye(3)[None], np.zeros(1, np.int32), np.array([0, 1], np.int32))
-    >>> A @ np.array([1.0, 2.0, 3.0])
-    array([2., 4., 6.])
     """
-
-    is_split = False  # as nearly incompressible stiffness is
 
     def __init__(self, data: Array, indices: Rows, indptr: Rows) -> None:
         self.data, self.indices, self.indptr = data, indices, indptr
+
+    @classmethod
+    def of(cls, A: Any) -> BlockMatrix:
+        """Return a sparse matrix of SciPy (3n, 3n) in blocks."""
+        A = A.tobsr((3, 3))
+        A.sort_indices()
+        return cls(np.ascontiguousarray(A.data), A.indices.astype(np.int32), A.indptr.astype(np.int32))
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -87,13 +79,7 @@ class BlockMatrix:
         return float(np.add.reduceat(sums, starts, axis=0).max(initial=0.0))
 
     def add_scalar(self, m: Array, at: Ints | None = None) -> None:
-        """Add numbers to the diagonals of blocks: A += m 1, in place.
-
-        Parameters
-        ----------
-        m : (nnz,), the data of a scalar matrix on the same pattern, or one number for each block of `at`.
-        at : blocks that take the numbers; `diagonal_blocks()` where m (n,) is a lumped mass.
-        """
+        """Add numbers to the diagonals of blocks: A += m 1, in place."""
         diagonals = self.data.reshape(-1, 9)[:, ::4]
         if at is None:
             diagonals += m[:, None]

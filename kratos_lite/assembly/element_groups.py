@@ -1,4 +1,4 @@
-"""Element groups: elements of one kind, rule and material, computed together, compiled or in NumPy."""
+"""Element groups: elements of one type, rule and material, computed together, compiled or in NumPy."""
 
 from __future__ import annotations
 
@@ -41,31 +41,21 @@ def compiled(name: str, element: type[KinematicLinear] | None = None) -> Any:
     return kernels(name) if element is None or not element.custom else None
 
 
-def floats(values: Any) -> Array:
+def as_double(values: Any) -> Array:
     """Return numbers as kernels take them."""
     return np.ascontiguousarray(values, dtype=float)
 
 
 @dataclass(eq=False)
 class ElementGroup:
-    """Elements that share class, rule and material.
-
-    Attributes
-    ----------
-    element : the element class.
-    rule : its quadrature rule.
-    material : its material.
-    nodes : (m, k) int, rows of the points.
-    rows : (m,) int, rows of the elements in the mesh.
-    prestress : (m, 6) float in Pa, or None.
-    """
+    """Elements that share class, rule and material."""
 
     element: type[KinematicLinear]
     rule: Rule
     material: LinearMaterial
-    nodes: Rows
-    rows: Ints
-    prestress: Array | None = None
+    nodes: Rows  # (m, k) int, indices of the points
+    rows: Ints  # (m,) int, indices of the elements in the mesh
+    prestress: Array | None = None  # (m, 6) float in Pa, or None
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -79,15 +69,16 @@ class ElementGroup:
         """Return nodes, N (g, k), dN (g, k, 3) and weights (g,) of a rule, or the own one, for kernels."""
         rule = self.rule if rule is None else rule
         N, dN = tabulate(self.element.shape, rule)
-        return np.ascontiguousarray(self.nodes, dtype=np.int32), floats(N), floats(dN), floats(rule.weights)
+        nodes = np.ascontiguousarray(self.nodes, dtype=np.int32)
+        return nodes, as_double(N), as_double(dN), as_double(rule.weights)
 
-    def law(self) -> tuple[Array, Array | None]:
+    def kernel_arguments(self) -> tuple[Array, Array | None]:
         """Return C (6, 6) and the prestress, as kernels take them."""
-        return floats(self.material.C), None if self.prestress is None else floats(self.prestress)
+        return as_double(self.material.C), None if self.prestress is None else as_double(self.prestress)
 
     def strain_tables(self) -> StrainTables | None:
         """Return what the element adds to the strain of the displacements, as kernels take it."""
-        return self.element.strain_tables(self.rule, floats(self.material.C))
+        return self.element.strain_tables(self.rule, as_double(self.material.C))
 
     def at(self, points: Array, chunk: slice = slice(None)) -> KinematicLinear:
         """Return the elements of a chunk, placed at `points` (n, 3)."""
@@ -124,14 +115,7 @@ class ElementGroup:
 
 
 def by_mass_rule(points: Array, group: ElementGroup, factors: int, flow: bool = False) -> list[ElementGroup]:
-    """Cut a group into parts whose rule is exact for a product of shape functions over their cells.
-
-    Parameters
-    ----------
-    points : (n, 3) float, m.
-    group : the elements.
-    factors, flow : see `KinematicLinear.mass_rules`.
-    """
+    """Cut a group into parts whose rule is exact for a product of shape functions over their cells."""
     parts = group.element.mass_rules(geometries_of(points, group), factors, flow)
     return [replace(group.take(mask), rule=rule) for mask, rule in parts]
 
@@ -140,13 +124,15 @@ def geometries_of(points: Array, group: ElementGroup) -> Geometries:
     """Return AFFINE, STRAIGHT or CURVED of the elements of a group, (m,); see `geometries`."""
     shape, nodes = group.element.shape, group.tables()[0]
     if interpolated := getattr(kernels("gauss"), "interpolated", None):
-        found, points = np.full(len(nodes), CURVED, dtype=np.int8), floats(points)
+        kinds, points = np.full(len(nodes), CURVED, dtype=np.int8), as_double(points)
         for geometry in (AFFINE, STRAIGHT):
-            spanned, rest = interpolations(shape)[geometry], found == CURVED
-            if spanned and rest.any():
-                left = nodes if rest.all() else nodes[rest]
-                found[rest] = np.where(interpolated(points, left, *spanned, ROUNDING) > 0, geometry, CURVED)
-        return found
+            spanned, curved = interpolations(shape)[geometry], kinds == CURVED
+            if spanned and curved.any():
+                cells = nodes if curved.all() else nodes[curved]
+                kinds[curved] = np.where(
+                    interpolated(points, cells, *spanned, ROUNDING) > 0, geometry, CURVED
+                )
+        return kinds
     parts = [geometries(shape, points[nodes[chunk]]) for chunk in group.chunks()]
     return np.concatenate([np.zeros(0, dtype=np.int8), *parts])
 
@@ -171,72 +157,45 @@ def element_groups_of(
     formulation: str | None = None,
     unnamed: str = NON_LOCKING,
 ) -> list[ElementGroup]:
-    """Return the elements of a mesh grouped by kind, rule and material.
+    """Return the elements of a mesh grouped by type, rule and material.
 
-    Parameters
-    ----------
-    mesh : the elements.
-    materials : all materials.
-    material_of : (m,) number of the material of each element, -1 for none; the first for all if not given.
-    rules : rules or orders of integration 1 … 5 that replace those of the elements, by number.
-    rule_of : (m,) number of the rule of each element, -1 for its own; its own for all if not given.
-    prestress : (m, 6) Pa.
-    formulation, unnamed : see `elements.formulations.element_of`.
-
-    Raises
-    ------
-    ModelError, InputError
-        For elements without material, unknown kinds, and rules that do not fit; and if there are no elements.
-    MaterialError
-        For a material whose stress is not C strain.
-
-    Examples
-    --------
-    >>> from kratos_lite import Isotropic3D, box
-    >>> [len(group) for group in element_groups_of(box(cells=(2, 2, 2)), [Isotropic3D(E=1e9, nu=0.3)])]
-    [8]
+    `material_of` and `rule_of` (m,) are numbers, -1 for no material and for the element's own rule.
     """
-    m, found = mesh.n_elements, []
+    m, groups = mesh.n_elements, []
     material_of = np.zeros(m, dtype=np.int64) if material_of is None else material_of
     rule_of = np.full(m, -1) if rule_of is None else rule_of
     for block, at in with_rows(mesh.blocks):
         if not len(block):
             continue
         element_class(mesh, block)
-        for material, rule, mine in _alike(mesh, block, material_of[at], rule_of[at]):
+        for material, rule, cells in _alike(mesh, block, material_of[at], rule_of[at]):
             materials[material].check_stress()
             element = element_of(block.name, formulation, materials[material].C, unnamed)
-            rows = at.start + mine
+            rows = at.start + cells
             chosen = _rule_of(element, rules[rule] if rules and rule >= 0 else None)
-            nodes = block.nodes if len(mine) == len(block) else block.nodes[mine]
+            nodes = block.nodes if len(cells) == len(block) else block.nodes[cells]
             stress = None if prestress is None else prestress[rows]
-            found.append(ElementGroup(element, chosen, materials[material], nodes, rows, stress))
-    if mesh.whole and not found:
+            groups.append(ElementGroup(element, chosen, materials[material], nodes, rows, stress))
+    if mesh.whole and not groups:
         raise ModelError("the model has no elements; nothing can be solved")
-    return found
+    return groups
 
 
-def _rule_of(element: type[KinematicLinear], given: Rule | int | None) -> Rule:
+def _rule_of(element: type[KinematicLinear], other: Rule | int | None) -> Rule:
     """Return the rule of an element, or one that replaces it, if it fits."""
-    if given is None and is_builtin(element):
+    if other is None and is_builtin(element):
         return element.rule
-    return _fitting(element, element.rule if given is None else given)
+    return _fitting(element, element.rule if other is None else other)
 
 
 def group_of_element(mesh: Mesh, groups: Sequence[ElementGroup], id: int) -> ElementGroup:
-    """Return the one element of an id as a group of its own.
-
-    Raises
-    ------
-    MeshError
-        There is no such element, or several have this id.
-    """
+    """Return the one element of an id as a group of its own."""
     number = whole_number(id, "the id of an element", least=0, error=MeshError)
     rows = np.flatnonzero(mesh.element_ids == number)
     if len(rows) != 1:
-        found = f"{len(rows)} elements have" if len(rows) else "no element has"
+        count = f"{len(rows)} elements have" if len(rows) else "no element has"
         ids = mesh.element_ids
-        raise MeshError(f"{found} the id {number}; ids run from {ids.min()} to {ids.max()}")
+        raise MeshError(f"{count} the id {number}; ids run from {ids.min()} to {ids.max()}")
     return next(group.take(group.rows == rows[0]) for group in groups if (group.rows == rows[0]).any())
 
 
@@ -249,7 +208,7 @@ def _alike(mesh: Mesh, block: Block, material: Ints, rule: Ints) -> list[tuple[i
     code = material * (int(rule.max()) + 2) + rule
     order = np.argsort(code, kind="stable")
     alike = np.split(order, np.flatnonzero(np.diff(code[order])) + 1)
-    return [(int(material[mine[0]]), int(rule[mine[0]]), mine) for mine in alike]
+    return [(int(material[cells[0]]), int(rule[cells[0]]), cells) for cells in alike]
 
 
 def _without_material(mesh: Mesh, block: Block, cell: int) -> ModelError:

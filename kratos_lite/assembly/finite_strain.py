@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.assembly.block_matrix import BlockMatrix
-from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, compiled, floats
+from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, as_double, compiled
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import add_in_parts
 from kratos_lite.elements import KinematicLinear
@@ -25,7 +25,7 @@ from kratos_lite.errors import MaterialError, ModelError
 from kratos_lite.typing import Array
 
 SAME_SHAPE = 1e-10
-"""Elements whose edges differ by less than this share of their size have one frequency."""
+"""Elements whose edges differ by less than this fraction of their size have one frequency."""
 
 
 def check_elements(groups: Sequence[ElementGroup]) -> None:
@@ -48,42 +48,23 @@ def _compiled(group: ElementGroup) -> Any:
 def _placed(points: Array, group: ElementGroup) -> tuple[Any, ...]:
     """Return points, nodes, dN and weights of a group, as kernels take them."""
     nodes, _, dN, weights = group.tables()
-    return floats(points), nodes, dN, weights
+    return as_double(points), nodes, dN, weights
 
 
 def _displaced(q: Array, dq: Array | None, damping: float) -> tuple[Any, ...]:
     """Return displacements, increment and damping, as kernels take them."""
-    return floats(q), None if dq is None else floats(dq), damping
+    return as_double(q), None if dq is None else as_double(dq), damping
 
 
 def internal_load(
     points: Array, groups: Sequence[ElementGroup], q: Array, dq: Array | None = None, damping: float = 0.0
 ) -> Array:
-    """Return ∫ P grad N dV as nodal forces (n, 3) in N.
-
-    Parameters
-    ----------
-    points : (n, 3) in m, the reference positions.
-    q : (n, 3) in m, nodal displacements.
-    dq : (n, 3) in m; with it, the load of the step from q to q + dq in energy-momentum form:
-        its work on dq is the change of the strain energy, and what damping takes.
-    damping : η/h, stiffness-proportional damping over the step.
-
-    Examples
-    --------
-    A rotation needs no force.
-
-    >>> import kratos_lite as kl
-    >>> model = kl.Model(kl.box(element="KinematicLinear3D8N"), kl.Isotropic3D(E=1.0, nu=0.3))
-    >>> X, R = model.mesh.points, np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
-    >>> float(np.abs(internal_load(X, model.element_groups(), X @ R.T - X)).max()) < 1e-15
-    True
-    """
+    """Return ∫ P grad N dV as nodal forces (n, 3) in N."""
     total = np.zeros_like(points)
     for group in groups:
         if module := _compiled(group):
             step = _displaced(q, dq, damping)
-            total += module.internal_load(*_placed(points, group), *step, *group.law())
+            total += module.internal_load(*_placed(points, group), *step, *group.kernel_arguments())
             continue
         for chunk in group.chunks():
             element, at = _moved(points, group, chunk, q, dq, damping)
@@ -113,17 +94,13 @@ def stiffness(
 
     Without dq it is the symmetric tangent by q.  With dq it is the derivative by dq, in general not
     symmetric; for dq → 0 without damping it is half the tangent.
-
-    Parameters
-    ----------
-    pattern : the sparsity of the nodes of the groups, in their order.
     """
     data = np.zeros((len(pattern.indices), 3, 3))
     for number, group in enumerate(groups):
         if module := _compiled(group):
             step = _displaced(q, dq, damping)
             rows = (pattern.indptr, pattern.indices)
-            module.add_stiffness(*_placed(points, group), *step, *group.law(), *rows, data)
+            module.add_stiffness(*_placed(points, group), *step, *group.kernel_arguments(), *rows, data)
             continue
 
         def tangent(chunk: slice, group: ElementGroup = group) -> Array:
@@ -140,7 +117,7 @@ def strain_energy(points: Array, groups: Sequence[ElementGroup], q: Array) -> fl
     energy = 0.0
     for group in groups:
         if module := _compiled(group):
-            energy += module.totals(*_placed(points, group), floats(q), *group.law())[0]
+            energy += module.totals(*_placed(points, group), as_double(q), *group.kernel_arguments())[0]
             continue
         for chunk in group.chunks():
             element, displaced = group.at(points, chunk), q[group.nodes[chunk]]
@@ -178,18 +155,6 @@ def highest_frequency(
 ) -> float:
     """Return an upper bound of the largest angular frequency in 1/s: the largest of any element alone.
 
-    Parameters
-    ----------
-    q : (n, 3) in m, displacements whose tangent counts; without, the linear stiffness.
-    lumped : take the lumped mass of the elements in place of the consistent one.
-
-    Raises
-    ------
-    MaterialError
-        If a material has no density.
-
-    Notes
-    -----
     Source: Irons & Treharne, Proc. 3rd Conf. Matrix Methods in Struct. Mech., Wright-Patterson (1971).
     It takes one dense eigenproblem (3k, 3k) for each element, some 0.1 ms with eight nodes; without q,
     elements that are translations of each other take one together.
@@ -209,9 +174,9 @@ def _distinct(points: Array, group: ElementGroup) -> ElementGroup:
     """Return a group of one element of each shape, whatever its place."""
     edges = points[group.nodes] - points[group.nodes[:, :1]]
     size = np.abs(edges).max()
-    rows = np.rint(edges.reshape(len(edges), -1) / (SAME_SHAPE * size))
+    keys = np.rint(edges.reshape(len(edges), -1) / (SAME_SHAPE * size))
     chosen = np.zeros(len(group), dtype=bool)
-    chosen[np.unique(rows, axis=0, return_index=True)[1]] = True
+    chosen[np.unique(keys, axis=0, return_index=True)[1]] = True
     return group.take(chosen)
 
 

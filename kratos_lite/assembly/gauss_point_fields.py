@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from kratos_lite import voigt
-from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, by_mass_rule, compiled, floats
+from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, as_double, by_mass_rule, compiled
 from kratos_lite.elements import KinematicLinear, custom
 from kratos_lite.typing import Array, Ints, Mask, Rows
 
@@ -25,8 +25,8 @@ def compiled_law(group: ElementGroup, stress: bool = True) -> Any:
 def displaced(points: Array, group: ElementGroup, u: Array, stress: bool = True) -> tuple[Any, ...]:
     """Return what kernels take to compute strains, or stresses, of displacements u (n, 3)."""
     nodes, _, dN, weights = group.tables()
-    law = group.law() if stress else (np.eye(6), None)  # a strain is the stress of C = 1
-    return floats(points), nodes, dN, weights, floats(u), *law, group.strain_tables()
+    law = group.kernel_arguments() if stress else (np.eye(6), None)  # a strain is the stress of C = 1
+    return as_double(points), nodes, dN, weights, as_double(u), *law, group.strain_tables()
 
 
 # ---- geometry ------------------------------------------------------------------------------------
@@ -45,7 +45,7 @@ def clearly_positive(
         return np.zeros(len(nodes), dtype=bool)
     weights = np.where(np.arange(len(dN)) < g, 1 / g, 0.0)
     cells = np.ascontiguousarray(nodes, dtype=np.int32)
-    return module.clearly_positive(floats(points), cells, floats(dN), weights) > 0
+    return module.clearly_positive(as_double(points), cells, as_double(dN), weights) > 0
 
 
 def volumes(points: Array, group: ElementGroup) -> Array:
@@ -58,7 +58,7 @@ def volumes(points: Array, group: ElementGroup) -> Array:
     """
     if module := compiled("gauss"):
         nodes, _, dN, weights = group.tables()
-        return module.volumes(floats(points), nodes, dN, weights)
+        return module.volumes(as_double(points), nodes, dN, weights)
     return np.concatenate([group.at(points, chunk).dV for chunk in group.chunks()])
 
 
@@ -70,8 +70,8 @@ def body_force(points: Array, group: ElementGroup, b: Array) -> Array:
     nodal, total = b.ndim == 2, np.zeros_like(points)
     module = compiled("gauss")
     for part in by_mass_rule(points, group, 2 if nodal else 1) if module else ():
-        tables = floats(points), *part.tables()
-        total += module.body_force(*tables, floats(b)) if nodal else module.shares(*tables) * b
+        tables = as_double(points), *part.tables()
+        total += module.body_force(*tables, as_double(b)) if nodal else module.shares(*tables) * b
     for chunk in () if module else group.chunks():
         nodes = group.nodes[chunk]
         add_nodal(total, nodes, group.at(points, chunk).body_force(b[nodes] if nodal else b))
@@ -100,11 +100,11 @@ def in_order(groups: Sequence[ElementGroup], parts: Sequence[Array]) -> Any:
     if len(parts) == 1 and (groups[0].rows == np.arange(m)).all():
         return parts[0]
     if len({part.shape[1:] for part in parts}) > 1:
-        rows: list[Any] = [None] * m
+        values: list[Any] = [None] * m
         for group, part in zip(groups, parts, strict=True):
             for row, value in zip(group.rows.tolist(), part, strict=True):
-                rows[row] = value
-        return rows
+                values[row] = value
+        return values
     out = np.zeros((m, *parts[0].shape[1:]))
     for group, part in zip(groups, parts, strict=True):
         out[group.rows] = part
@@ -146,7 +146,7 @@ def _internal_forces(element: KinematicLinear, group: ElementGroup, u: Array, ch
 
 
 def totals(points: Array, groups: Sequence[ElementGroup], u: Array) -> tuple[float, float, int]:
-    """Return strain energy in J, largest von Mises stress at a Gauss point in Pa, row of its element."""
+    """Return strain energy in J, largest von Mises stress at a Gauss point in Pa, index of its element."""
     energy, largest, row = 0.0, 0.0, 0
     for group in groups:
         module = compiled_law(group)
@@ -155,8 +155,8 @@ def totals(points: Array, groups: Sequence[ElementGroup], u: Array) -> tuple[flo
             if module
             else [_totals(points, group, u, chunk) for chunk in group.chunks()]
         )
-        for share, mises, at in parts:
-            energy += share
+        for part, mises, at in parts:
+            energy += part
             if mises > largest:
                 largest, row = mises, int(group.rows[at])
     return energy, largest, row

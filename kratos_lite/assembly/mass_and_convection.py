@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, by_mass_rule, compiled, floats
+from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, as_double, by_mass_rule, compiled
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.exact_rules import geometries
@@ -32,28 +32,9 @@ def inertia_matrices(
     names: str,
     velocity: Array = REST,
 ) -> dict[str, Array]:
-    """Return matrices by name, each as data (nnz,) on the pattern: M in kg, G in kg/s, H in kg/s².
-
-    Parameters
-    ----------
-    points : (n, 3) float, m.
-    groups : elements with these points.
-    pattern : the sparsity of their nodes, in the order of the groups.
-    names : some of ``"MGH"``; the others are not computed.
-    velocity : (3, 4), A in 1/s and b in m/s of c = A X + b.
-
-    Examples
-    --------
-    >>> import kratos_lite as kl
-    >>> model = kl.Model(kl.box(cells=(2, 2, 2)), kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0))
-    >>> groups = model.element_groups()
-    >>> pattern = Pattern(model.mesh.n_nodes, [group.nodes for group in groups])
-    >>> made = inertia_matrices(model.mesh.points, groups, pattern, "M")
-    >>> round(float(made["M"].sum()), 8)
-    7620.0
-    """
+    """Return matrices by name, each as data (nnz,) on the pattern: M in kg, G in kg/s, H in kg/s²."""
     data = {name: np.zeros(len(pattern.indices)) for name in names}
-    points = floats(points)
+    points = as_double(points)
     for number, group in enumerate(groups):
         if module := compiled("inertia"):
             _add_compiled(module, data, points, group, pattern, velocity)
@@ -70,7 +51,7 @@ def _add_compiled(
         wanted = {name: data[name] for name in names if name in data}
         for part in by_mass_rule(points, group, 2, flow) if wanted else ():
             nodes, N, dN, weights = part.tables()
-            tables = (N, dN, group.material.density * weights, floats(velocity))
+            tables = (N, dN, group.material.density * weights, as_double(velocity))
             module.add(points, nodes, *tables, pattern.indptr, pattern.indices, **wanted)
 
 
@@ -86,14 +67,14 @@ def _add_computed(
 
 def _computed(element: KinematicLinear, density: float, names: Any, velocity: Array) -> dict[str, Array]:
     """Return the matrices (m, k, k) of elements by name."""
-    found = {"M": element.scalar_mass(density)} if "M" in names else {}
+    matrices = {"M": element.scalar_mass(density)} if "M" in names else {}
     if "G" in names or "H" in names:
-        kinds, X = geometries(element.shape, element.X), element.X
+        geometry, X = geometries(element.shape, element.X), element.X
         G, H = np.zeros((2, *X.shape[:2], X.shape[1]))
-        for mine, rule in element.mass_rules(kinds, 2, flow=True):
-            G[mine], H[mine] = _convective(type(element)(X[mine], rule), density, velocity)
-        found |= {name: matrix for name, matrix in (("G", G), ("H", H)) if name in names}
-    return found
+        for cells, rule in element.mass_rules(geometry, 2, flow=True):
+            G[cells], H[cells] = _convective(type(element)(X[cells], rule), density, velocity)
+        matrices |= {name: matrix for name, matrix in (("G", G), ("H", H)) if name in names}
+    return matrices
 
 
 def _convective(element: KinematicLinear, density: float, velocity: Array) -> tuple[Array, Array]:
@@ -114,8 +95,8 @@ def lumped_mass(points: Array, groups: Sequence[ElementGroup]) -> Array:
     for group in groups:
         for part in by_mass_rule(points, group, 2):
             for chunk in part.chunks():
-                few = replace(part, nodes=part.nodes[chunk], rows=part.rows[chunk], prestress=None)
-                add_nodal(total, few.nodes, _element_masses(points, few)[..., None])
+                some = replace(part, nodes=part.nodes[chunk], rows=part.rows[chunk], prestress=None)
+                add_nodal(total, some.nodes, _element_masses(points, some)[..., None])
     return total[:, 0]
 
 
@@ -125,5 +106,5 @@ def _element_masses(points: Array, group: ElementGroup) -> Array:
     module = compiled("gauss")
     if module is None:
         return group.at(points).lumped_mass(density)
-    sums, diagonal = module.mass_sums(floats(points), *group.tables())
+    sums, diagonal = module.mass_sums(as_double(points), *group.tables())
     return density * lumped(sums, diagonal, group.element.shape, group.rule)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kratos_lite.assembly.block_matrix import BlockMatrix
-from kratos_lite.assembly.element_groups import ElementGroup, compiled, floats
+from kratos_lite.assembly.element_groups import ElementGroup, as_double, compiled
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import assemble_stiffness
 from kratos_lite.elements.tables import tabulate
@@ -26,27 +26,7 @@ if TYPE_CHECKING:
 
 
 class MatrixFree:
-    """The stiffness K (3n, 3n) in N/m of elements that the kernels know, which is only multiplied.
-
-    Attributes
-    ----------
-    points : (n, 3) m.
-    groups : the elements.
-    assembled : makes the matrix, for what needs it.
-    product : what the kernels have prepared.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from kratos_lite import Isotropic3D, Model, box
-    >>> model = Model(box(element="KinematicLinear3D27N"), Isotropic3D(E=1e9, nu=0.3))
-    >>> rigid = np.tile([1.0, 0.0, 0.0], model.mesh.n_nodes)
-    >>> if all(map(MatrixFree.takes, model.element_groups())):  # never without kernels
-    ...     K = MatrixFree(model.mesh.points, model.element_groups())
-    ...     assert np.abs(K @ rigid).max() < 1e-6 * K.norm()
-    """
-
-    is_split = False
+    """The stiffness K (3n, 3n) in N/m of elements that the kernels know, which is only multiplied."""
 
     def __init__(
         self,
@@ -54,7 +34,7 @@ class MatrixFree:
         groups: Sequence[ElementGroup],
         assembled: Callable[[], BlockMatrix] | None = None,
     ) -> None:
-        self.points, self.groups = floats(points), list(groups)
+        self.points, self.groups = as_double(points), list(groups)
         self.assembled = self._assembled if assembled is None else assembled
         module = compiled("multigrid", self.groups[0].element)
         self.product: Any = module.Product(self.points, list(map(_tables, self.groups)))
@@ -95,11 +75,11 @@ class MatrixFree:
 def _tables(group: ElementGroup) -> tuple[Any, ...]:
     """Return nodes, dN, weights, C and factors of a group, as kernels take them."""
     nodes, _, dN, weights = group.tables()
-    C, found = group.law()[0], factors(group.element.shape, group.rule)
-    if found is None:
+    C, tables = group.kernel_arguments()[0], factors(group.element.shape, group.rule)
+    if tables is None:
         return nodes, dN, weights, C, None
-    order, *rest = found
-    return nodes, floats(dN[order]), floats(weights[order]), C, tuple(rest)
+    order, *by_axis = tables
+    return nodes, as_double(dN[order]), as_double(weights[order]), C, tuple(by_axis)
 
 
 @remembered
@@ -108,13 +88,6 @@ def factors(shape: type[Shape], rule: Rule) -> tuple[Ints, Array, Array, Array] 
 
     They do where the points are a grid of n along each axis, n = 2 or 3, and the shape functions have no
     higher degree than n - 1 in any coordinate.
-
-    Returns
-    -------
-    order : (g,) the points by z, y and x.
-    values : (n, n) Lagrange polynomials of n equidistant places, at the points on an axis.
-    slopes : (n, n) derivatives at these of the Lagrange polynomials of the points.
-    places : (g, k) shape functions at the grid of places.
     """
     n = round(len(rule.weights) ** (1 / 3))
     order: Ints = np.lexsort(np.round(rule.points, 12).T).astype(np.int64)
@@ -133,9 +106,9 @@ def factors(shape: type[Shape], rule: Rule) -> tuple[Ints, Array, Array, Array] 
         np.kron(one, np.kron(slopes, one)),
         np.kron(slopes, np.kron(one, one)),
     ]
-    found = np.stack([D @ all_values for D in along], axis=-1)
-    exact = np.abs(found - tabulate(shape, rule)[1][order]).max() < 1e-12
-    return (order, floats(values), floats(slopes), floats(places)) if exact else None
+    gradients = np.stack([D @ all_values for D in along], axis=-1)
+    exact = np.abs(gradients - tabulate(shape, rule)[1][order]).max() < 1e-12
+    return (order, as_double(values), as_double(slopes), as_double(places)) if exact else None
 
 
 def _lagrange(nodes: Array, x: Array) -> tuple[Array, Array]:

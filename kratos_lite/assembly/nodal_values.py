@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, floats
+from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, as_double
 from kratos_lite.assembly.gauss_point_fields import at_gauss, compiled_law, displaced, value_at
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.quadrature import Rule
@@ -56,7 +56,7 @@ def averages(
 
 def _averages(points: Array, group: ElementGroup, u: Array, stress: bool) -> tuple[Array, Array]:
     """Return the sums of the nodal values (n, 6) of a group and the means of its elements (m, 6)."""
-    to_nodes = floats(extrapolation(group.element, group.rule))
+    to_nodes = as_double(extrapolation(group.element, group.rule))
     if module := compiled_law(group, stress=stress):
         nodal, mean = module.averages(*displaced(points, group, u, stress), to_nodes)
         return nodal, mean

@@ -32,51 +32,34 @@ DECAY = 4
 
 @dataclass(frozen=True, eq=False)
 class Patches:
-    """Patches of some elements, numbered 0 … m - 1.
+    """Patches of some elements, numbered 0 … m - 1."""
 
-    Attributes
-    ----------
-    elements : those of each patch.
-    weights : of each of these, 1 for those that contain the node.
-    wide : (p,) whether a patch has a second layer, and can tell a polynomial of one degree more.
-    of : the patches whose mean counts at each node; none at nodes without elements.
-    """
-
-    elements: Lists
-    weights: Array
-    wide: Mask
-    of: Lists
+    elements: Lists  # those of each patch
+    weights: Array  # of each of these, 1 for those that contain the node
+    wide: Mask  # (p,) whether a patch has a second layer, and can tell a polynomial of one degree more
+    of: Lists  # the patches whose mean counts at each node; none at nodes without elements
 
 
-def patches(blocks: Sequence[Block], points: Array, outer: Mask, hanging: Ints, masters: Lists) -> Patches:
-    """Return the patches of blocks of elements.
-
-    Parameters
-    ----------
-    blocks : the elements, numbered through the blocks.
-    points : (n, 3) m.
-    outer : (n,) whether a node is a corner of a face on the surface.
-    hanging : nodes that others interpolate.
-    masters : those of each.
-    """
+def patches(blocks: Sequence[Block], points: Array, outer: Mask, hanging: Ints, leaders: Lists) -> Patches:
+    """Return the patches of blocks of elements."""
     corners = _corners(blocks)
     is_corner = np.zeros(len(outer), dtype=bool)
     is_corner[corners[corners >= 0]] = True
     is_corner[hanging] = False
-    held = np.bincount(masters.owner, weights=is_corner[masters.entries], minlength=len(masters)) > 0
-    is_corner[hanging[~held]] = True
-    hanging, masters = hanging[held], masters.take(np.flatnonzero(held))
+    is_tied = np.bincount(leaders.owner, weights=is_corner[leaders.entries], minlength=len(leaders)) > 0
+    is_corner[hanging[~is_tied]] = True
+    hanging, leaders = hanging[is_tied], leaders.take(np.flatnonzero(is_tied))
     around, outer = _around(blocks, corners, is_corner), outer & is_corner
     inside = ~outer[around.owner]
     far = np.repeat([_far(block) for block in blocks], [len(block) for block in blocks])
     is_wide, owner, element, weights = _outside(points, around, corners, far, outer, is_corner)
-    rows = np.concatenate([around.owner[inside], owner])
+    nodes = np.concatenate([around.owner[inside], owner])
     weights = np.concatenate([np.ones(int(inside.sum())), weights])
     number, n = np.cumsum(is_corner) - 1, int(is_corner.sum())
-    found = lists(number[rows], np.arange(len(rows)), n)
-    elements = Lists(found.start, np.concatenate([around.entries[inside], element])[found.entries])
-    of = _patches_of_nodes(blocks, is_corner, number, hanging, masters)
-    return Patches(elements, weights[found.entries], is_wide[is_corner], of)
+    order = lists(number[nodes], np.arange(len(nodes)), n)
+    elements = Lists(order.start, np.concatenate([around.entries[inside], element])[order.entries])
+    of = _patches_of_nodes(blocks, is_corner, number, hanging, leaders)
+    return Patches(elements, weights[order.entries], is_wide[is_corner], of)
 
 
 def _far(block: Block) -> float:
@@ -109,8 +92,8 @@ def _outside(
 def _second_layer(owner: Ints, element: Ints, around: Lists, corners: Ints, n: int) -> tuple[Ints, Ints]:
     """Return the pairs of node and element with the elements around those."""
     if module := kernels("recovery"):
-        rows, found = module.grown(*map(integers, (owner, element, corners, around.start, around.entries)), n)
-        return rows, found
+        rows, near = module.grown(*map(integers, (owner, element, corners, around.start, around.entries)), n)
+        return rows, near
     known = corners[element]
     pair, at = np.nonzero(known >= 0)
     owner, near, _ = distinct(owner[pair], known[pair, at], n)
@@ -128,36 +111,36 @@ def _decayed(points: Array, owner: Ints, element: Ints, corners: Ints) -> Array:
     at, distance = (np.cumsum(used) - 1)[element], np.zeros(len(owner))
     for x, place in zip(center.T.copy(), points.T.copy(), strict=True):
         distance += (x[at] - place[owner]) ** 2
-    share = np.minimum(1.0, radius[at] / distance)
-    return np.asarray(share ** (DECAY // 2))
+    ratio = np.minimum(1.0, radius[at] / distance)
+    return np.asarray(ratio ** (DECAY // 2))
 
 
-def outer_corners(cells: Cells, kind: Ints) -> tuple[Ints, Ints]:
-    """Return kind and corner node of the faces that no element of the same kind (m,) shares."""
+def outer_corners(cells: Cells, material: Ints) -> tuple[Ints, Ints]:
+    """Return material and corner node of the faces that no element of the same material (m,) shares."""
     faces = cells.all_faces
-    alone, kinds = np.ones(len(faces.element), dtype=bool), kind[faces.element]
-    same = kinds[faces.one] == kinds[faces.other]
+    alone, behind = np.ones(len(faces.element), dtype=bool), material[faces.element]
+    same = behind[faces.one] == behind[faces.other]
     alone[faces.one[same]] = alone[faces.other[same]] = False
-    found, nodes, start = [NO_ROWS], [NO_ROWS], 0
+    materials, nodes, start = [NO_ROWS], [NO_ROWS], 0
     for block in cells.blocks:
         for face in faces_of(block):
             chosen = np.flatnonzero(alone[start : start + len(block)])
             picked = block.nodes[chosen][:, list(corners_of(face))]
-            found.append(np.repeat(kinds[start + chosen], picked.shape[1]))
+            materials.append(np.repeat(behind[start + chosen], picked.shape[1]))
             nodes.append(picked.ravel().astype(np.int64))
             start += len(block)
-    return np.concatenate(found), np.concatenate(nodes)
+    return np.concatenate(materials), np.concatenate(nodes)
 
 
 def _corners(blocks: Sequence[Block]) -> Ints:
     """Return the corner nodes of all elements (m, c), filled up with -1."""
     counts = [block.shape.corners if block.shape else block.nodes.shape[1] for block in blocks]
-    found = np.full((sum(map(len, blocks)), max(counts, default=0)), -1)
+    corners = np.full((sum(map(len, blocks)), max(counts, default=0)), -1)
     first = 0
     for block, c in zip(blocks, counts, strict=True):
-        found[first : first + len(block), :c] = block.nodes[:, :c]
+        corners[first : first + len(block), :c] = block.nodes[:, :c]
         first += len(block)
-    return found
+    return corners
 
 
 def _around(blocks: Sequence[Block], corners: Ints, is_corner: Mask) -> Lists:
@@ -166,9 +149,9 @@ def _around(blocks: Sequence[Block], corners: Ints, is_corner: Mask) -> Lists:
     nodes, elements, first = [corners.ravel()[at]], [at // corners.shape[1]], 0
     for block in blocks:
         c = block.shape.corners if block.shape else block.nodes.shape[1]
-        rest = block.nodes[:, c:]
-        row, column = np.nonzero(is_corner[rest]) if rest.size else (NO_ROWS, NO_ROWS)
-        nodes.append(rest[row, column].astype(np.int64))
+        others = block.nodes[:, c:]
+        row, column = np.nonzero(is_corner[others]) if others.size else (NO_ROWS, NO_ROWS)
+        nodes.append(others[row, column].astype(np.int64))
         elements.append(first + row)
         first += len(block)
     return lists(np.concatenate(nodes), np.concatenate(elements), len(is_corner))
@@ -176,11 +159,11 @@ def _around(blocks: Sequence[Block], corners: Ints, is_corner: Mask) -> Lists:
 
 def _neighborhoods(around: Lists, corners: Ints, outer: Mask, is_corner: Mask) -> tuple[Ints, Ints]:
     """Return node and element of all pairs of the patches of nodes on the surface."""
-    rows = np.flatnonzero(outer)
-    if not len(rows):
-        return rows, rows
-    own = around.take(rows)
-    node, element = rows[own.owner], own.entries
+    surface = np.flatnonzero(outer)
+    if not len(surface):
+        return surface, surface
+    own = around.take(surface)
+    node, element = surface[own.owner], own.entries
     near = corners[element]
     usable = (near >= 0) & is_corner[near]
     inner = usable & ~outer[near]
@@ -213,30 +196,30 @@ def _largest(owner: Ints, count: Ints, n: int) -> Mask:
 
 def _contain(owner: Ints, element: Ints, corners: Ints) -> Mask:
     """Return a mask of the elements that have the node as a corner."""
-    found = np.zeros(len(owner), dtype=bool)
+    contain = np.zeros(len(owner), dtype=bool)
     for column in corners.T.copy():
-        found |= column[element] == owner
-    return found
+        contain |= column[element] == owner
+    return contain
 
 
 def _patches_of_nodes(
-    blocks: Sequence[Block], is_corner: Mask, number: Ints, hanging: Ints, masters: Lists
+    blocks: Sequence[Block], is_corner: Mask, number: Ints, hanging: Ints, leaders: Lists
 ) -> Lists:
-    """Return the patches of each node: its own; else those of its masters, or of its edge, face or cell."""
+    """Return the patches of each node: its own; else of those it depends on, or of its edge, face or cell."""
     owner, entries = [np.flatnonzero(is_corner)], [number[is_corner]]
     done = is_corner.copy()
-    known = is_corner[masters.entries]
-    owner.append(hanging[masters.owner[known]])
-    entries.append(number[masters.entries[known]])
+    known = is_corner[leaders.entries]
+    owner.append(hanging[leaders.owner[known]])
+    entries.append(number[leaders.entries[known]])
     done[hanging] = True
     for block in blocks:
         for a, support in enumerate(_supports(block)):
-            left = np.flatnonzero(~done[block.nodes[:, a]])
-            if not len(left):
+            open_ = np.flatnonzero(~done[block.nodes[:, a]])
+            if not len(open_):
                 continue
-            new, first = np.unique(block.nodes[left, a], return_index=True)
+            new, first = np.unique(block.nodes[open_, a], return_index=True)
             done[new] = True
-            at = block.nodes[left[first]][:, support]
+            at = block.nodes[open_[first]][:, support]
             known = is_corner[at]
             owner.append(np.repeat(new, known.sum(axis=1)))
             entries.append(number[at[known]])

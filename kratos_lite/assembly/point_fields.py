@@ -27,12 +27,12 @@ def at_located(groups: Sequence[ElementGroup], located: Located, u: Array, *, st
         at = np.flatnonzero((rows >= 0) & (number[rows] >= 0))
         if not len(at):
             continue
-        mine = number[rows[at]]
-        X, displaced = (values[group.nodes[mine]] for values in (located.mesh.points, u))
+        cells = number[rows[at]]
+        X, displaced = (values[group.nodes[cells]] for values in (located.mesh.points, u))
         value = _strain(group, X, xi[at], displaced)
         if stress:
             value = group.stress(value)
-            value = value if group.prestress is None else value + group.prestress[mine]
+            value = value if group.prestress is None else value + group.prestress[cells]
         out[at] = value
     return out.reshape(*located.rows.shape, 6)
 
@@ -41,11 +41,11 @@ def recovered_at(recovery: Recovery, located: Located, u: Array, *, stress: bool
     """Return recovered stresses in Pa, or strains, (..., 6) at points, between nodes of one material."""
     out = np.zeros((*located.rows.shape, 6))
     for region, values in recovery.by_region(u, stress=stress):
-        mine = np.isin(located.rows, np.concatenate([group.rows for group in region.groups]))
-        if mine.any():
+        inside = np.isin(located.rows, np.concatenate([group.rows for group in region.groups]))
+        if inside.any():
             nodal = np.zeros((len(located.mesh.points), 6))
             nodal[region.nodes] = values
-            out[mine] = located[mine].interpolate(nodal)
+            out[inside] = located[inside].interpolate(nodal)
     return out
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kratos_lite.assembly.element_groups import floats
+from kratos_lite.assembly.element_groups import as_double
 from kratos_lite.native import kernels
 from kratos_lite.typing import Array, Ints, Mask, Numbers
 
@@ -57,8 +57,8 @@ def lists(owner: Numbers, entries: Ints, n: int) -> Lists:
 def distinct(owner: Numbers, entries: Numbers, n: int) -> tuple[Ints, Ints, Ints]:
     """Return row and entry of the distinct entries of n rows, ascending, and how often each occurs."""
     if module := kernels("recovery"):
-        rows, found, count = module.distinct(integers(owner), integers(entries), n)
-        return rows, found, count
+        rows, values, count = module.distinct(integers(owner), integers(entries), n)
+        return rows, values, count
     most = int(entries.max(initial=0)) + 1
     codes, count = np.unique(owner * most + entries, return_counts=True)
     return codes // most, codes % most, count
@@ -71,59 +71,37 @@ def integers(numbers: Numbers) -> Ints:
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Values at points of elements.
+    """Values at points of elements."""
 
-    Attributes
-    ----------
-    places : (s, 3) m.
-    values : (s, 6).
-    offset : (m + 1,) first sample of each element.
-    """
-
-    places: Array
-    values: Array
-    offset: Ints
+    places: Array  # (s, 3) m
+    values: Array  # (s, 6)
+    offset: Ints  # (m + 1,) first sample of each element
 
 
 @dataclass(frozen=True, eq=False)
 class Polynomials:
-    """Fitted polynomials.
+    """Fitted polynomials."""
 
-    Attributes
-    ----------
-    frame : (p, 12) origin in m, and the rows of the map to local coordinates in 1/m.
-    terms : (p, t, 6) coefficients of the monomials in local coordinates, by degree.
-    """
-
-    frame: Array
-    terms: Array
+    frame: Array  # (p, 12) origin in m, and the rows of the map to local coordinates in 1/m
+    terms: Array  # (p, t, 6) coefficients of the monomials in local coordinates, by degree
 
     def at(self, places: Array, chosen: Lists) -> Array:
         """Return at each place (n, 3) the mean of some of the polynomials there, (n, 6)."""
         if module := kernels("recovery"):
             return module.evaluate(
-                self.frame, self.terms, floats(places), as_rows(chosen.start), as_rows(chosen.entries)
+                self.frame, self.terms, as_double(places), as_rows(chosen.start), as_rows(chosen.entries)
             )
         return self._mean(places[:, None], chosen)[:, 0]
 
     def residuals(self, places: Array, values: Array, E: Array, nodes: Ints, chosen: Lists) -> Array:
-        """Return what values in elements leave of the polynomials, extrapolated to the nodes, (m, k, 6).
-
-        Parameters
-        ----------
-        places : (m, s, 3) m in each element.
-        values : (m, s, 6) there.
-        E : (k, s) values at the nodes of an element from those at the places.
-        nodes : (m, k) of the elements.
-        chosen : the polynomials whose mean counts at each node.
-        """
+        """Return the residuals of values (m, s, 6), extrapolated to the nodes by E (k, s), (m, k, 6)."""
         if module := kernels("recovery"):
-            tables = (floats(places), floats(values), floats(E), as_rows(nodes))
+            tables = (as_double(places), as_double(values), as_double(E), as_rows(nodes))
             return module.residuals(
                 self.frame, self.terms, *tables, as_rows(chosen.start), as_rows(chosen.entries)
             )
-        rest = [values - self._mean(places, chosen.take(column)) for column in nodes.T]
-        return np.stack([row @ off for row, off in zip(E, rest, strict=True)], axis=1)
+        residuals = [values - self._mean(places, chosen.take(column)) for column in nodes.T]
+        return np.stack([row @ off for row, off in zip(E, residuals, strict=True)], axis=1)
 
     def _mean(self, places: Array, chosen: Lists) -> Array:
         """Return the mean of the polynomials chosen for each row of places (m, s, 3), (m, s, 6)."""
@@ -137,23 +115,14 @@ class Polynomials:
 def fit(samples: Samples, patches: Lists, weights: Array, degree: Ints, means: Ints) -> Polynomials:
     """Return the polynomial of each patch.
 
-    Parameters
-    ----------
-    samples : values at points of all elements.
-    patches : the elements of each patch.
-    weights : of each of these.
-    degree : (p,) of the polynomials, 0 … 3.
-    means : (p,) 1 for patches that take the means of their elements as far as they tell.
-
-    Notes
-    -----
     A monomial that the points of a patch cannot tell from those before it is left out.  What means cannot
-    tell, as across a single layer, is then fitted to what they leave of all samples.
+    tell, as across a single layer, is then fitted to the residuals of all samples.
     """
     if module := kernels("recovery"):
         numbers = (as_rows(samples.offset), as_rows(patches.start), as_rows(patches.entries))
-        tables = (floats(weights), as_rows(degree), as_rows(means))
-        return Polynomials(*module.fit(floats(samples.places), floats(samples.values), *numbers, *tables))
+        tables = (as_double(weights), as_rows(degree), as_rows(means))
+        values = as_double(samples.places), as_double(samples.values)
+        return Polynomials(*module.fit(*values, *numbers, *tables))
     return _fit(samples, patches, weights, degree, means)
 
 
@@ -200,13 +169,13 @@ class _Fits:
         self.known = np.zeros(self.terms.shape[:2], dtype=bool)
 
     def add(self, X: Array, values: Array, weight: Array, nothing: float) -> None:
-        """Fit the monomials not yet known to what is left of values (p, s, 6) at places (p, s, 3)."""
+        """Fit the monomials not yet known to the residuals of values (p, s, 6) at places (p, s, 3)."""
         if self.known.all():
             return
         P = _monomials(_local(self.frame, X), self.degree)
         weighted = np.swapaxes(P, 1, 2) * weight[:, None]
-        found, used = _solve(weighted @ P, weighted @ (values - P @ self.terms), nothing, self.known)
-        self.terms += found
+        terms, used = _solve(weighted @ P, weighted @ (values - P @ self.terms), nothing, self.known)
+        self.terms += terms
         self.known |= used
 
 
@@ -259,6 +228,6 @@ def _solve(M: Array, b: Array, nothing: float, known: Mask) -> tuple[Array, Mask
         b[:, i + 1 :] -= factor[:, :, None] * b[:, i, None]
     x = np.zeros_like(b)
     for i in range(n - 1, -1, -1):
-        rest = b[:, i] - (M[:, i, None, i + 1 :] @ x[:, i + 1 :])[:, 0]
-        x[:, i] = np.where(used[:, i, None], rest / np.where(used[:, i], M[:, i, i], 1.0)[:, None], 0.0)
+        y = b[:, i] - (M[:, i, None, i + 1 :] @ x[:, i + 1 :])[:, 0]
+        x[:, i] = np.where(used[:, i, None], y / np.where(used[:, i], M[:, i, i], 1.0)[:, None], 0.0)
     return x, used

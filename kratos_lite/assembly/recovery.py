@@ -15,7 +15,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, floats
+from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, as_double
 from kratos_lite.assembly.gauss_point_fields import at_gauss, volumes
 from kratos_lite.assembly.nodal_values import extrapolation
 from kratos_lite.assembly.patches import Patches, outer_corners, patches
@@ -33,22 +33,13 @@ from kratos_lite.typing import Array, Ints, Numbers
 
 @dataclass(frozen=True, eq=False)
 class Sampling:
-    """Where the values of an element are taken, and what is fitted to them.
+    """Where the values of an element are taken, and what is fitted to them."""
 
-    Attributes
-    ----------
-    N : (s, k) shape functions at the samples.
-    from_gauss : (s, g) values there from those at the Gauss points; None where they are the Gauss points.
-    to_nodes : (k, s) share of the nodes in what polynomials leave of the samples; (k, 1) of their mean.
-    degree : of the polynomials.
-    means : whether means of elements are better than the samples, as far as they tell a polynomial.
-    """
-
-    N: Array
-    from_gauss: Array | None
-    to_nodes: Array
-    degree: int
-    means: bool
+    N: Array  # (s, k) shape functions at the samples
+    from_gauss: Array | None  # (s, g) values there from those at the Gauss points; None where they are these
+    to_nodes: Array  # (k, s) fraction of the residuals of the samples at nodes; (k, 1) of their mean
+    degree: int  # of the polynomials
+    means: bool  # whether means of elements are better than the samples, as far as they tell a polynomial
 
     @property
     def count(self) -> int:
@@ -63,7 +54,7 @@ def sampling(element: type[KinematicLinear], rule: Rule) -> Sampling:
     Hexahedra of degree 2 have their most accurate stresses at 2 x 2 x 2 points (Barlow, Int. J. Numer. Meth.
     Eng. 10 (1976) 243-251): trilinear functions are fitted to those at more Gauss points.  In linear
     hexahedra and wedges they lie at the center.  One degree above that of the element is fitted elsewhere,
-    but not in tetrahedra, which have no such points; in these half of what is left belongs to the nodes, and
+    but not in tetrahedra, which have no such points; in these half of the residual belongs to the nodes, and
     nothing of it in linear ones and linear pyramids.
     """
     shape, T, points = element.shape, None, rule.points
@@ -84,20 +75,12 @@ def sampling(element: type[KinematicLinear], rule: Rule) -> Sampling:
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """Elements of one material, over which stresses are smooth.
+    """Elements of one material, over which stresses are smooth."""
 
-    Attributes
-    ----------
-    groups : its elements.
-    nodes : (k,) their nodes, ascending.
-    cells : the nodes of each group, numbered 0 … k - 1.
-    patches : of these.
-    """
-
-    groups: list[ElementGroup]
-    nodes: Ints
-    cells: list[Ints]
-    patches: Patches
+    groups: list[ElementGroup]  # its elements
+    nodes: Ints  # (k,) their nodes, ascending
+    cells: list[Ints]  # the nodes of each group, numbered 0 … k - 1
+    patches: Patches  # of these
 
     def at_nodes(self, points: Array, values: Sequence[Array]) -> Array:
         """Return values at the nodes (k, 6) from those at the Gauss points of the groups (m, g, 6)."""
@@ -108,13 +91,14 @@ class Region:
             places.append(_combined(way.N, points, group.nodes))
             sampled.append(value if T is None else _from_points(T, value))
         fitted = self._fitted(ways, places, sampled)
-        rest = np.zeros((len(self.nodes), 6))
+        residual = np.zeros((len(self.nodes), 6))
         for way, cells, *both in zip(ways, self.cells, places, sampled, strict=True):
             if not way.to_nodes.any():
                 continue
             X, value = (_means(v) if way.means else v for v in both)
-            rest += _sum(fitted.residuals(X, value, way.to_nodes, cells, self.patches.of), cells, len(rest))
-        return fitted.at(points[self.nodes], self.patches.of) + rest / self.held[:, None]
+            at_nodes = fitted.residuals(X, value, way.to_nodes, cells, self.patches.of)
+            residual += _sum(at_nodes, cells, len(residual))
+        return fitted.at(points[self.nodes], self.patches.of) + residual / self.n_around[:, None]
 
     def _fitted(self, ways: list[Sampling], places: list[Array], sampled: list[Array]) -> Polynomials:
         """Return the polynomials of the patches, from places (m, s, 3) and values (m, s, 6) of the groups."""
@@ -134,8 +118,8 @@ class Region:
         return np.asarray(least.reduceat(every[elements.entries], elements.start[:-1]))
 
     @cached_property
-    def held(self) -> Ints:
-        """How many elements hold each node."""
+    def n_around(self) -> Ints:
+        """The number of elements around each node."""
         return np.bincount(np.concatenate([c.ravel() for c in self.cells]), minlength=len(self.nodes))
 
     def averaged(self, values: Sequence[Array]) -> Array:
@@ -143,7 +127,7 @@ class Region:
         total = np.zeros((len(self.nodes), 6))
         for group, cells, value in zip(self.groups, self.cells, values, strict=True):
             total += _sum(_from_points(extrapolation(group.element, group.rule), value), cells, len(total))
-        return total / self.held[:, None]
+        return total / self.n_around[:, None]
 
 
 _KNOWN: WeakKeyDictionary[Mesh, tuple[Ints, Ints, list[tuple[Ints, Patches]]]] = WeakKeyDictionary()
@@ -156,16 +140,16 @@ def _regions(mesh: Mesh, groups: Sequence[ElementGroup]) -> list[Region]:
     for group in groups:
         by_material.setdefault(id(group.material), []).append(group)
     parts = list(by_material.values())
-    kind, place = np.full(mesh.n_elements, -1), np.zeros(mesh.n_elements, dtype=np.int64)
-    for i, mine in enumerate(parts):
-        rows = np.concatenate([group.rows for group in mine])
-        kind[rows], place[rows] = i, np.arange(len(rows))
+    material, place = np.full(mesh.n_elements, -1), np.zeros(mesh.n_elements, dtype=np.int64)
+    for i, part in enumerate(parts):
+        rows = np.concatenate([group.rows for group in part])
+        material[rows], place[rows] = i, np.arange(len(rows))
     known = _KNOWN.get(mesh)
-    if known is None or not (np.array_equal(known[0], kind) and np.array_equal(known[1], place)):
-        kinds, outer = outer_corners(mesh, kind)
-        made = [_patches(mesh, mine, outer[kinds == i]) for i, mine in enumerate(parts)]
-        known = _KNOWN[mesh] = kind, place, made
-    return [_region(mesh, mine, *found) for mine, found in zip(parts, known[2], strict=True)]
+    if known is None or not (np.array_equal(known[0], material) and np.array_equal(known[1], place)):
+        outside, outer = outer_corners(mesh, material)
+        around = [_patches(mesh, part, outer[outside == i]) for i, part in enumerate(parts)]
+        known = _KNOWN[mesh] = material, place, around
+    return [_region(mesh, part, *around) for part, around in zip(parts, known[2], strict=True)]
 
 
 def _region(mesh: Mesh, groups: list[ElementGroup], nodes: Ints, around: Patches) -> Region:
@@ -182,24 +166,18 @@ def _patches(mesh: Mesh, groups: list[ElementGroup], outer: Ints) -> tuple[Ints,
     on_surface[outer] = True
     nodes, number = np.flatnonzero(used), np.cumsum(used) - 1
     blocks = [Block("", number[g.nodes], g.rows, 0 * g.rows, g.element.shape) for g in groups]
-    hanging, masters = NO_ROWS, Lists(np.zeros(1, dtype=np.int64), NO_ROWS)
+    hanging, leaders = NO_ROWS, Lists(np.zeros(1, dtype=np.int64), NO_ROWS)
     if mesh.hanging is not None:
         here = used[mesh.hanging.nodes]
         hanging = number[mesh.hanging.nodes[here]]
         every = Lists(mesh.hanging.start, mesh.hanging.masters).take(np.flatnonzero(here))
         kept = used[every.entries]
-        masters = lists(every.owner[kept], number[every.entries[kept]], len(hanging))
-    return nodes, patches(blocks, mesh.points[nodes], on_surface[nodes], hanging, masters)
+        leaders = lists(every.owner[kept], number[every.entries[kept]], len(hanging))
+    return nodes, patches(blocks, mesh.points[nodes], on_surface[nodes], hanging, leaders)
 
 
 class Recovery:
-    """Recovered stresses and strains of a mesh, for any displacements.
-
-    Parameters
-    ----------
-    mesh : of n nodes.
-    groups : its elements.
-    """
+    """Recovered stresses and strains of a mesh, for any displacements."""
 
     def __init__(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> None:
         self.points, self.groups = mesh.points, list(groups)
@@ -223,13 +201,13 @@ class Recovery:
         if free and self._last is not None and self._last[0] is u:
             yield from zip(self.regions, self._last[1], strict=True)
             return
-        found = []
+        nodal = []
         for region in self.regions:
             values = [at_gauss(self.points, group, u, stress=stress) for group in region.groups]
-            found.append(region.at_nodes(self.points, values))
-            yield region, found[-1]
+            nodal.append(region.at_nodes(self.points, values))
+            yield region, nodal[-1]
         if free:
-            self._last = u, found
+            self._last = u, nodal
 
     def products(self, u: Array, z: Array, n_elements: int) -> tuple[Array, Array]:
         """Return ∫ (σ* - σ) : C⁻¹ : (σ* - σ)' dV of each element, (m,) in J, of two displacements (n, 3).
@@ -237,9 +215,9 @@ class Recovery:
         With recovered and with averaged σ*.  Prestress is given and no part of the error.  σ* is kept for the
         first of them alone.
         """
-        found, mine = np.zeros((2, n_elements)), self._recovered(u)
-        theirs = mine if z is u else self._recovered(z, keep=False)
-        for region, (values, nodal), (others, other_nodal) in zip(self.regions, mine, theirs, strict=True):
+        energies, of_u = np.zeros((2, n_elements)), self._recovered(u)
+        of_z = of_u if z is u else self._recovered(z, keep=False)
+        for region, (values, nodal), (others, other_nodal) in zip(self.regions, of_u, of_z, strict=True):
             averaged = region.averaged(values)
             other_averaged = averaged if z is u else region.averaged(others)
             stars = (nodal, other_nodal), (averaged, other_averaged)
@@ -247,9 +225,9 @@ class Recovery:
                 fine, N, dV, S = self._tables(group)
                 raw = value if fine is group else at_gauss(self.points, fine, u)
                 other_raw = raw if z is u else other if fine is group else at_gauss(self.points, fine, z)
-                for row, (star, other_star) in zip(found, stars, strict=True):
+                for row, (star, other_star) in zip(energies, stars, strict=True):
                     row[group.rows] = _products((star, raw), (other_star, other_raw), nodes, N, dV, S)
-        return found[0], found[1]
+        return energies[0], energies[1]
 
     def squared_errors(self, u: Array, n_elements: int) -> tuple[Array, Array]:
         """Return ∫ (σ* - σ) : C⁻¹ : (σ* - σ) dV of each element, (m,) in J, of recovered and averaged σ*."""
@@ -258,19 +236,19 @@ class Recovery:
     def _recovered(self, u: Array, keep: bool = True) -> list[tuple[list[Array], Array]]:
         """Return C ε at the points of the groups, and recovered at the nodes, of each region."""
         known = self._last[1] if self._last is not None and self._last[0] is u else None
-        found = []
+        recovered = []
         for i, region in enumerate(self.regions):
             values = [at_gauss(self.points, _plain(group), u) for group in region.groups]
-            found.append((values, known[i] if known else region.at_nodes(self.points, values)))
+            recovered.append((values, known[i] if known else region.at_nodes(self.points, values)))
         if keep:
-            self._last = u, [nodal for _, nodal in found]
-        return found
+            self._last = u, [nodal for _, nodal in recovered]
+        return recovered
 
     def _tables(self, group: ElementGroup) -> tuple[ElementGroup, Array, Array, Array]:
         """Return a group without prestress and with a rule for squared errors, its N and volumes, and C⁻¹."""
         fine = _compared_at(group)
         N, _ = tabulate(fine.element.shape, fine.rule)
-        return fine, N, volumes(self.points, fine), floats(np.linalg.inv(fine.material.C))
+        return fine, N, volumes(self.points, fine), as_double(np.linalg.inv(fine.material.C))
 
 
 def _plain(group: ElementGroup) -> ElementGroup:
@@ -295,7 +273,9 @@ def _products(
 ) -> Array:
     """Return ∫ (N σ* - σ) : S : (N σ*' - σ') dV of each element, (m,), of two pairs of σ* and σ."""
     if module := kernels("recovery"):
-        return module.products(*map(floats, (*first, *second)), as_rows(nodes), *map(floats, (N, dV, S)))
+        return module.products(
+            *map(as_double, (*first, *second)), as_rows(nodes), *map(as_double, (N, dV, S))
+        )
     one, other = (N @ nodal[nodes] - raw for nodal, raw in (first, second))
     return (((one @ S) * other).sum(axis=-1) * dV).sum(axis=1)
 
@@ -303,7 +283,7 @@ def _products(
 def _sum(values: Array, nodes: Ints, n: int) -> Array:
     """Return the sums at nodes (n, 6) of values (m, k, 6) of elements."""
     if module := kernels("recovery"):
-        return module.summed(floats(values), as_rows(nodes), n)
+        return module.summed(as_double(values), as_rows(nodes), n)
     total = np.zeros((n, 6))
     add_nodal(total, nodes, values)
     return total
@@ -312,7 +292,7 @@ def _sum(values: Array, nodes: Ints, n: int) -> Array:
 def _combined(table: Array, values: Array, rows: Numbers) -> Array:
     """Return rows (m, k) of values (n, c) combined by a table (s, k), as (m, s, c)."""
     if module := kernels("recovery"):
-        return module.combined(floats(table), floats(values), as_rows(rows))
+        return module.combined(as_double(table), as_double(values), as_rows(rows))
     return table @ values[rows]
 
 

@@ -17,18 +17,7 @@ from kratos_lite.typing import Array, Ints, Rows
 
 
 class Pattern:
-    """Sparsity of the node graph in rows of node blocks.
-
-    Parameters
-    ----------
-    n_nodes : number of nodes.
-    connectivity : (m, k) node rows of each number of elements.
-
-    Attributes
-    ----------
-    indptr : (n + 1,) int32, where the row of each node starts; nodes without elements have empty rows.
-    indices : (nnz,) int32, sorted within a row: the nodes that share an element with it.
-    """
+    """Sparsity of the node graph in rows of node blocks."""
 
     def __init__(self, n_nodes: int, connectivity: Sequence[Rows]) -> None:
         self.n_nodes = n_nodes
@@ -51,7 +40,7 @@ class Pattern:
 
     def _find(self, keys: Ints, nodes: Rows) -> Rows:
         m, k = nodes.shape
-        found = np.zeros((m, k, k), dtype=np.int32)
+        positions = np.zeros((m, k, k), dtype=np.int32)
         step = max(1, 1_000_000 // (k * k))
         for start in range(0, m, step):
             n = nodes[start : start + step].astype(np.int64)
@@ -59,8 +48,8 @@ class Pattern:
             place = np.searchsorted(keys, wanted)
             if (keys[np.minimum(place, len(keys) - 1)] != wanted).any():
                 raise AssertionError("the sparsity pattern misses a pair of nodes that share an element")
-            found[start : start + step] = place
-        return found
+            positions[start : start + step] = place
+        return positions
 
     def add(self, data: Array, number: int, window: slice, matrices: Array) -> None:
         """Add matrices of some elements of a number: (m, k, k, 3, 3) to (nnz, 3, 3), (m, k, k) to (nnz,)."""

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from kratos_lite.assembly.block_matrix import BlockMatrix
-from kratos_lite.assembly.element_groups import ElementGroup, compiled, floats
+from kratos_lite.assembly.element_groups import ElementGroup, as_double, compiled
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.typing import Array, Progress
 
@@ -27,18 +27,9 @@ def assemble_stiffness(
     progress: Progress | None = None,
     skipped: set[str] | None = None,
 ) -> BlockMatrix:
-    """Return the stiffness matrix as 3x3 blocks, (3n, 3n) in N/m.
-
-    Parameters
-    ----------
-    points : (n, 3) float, m.
-    groups : elements with these points.
-    pattern : the sparsity of their nodes, in the order of the groups.
-    progress : called with ``"assemble"`` and the share done, 0 … 1.
-    skipped : collects what made a part of the work unnecessary, in words for the report.
-    """
+    """Return the stiffness matrix as 3x3 blocks, (3n, 3n) in N/m."""
     data = np.zeros((len(pattern.indices), 3, 3))
-    points = floats(points)
+    points = as_double(points)
     done, total = 0, sum(len(group) for group in groups)
     for number, group in enumerate(groups):
         kernels = compiled("stiffness", group.element)
@@ -57,7 +48,7 @@ def _add_compiled(
 ) -> Iterator[tuple[int, bool]]:
     """Add the stiffness of a group; yield the number of elements and whether J was constant in some."""
     nodes, _, dN, weights = group.tables()
-    law = group.law()[0], group.strain_tables()
+    law = group.kernel_arguments()[0], group.strain_tables()
     module = compiled("stiffness", group.element)
     constant = module.add_stiffness(points, nodes, dN, weights, *law, pattern.indptr, pattern.indices, data)
     yield len(group), constant > 0

@@ -24,13 +24,13 @@ _log = logging.getLogger("kratos_lite")
 
 CORRECTIONS_MAX = 50
 ROUND_OFF = 1e-15
-"""Share of the velocities that a gap cannot get below."""
+"""Fraction of the velocities that a gap cannot get below."""
 CLOSED = 1e-9
-"""Share of the velocities that a gap may be where corrections no longer help."""
+"""Fraction of the velocities that a gap may be where corrections no longer help."""
 JUMP = 1e-9
-"""Share of the positions by which a constraint may be missed at the start."""
+"""Fraction of the positions by which a constraint may be violated at the start."""
 PLACED = 1e-13
-"""Share of the positions that it may be there."""
+"""Fraction of the positions that it may be there."""
 
 
 class Step(NamedTuple):
@@ -73,7 +73,7 @@ def project_velocity(body: Body, h: float) -> None:
         gap = float(np.abs(constraint.gap(x, v, body.time, 2.0)).max()) if constraint.positional else 0.0
         if gap > JUMP * size:
             raise InputError(
-                f"a {type(constraint).__name__} is missed by {gap:.3g} m at t = {body.time:g} s, "
+                f"a {type(constraint).__name__} is not met: its gap is {gap:.3g} m at t = {body.time:g} s, "
                 "where the body is: it would have to jump; let the motion start there, or bring the body to "
                 "rest with find_equilibrium"
             )
@@ -84,8 +84,8 @@ def project_velocity(body: Body, h: float) -> None:
         return
     columns = body.mass_solver()(H.T)
     u = body.u + columns @ (np.linalg.pinv(H @ columns, rcond=1e-12, hermitian=True) @ miss)
-    left = np.concatenate(wanted) - H @ u
-    if np.abs(left).max() > CLOSED * max(np.abs(miss).max(), np.abs(H @ np.abs(u)).max()):
+    residual = np.concatenate(wanted) - H @ u
+    if np.abs(residual).max() > CLOSED * max(np.abs(miss).max(), np.abs(H @ np.abs(u)).max()):
         raise SolveError("the constraints cannot be met at the start: they contradict each other")
     body.u = u
     after = float(body.kinetic_energy())
@@ -99,9 +99,9 @@ def project_velocity(body: Body, h: float) -> None:
 
 
 def _extent(body: Body) -> float:
-    """Return the size of the positions of the points that are held, and of the body about them, in m."""
-    held = np.concatenate([body.position(constraint.points) for constraint in body.constraints])
-    return float(max(np.abs(held).max(), np.abs(held - body.mass_center()).max()))
+    """Return the size of the positions of the constrained points, and of the body about them, in m."""
+    constrained = np.concatenate([body.position(constraint.points) for constraint in body.constraints])
+    return float(max(np.abs(constrained).max(), np.abs(constrained - body.mass_center()).max()))
 
 
 def constraint_jacobian(body: Body, q: Array) -> Array:
@@ -117,7 +117,7 @@ def allowed(H: Array) -> csr_array[Any, Any]:
     count = (H != 0).sum(axis=1)
     if (count <= 1).all():  # each row holds one displacement, or none
         return csr_array(eye_array(H.shape[1], format="csr")[:, ~(H != 0).any(axis=0)])
-    tied = (H != 0).any(axis=0)  # only these take part in what is held together
+    tied = (H != 0).any(axis=0)  # only these take part in constraints
     inner = null_space(H[:, tied])
     free = np.flatnonzero(~tied)
     T = np.zeros((H.shape[1], inner.shape[1] + len(free)))
@@ -137,7 +137,7 @@ def _corrected(body: Body, h: float, H: Array, inverse: Array, advance: Advance)
         allowed = CLOSED * speed + PLACED * extent * 2 / h
         if size <= ROUND_OFF * speed or (size > 0.5 * last and size <= allowed):
             return step, multipliers
-        if not size <= 10 * last:  # nor if it is no number
+        if not size <= 10 * last:  # nor if it is NaN
             break
         multipliers, last = multipliers - inverse @ gap, size
     raise SolveError(

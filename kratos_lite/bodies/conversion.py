@@ -18,9 +18,9 @@ from kratos_lite.validation import instance
 
 _log = logging.getLogger("kratos_lite")
 ROUND_OFF = 1e-12
-"""Share of the angular momentum that is not worth a correction."""
+"""Fraction of the angular momentum that is not worth a correction."""
 SAME_SHAPE = 1e-9
-"""Share of the size of a body by which nodes of the same shape may differ."""
+"""Fraction of the size of a body by which nodes of the same shape may differ."""
 
 Kind = TypeVar("Kind", bound=Body)
 
@@ -84,9 +84,9 @@ def convert(body: Body, kind: Any, **options: Any) -> Any:
     other.external_work = np.array(body.external_work)
     if isinstance(other, Deformable):  # that a rigid body has no deformation goes without saying
         _warn_of_lost_shape(body, other, F, center)
-    for what, held in (("loads", body.loads), ("constraints", body.constraints)):
-        if held:
-            _log.warning("%d %s of the %s body do not go along; add them anew", len(held), what, body.kind)
+    for what, items in (("loads", body.loads), ("constraints", body.constraints)):
+        if items:
+            _log.warning("%d %s of the %s body do not go along; add them anew", len(items), what, body.kind)
     return other
 
 
@@ -99,7 +99,7 @@ def _made(body: Body, kind: type[Body], options: dict[str, Any]) -> Body:
         if name == "mass_properties" and value is not None:
             _check_mass(body, kind)
         elif name == "damping" and value:
-            _log.warning("a %s body takes no damping: %g s is left out", kind.kind, value)
+            _log.warning("a %s body takes no damping: %g s is omitted", kind.kind, value)
     if "formulation" in options:
         settings.pop("modes", None)
     if type(body) is not kind:  # its default is that of the kind
@@ -116,7 +116,7 @@ def _made(body: Body, kind: type[Body], options: dict[str, Any]) -> Body:
 
 
 def _warn_of_lost_shape(body: Body, other: Body, F: Array, center: Array) -> None:
-    """Log which share of the displacement that deforms a body does not go along."""
+    """Log which fraction of the displacement that deforms a body does not go along."""
     assert body.mesh is not None
     X = body.mesh.points
     x = body.position(X)
@@ -139,15 +139,19 @@ def _check_mass(body: Body, kind: type[Body]) -> None:
     assert body.mesh is not None
     assert body.material is not None
     own = mass_properties_of(body.mesh, body.material)
-    given = body.mass_properties
+    properties = body.mass_properties
     size = float(np.ptp(body.mesh.points, axis=0).max())
-    pairs = ((given.mass, own.mass, 1.0), (given.center, own.center, size), (given.euler, own.euler, size**2))
+    pairs = (
+        (properties.mass, own.mass, 1.0),
+        (properties.center, own.center, size),
+        (properties.euler, own.euler, size**2),
+    )
     for value, other, scale in pairs:
         if not np.allclose(value, other, rtol=0, atol=1e-9 * own.mass * scale):
             raise ModelError(
                 f"the mass of a {kind.kind} body follows from its mesh ({own.mass:g} kg), and the mass "
-                f"properties that were given to this {body.kind} body are others ({given.mass:g} kg); make "
-                "one of a mesh and a density that have them"
+                f"properties that were given to this {body.kind} body are others ({properties.mass:g} kg); "
+                "make one of a mesh and a density that have them"
             )
 
 

@@ -17,11 +17,11 @@ INCREMENTS = (1, 4, 16, 64)
 """Numbers of load increments that are tried one after the other."""
 NEWTON_MAX = 25
 CONVERGED = 1e-9
-"""Last Newton step, as a share of the displacement; the error left is its square."""
+"""Last Newton step, as a fraction of the displacement; the remaining error is its square."""
 ROUND_OFF = 4e-15
-"""Newton step, as a share of the size of the body, that is nothing but rounding."""
+"""Newton step, as a fraction of the size of the body, that is nothing but rounding."""
 UNBALANCED = 1e-8
-"""Share of the loads that may be left over."""
+"""Fraction of the loads that may remain."""
 
 
 def find_equilibrium(body: Body, *, progress: Progress | None = None) -> int:
@@ -31,10 +31,10 @@ def find_equilibrium(body: Body, *, progress: Progress | None = None) -> int:
 
     Parameters
     ----------
-    body : pseudo-rigid or finite-element, not modal, held by constraints or springs.  A `Callback` that
+    body : pseudo-rigid or finite-element, not modal, supported by constraints or springs.  A `Callback` that
         depends on the configuration counts as a load without a derivative, and must be weak beside the other
         stiffness.
-    progress : called with ``"equilibrium"`` and the share of the load, 0 … 1.
+    progress : called with ``"equilibrium"`` and the fraction of the load, 0 … 1.
 
     Returns
     -------
@@ -45,7 +45,7 @@ def find_equilibrium(body: Body, *, progress: Progress | None = None) -> int:
     ModelError
         A rigid or a modal body, or a constraint on velocities.
     SolveError
-        There is no equilibrium near by: the body is not held, or it buckles.
+        There is no equilibrium near by: the body is not supported, or it buckles.
 
     Examples
     --------
@@ -85,35 +85,35 @@ def find_equilibrium(body: Body, *, progress: Progress | None = None) -> int:
         return iterations
     body.q = start
     raise SolveError(
-        f"no equilibrium was found: {failed}; is the body held by constraints "
+        f"no equilibrium was found: {failed}; is the body supported by constraints "
         "or springs, and are the loads not too large?"
     )
 
 
-def _increment(body: Deformable, start: Array, share: float, progress: Progress | None) -> int:
-    """Find the equilibrium under a share of the loads; return the number of iterations."""
-    initial, noise = _gap(body, start), ROUND_OFF * body.extent()
+def _increment(body: Deformable, start: Array, fraction: float, progress: Progress | None) -> int:
+    """Find the equilibrium under a fraction of the loads; return the number of iterations."""
+    initial, roundoff = _gap(body, start), ROUND_OFF * body.extent()
     multipliers = np.zeros(len(initial))
     for iteration in range(1, NEWTON_MAX + 1):
-        left = share * _load(body) - body.internal_force(body.q)
-        gap = _gap(body, body.q) - (1 - share) * initial
-        tangent = _tangent(body, share, multipliers)
-        step, multipliers = body.solve_static(left, _entries(body), gap, tangent)
+        residual = fraction * _load(body) - body.internal_force(body.q)
+        gap = _gap(body, body.q) - (1 - fraction) * initial
+        tangent = _tangent(body, fraction, multipliers)
+        step, multipliers = body.solve_static(residual, _entries(body), gap, tangent)
         largest = float(np.abs(step).max())
         if not np.isfinite(largest):
             break
-        if largest > noise or iteration == 1:  # less would not make it better
+        if largest > roundoff or iteration == 1:  # less would not make it better
             body.q = body.q + step
-        if largest <= max(noise, CONVERGED * float(np.abs(body.q - start).max())):
-            _balance(body, share, multipliers)
+        if largest <= max(roundoff, CONVERGED * float(np.abs(body.q - start).max())):
+            _balance(body, fraction, multipliers)
             if progress:
-                progress("equilibrium", share)
+                progress("equilibrium", fraction)
             return iteration
-    raise SolveError(f"Newton does not converge in {NEWTON_MAX} iterations at {share:.0%} of the load")
+    raise SolveError(f"Newton does not converge in {NEWTON_MAX} iterations at {fraction:.0%} of the load")
 
 
 def _gap(body: Deformable, q: Array) -> Array:
-    """Return by how much the constraints are missed in m."""
+    """Return by how much the constraints are violated in m."""
     gaps = [c.gaps(body, q, np.zeros_like(q), body.time, 2.0) for c in body.constraints]
     return np.concatenate([np.zeros(0), *gaps])
 
@@ -123,12 +123,12 @@ def _load(body: Deformable) -> Array:
     return body.external_force(body.q, u=np.zeros_like(body.u))
 
 
-def _tangent(body: Deformable, share: float, multipliers: Array) -> Entries:
-    """Return the derivative of a share of the loads, and of the reactions, with respect to q."""
-    rest, at, parts = np.zeros_like(body.u), 0, []
+def _tangent(body: Deformable, fraction: float, multipliers: Array) -> Entries:
+    """Return the derivative of a fraction of the loads, and of the reactions, with respect to q."""
+    zero, at, parts = np.zeros_like(body.u), 0, []
     for load in body.loads:
-        row, column, value = load.derivative(body.q, rest, body.time)
-        parts.append((row, column, share * value))
+        row, column, value = load.derivative(body.q, zero, body.time)
+        parts.append((row, column, fraction * value))
     for constraint in body.constraints:
         parts += constraint.tangent_entries(body, body.q, multipliers[at : at + constraint.count])
         at += constraint.count
@@ -147,7 +147,7 @@ def _entries(body: Deformable) -> Entries:
     return row, dof, value
 
 
-def _balance(body: Deformable, share: float, multipliers: Array) -> None:
+def _balance(body: Deformable, fraction: float, multipliers: Array) -> None:
     """Note the reactions; SolveError if loads, reactions and internal forces do not balance."""
     reaction, at = np.zeros_like(body.q), 0
     for constraint in body.constraints:
@@ -156,10 +156,10 @@ def _balance(body: Deformable, share: float, multipliers: Array) -> None:
         row, dof, value = constraint.jacobian_entries(body, body.q)
         np.add.at(reaction, dof, own[row] * value)
         at += constraint.count
-    load, inner = share * _load(body), body.internal_force(body.q)
-    left = np.abs(load + reaction - inner).max()
+    load, inner = fraction * _load(body), body.internal_force(body.q)
+    residual = np.abs(load + reaction - inner).max()
     scale = max(np.abs(load).max(), np.abs(reaction).max(), np.abs(inner).max())
     K = body.stiffness(body.q)
-    noise = 1e-14 * float(np.abs(K.data if isinstance(K, BlockMatrix) else K).max() * np.abs(body.q).max())
-    if left > UNBALANCED * scale + noise:
-        raise SolveError(f"{left / scale:.1%} of the loads find no reaction, so the body would move")
+    roundoff = 1e-14 * float(np.abs(K.data if isinstance(K, BlockMatrix) else K).max() * np.abs(body.q).max())
+    if residual > UNBALANCED * scale + roundoff:
+        raise SolveError(f"{residual / scale:.1%} of the loads find no reaction, so the body would move")

@@ -345,10 +345,10 @@ class FiniteElementBody(Deformable):
         holds has its six rigid motions first.
         """
         K, M = self.formulation.K0.scipy().tocsr(), self._mass.matrix()
-        held = [c.jacobian(self, np.zeros(self.dofs)) for c in self.constraints]
-        if not held:
+        constrained = [c.jacobian(self, np.zeros(self.dofs)) for c in self.constraints]
+        if not constrained:
             return modes(K, M, count)
-        T = allowed(np.concatenate(held))
+        T = allowed(np.concatenate(constrained))
         omega, shapes = modes((T.T @ K @ T).tocsr(), (T.T @ M @ T).tocsr(), count)
         return omega, np.asarray(T @ shapes)
 

@@ -10,7 +10,8 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.bodies.linear_algebra import Entries
 from kratos_lite.solvers import direct
 from kratos_lite.solvers.constraint_map import ConstraintMap
-from kratos_lite.solvers.linear_solver import LinearSolver, choose
+from kratos_lite.solvers.linear_solver import LinearSolver
+from kratos_lite.solvers.plan import Facts, choose
 from kratos_lite.typing import Array, Ints
 
 
@@ -48,10 +49,9 @@ def _eliminated(
     prescribed, free = np.zeros(n), np.ones(n, dtype=bool)
     prescribed[dof], free[dof] = -gap / value, False
     constraints = ConstraintMap(np.flatnonzero(free), prescribed)
-    method, reason = choose("auto", len(constraints.free), n)
-    method = method if symmetric or method == "dense" else "direct"
-    matrix: Any = K if method != "dense" else K.scipy().toarray()
-    solver = LinearSolver(matrix, constraints, points, method, reason, symmetric=symmetric)
+    plan = choose("auto", Facts(len(constraints.free), n, symmetric))
+    matrix: Any = K.scipy().toarray() if plan.method == "dense" else K
+    solver = LinearSolver(matrix, constraints, points, plan, symmetric=symmetric)
     x = solver.solve(residual, 1e-12).x
     reaction = (K @ x - residual)[dof] / value
     twice = np.bincount(dof, minlength=n)[dof]
@@ -59,12 +59,10 @@ def _eliminated(
 
 
 def _less(K: BlockMatrix, tangent: Entries) -> BlockMatrix:
-    from scipy.sparse import bsr_array, csr_array
+    from scipy.sparse import csr_array
 
     row, column, value = tangent
-    A = bsr_array(K.scipy().tocsr() - csr_array((value, (row, column)), shape=K.shape), blocksize=(3, 3))
-    A.sort_indices()
-    return BlockMatrix(A.data, A.indices.astype(np.int32), A.indptr.astype(np.int32))
+    return BlockMatrix.of(K.scipy().tocsr() - csr_array((value, (row, column)), shape=K.shape))
 
 
 def _with_multipliers(K: BlockMatrix, residual: Array, entries: Entries, gap: Array) -> tuple[Array, Array]:

@@ -34,7 +34,7 @@ class PseudoRigidBody(AffineBody, Deformable):
 
     Parameters
     ----------
-    mesh : the shape; may be left out where mass_properties are given.
+    mesh : the shape; may be omitted where mass_properties are given.
     material : one material (a body of several has no single C).
     mass_properties : mass, volume, center and Euler tensor in place of those of mesh and material.
     integrator : one of `Deformable.integrators`; ``energy_momentum`` if not given.

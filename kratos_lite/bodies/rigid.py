@@ -32,7 +32,7 @@ class RigidBody(AffineBody):
 
     Parameters
     ----------
-    mesh : the shape; may be left out where mass_properties are given.
+    mesh : the shape; may be omitted where mass_properties are given.
     material : its density counts.
     mass_properties : mass, center and inertia in place of those of mesh and material; with leading axes for
         a batch of bodies.

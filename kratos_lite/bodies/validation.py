@@ -14,6 +14,7 @@ from kratos_lite.errors import InputError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.checks import checked_material
+from kratos_lite.model.hourglass_modes import check_rules
 from kratos_lite.model.mass_properties import MassProperties
 from kratos_lite.model.spurious_modes import check_spurious_modes
 from kratos_lite.model.structure import Structure
@@ -28,11 +29,8 @@ def elements_of(mesh: Mesh, material: Material, unnamed: str = NON_LOCKING) -> l
     structure = Structure(mesh, material if isinstance(material, Mapping) else checked_material(material))
     structure.check_geometry()
     groups = structure.element_groups(unnamed)
-    if not all(group.is_proven for group in groups):
-        from kratos_lite.model.hourglass_modes import check_rules  # rarely needed
-
-        check_rules(mesh, groups)
-    check_spurious_modes(mesh, groups, None, mesh.all_faces)
+    check_rules(mesh, groups)
+    check_spurious_modes(mesh, groups)
     return groups
 
 

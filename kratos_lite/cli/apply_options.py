@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
-import re
 from argparse import Namespace
 from collections.abc import Callable
 from dataclasses import replace
-from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kratos_lite.analysis.model import Model
-from kratos_lite.errors import InputError, MaterialError, nearest
+from kratos_lite.cli.option_texts import (
+    fraction_of,
+    integrator_of,
+    material_of,
+    number,
+    rates_of,
+    rayleigh_of,
+    split_part,
+    steps_of,
+    vector,
+)
+from kratos_lite.errors import InputError, nearest
 from kratos_lite.io.case import Case, Outputs, TimeIntegration
 from kratos_lite.io.files import read_case
 from kratos_lite.materials import MATERIALS, LinearMaterial
@@ -19,12 +28,10 @@ from kratos_lite.model.loads import Load
 from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.loads.nodal import PointLoad
 from kratos_lite.model.loads.surface import Pressure, Traction
-from kratos_lite.tabular import names_of
 from kratos_lite.validation import whole_number
 
 if TYPE_CHECKING:
     from kratos_lite.ale import Motion
-    from kratos_lite.analysis.integrators import ModelIntegrator
 
 OF_TIME = ("integrator", "rayleigh", "lumped", "restart", "state", "steps")
 """Options that need a time integration."""
@@ -61,7 +68,7 @@ def case_of(options: Namespace, part: int | None = None) -> Case:
 
     `part` is the number of the part file to read, of a mesh in parts.
     """
-    materials = [material(text) for text in options.material]
+    materials = [material_of(text) for text in options.material]
     everywhere = any(part is None for part, _ in materials)
     case = read_case(
         options.input,
@@ -78,7 +85,7 @@ def case_of(options: Namespace, part: int | None = None) -> Case:
         if options.tolerance is not None:
             case.tolerance = options.tolerance
         if options.error is not None:
-            case.error = share(options.error, "--error")
+            case.error = fraction_of(options.error, "--error")
     else:
         refuse(options, OF_MODELS, f"is for models; {options.input} describes a body")
     case.time = _time(options, case.time)
@@ -88,22 +95,6 @@ def case_of(options: Namespace, part: int | None = None) -> Case:
     if options.modes is not None:
         _take_modes(case, options)
     return case
-
-
-def share(text: str, what: str) -> float:
-    """Return a share between 0 and 1, given as one or in percent.
-
-    >>> share("2.5%", "--error"), share("0.01", "--error")
-    (0.025, 0.01)
-    """
-    word = text.strip()
-    try:
-        fraction = number(word.removesuffix("%"), what) / (100 if word.endswith("%") else 1)
-    except InputError:
-        fraction = 0.0
-    if not 0 < fraction < 1:
-        raise InputError(f"{what} must be a share between 0 and 1, such as 1% or 0.01; got {text!r}")
-    return fraction
 
 
 def refuse(options: Namespace, names: tuple[str, ...], why: str) -> None:
@@ -147,7 +138,7 @@ def _time(options: Namespace, of_file: TimeIntegration | None) -> TimeIntegratio
     """Return the time integration that the options and a file ask for."""
     time = of_file
     if options.time is not None:
-        step, steps, every = _steps(options.time)
+        step, steps, every = steps_of(options.time)
         time = (
             replace(of_file, step=step, steps=steps, every=every, place="")
             if of_file
@@ -163,9 +154,9 @@ def _time(options: Namespace, of_file: TimeIntegration | None) -> TimeIntegratio
     if options.steps is not None:
         changes["steps"] = whole_number(options.steps, "--steps")
     if options.integrator:
-        changes["integrator"] = _integrator(options.integrator)
+        changes["integrator"] = integrator_of(options.integrator)
     if options.rayleigh:
-        changes["rayleigh"] = _rayleigh(options.rayleigh)
+        changes["rayleigh"] = rayleigh_of(options.rayleigh)
     if options.lumped:
         changes["lumped"] = True
     if options.restart:
@@ -173,119 +164,11 @@ def _time(options: Namespace, of_file: TimeIntegration | None) -> TimeIntegratio
     return replace(time, **changes)
 
 
-def _steps(text: str) -> tuple[float, int, int]:
-    """Return step, number of steps and every how many a state is kept of ``STEP:STEPS[:EVERY]``.
-
-    >>> _steps("1e-3:200:10")
-    (0.001, 200, 10)
-    """
-    step, *counts = text.split(":")
-    if len(counts) not in (1, 2) or not all(re.fullmatch("[0-9]{1,18}", count) for count in counts):
-        raise InputError(f"--time: expected STEP:STEPS[:EVERY] such as 1e-3:200:10; got {text!r}")
-    steps, every = (int(count) for count in (*counts, "1")[:2])
-    return number(step, "--time"), steps, every
-
-
-def _integrator(text: str) -> ModelIntegrator:
-    """Return the integrator of ``NAME[:NUMBERS]``.
-
-    >>> str(_integrator("hht:-0.1"))
-    'hht(-0.1)'
-    """
-    from kratos_lite.analysis.integrators import INTEGRATORS  # a quick start of statics
-
-    name, _, words = text.partition(":")
-    numbers = _numbers(words, "--integrator")
-    if name not in INTEGRATORS:
-        hint = nearest(name, INTEGRATORS)
-        raise InputError(f"unknown integrator {name!r}.{hint} Known are {', '.join(INTEGRATORS)}")
-    make: Callable[..., ModelIntegrator] = INTEGRATORS[name]
-    counts = sorted({0, len(names_of(INTEGRATORS[name]))})
-    if len(numbers) not in counts:
-        raise InputError(f"{name} takes {' or '.join(map(str, counts))} numbers; got {len(numbers)}")
-    return make(*numbers)
-
-
-def _numbers(text: str, option: str) -> list[float]:
-    return [number(word, option) for word in text.split(",")] if text else []
-
-
-def _rayleigh(text: str) -> tuple[float, float]:
-    values = _numbers(text, "--rayleigh")
-    if len(values) != 2 or min(values) < 0:
-        raise InputError(f"--rayleigh: ALPHA,BETA, both ≥ 0, in 1/s and s are needed; got {text!r}")
-    return values[0], values[1]
-
-
-def number(text: str, option: str) -> float:
-    """Return a finite number or say which option holds what instead."""
-    try:
-        value = float(text) if "_" not in text else float("nan")
-    except ValueError:
-        value = float("nan")
-    if not isfinite(value):
-        raise InputError(f"{option}: {text!r} is not a finite number such as 1.5 or 2e9")
-    return value
-
-
-def vector(text: str, option: str) -> list[float]:
-    """Return three numbers.
-
-    >>> vector("0,0,-9.81", "--gravity")
-    [0.0, 0.0, -9.81]
-    """
-    words = text.split(",")
-    if len(words) != 3:
-        raise InputError(f"{option}: three numbers X,Y,Z are needed; got {text!r}")
-    return [number(word, option) for word in words]
-
-
 LOADS: dict[str, tuple[Callable[[str, Any], Load], Callable[[str, str], Any], str]] = {
     "traction": (Traction, vector, "PART:X,Y,Z"),
     "pressure": (Pressure, number, "PART:P"),
     "point_load": (PointLoad, vector, "PART:X,Y,Z"),
 }
-
-
-def split_part(text: str, option: str, example: str) -> tuple[str, str]:
-    """Split ``PART:rest`` at the last colon."""
-    part, colon, rest = text.rpartition(":")
-    if not (part and colon and rest):
-        raise InputError(f"{option}: expected {example}; got {text!r}")
-    return part, rest
-
-
-def material(text: str) -> tuple[str | None, LinearMaterial]:
-    """Return part (or None) and material of ``[PART:][LAW:]constant=value,…``.
-
-    >>> material("steel:E=210e9,nu=0.3")
-    ('steel', Isotropic3D(E=210000000000.0, nu=0.3, density=0.0))
-    """
-    option = f"--material {text}"
-    *names, constants = text.split(":")
-    part, law = None, "Isotropic3D"
-    for name in names:
-        if name in MATERIALS:
-            law = name
-        elif part is None:
-            part = name
-        else:
-            laws = ", ".join(MATERIALS)
-            raise InputError(f"{option}: {name!r} is no material; have {laws}.{nearest(name, MATERIALS)}")
-    kind = MATERIALS[law]
-    values: dict[str, float] = {}
-    for pair in constants.split(","):
-        key, equals, value = (word.strip() for word in pair.partition("="))
-        variable = kind.variables.get(key, key)
-        if not equals or variable not in kind.variables.values():
-            raise InputError(f"{option}: constants of {law} are {', '.join(kind.variables)}; got {pair!r}")
-        if variable in values:
-            raise InputError(f"{option}: {key} is given twice")
-        values[variable] = number(value, option)
-    try:
-        return part, kind.from_variables(values)
-    except MaterialError as error:
-        raise InputError(f"{option}: {error}") from None
 
 
 def _where(model: Model, part: str | None) -> str | int | None:
@@ -315,7 +198,7 @@ def motion(model: Model, options: Namespace) -> Motion | None:
         return None
     from kratos_lite.ale import Rotation, Translation  # a quick start without motion
 
-    rates = _rates(text, option)
+    rates = rates_of(text, option)
     common: dict[str, Any] = {"damping": number(options.damping or "0", "--damping")}
     common["part"] = options.moving_part
     try:
@@ -327,19 +210,6 @@ def motion(model: Model, options: Namespace) -> Motion | None:
         return Rotation(*rates, stiffening=options.stiffening, **common)
     except InputError as error:
         raise InputError(f"{option} {text}: {error}") from None
-
-
-def _rates(text: str, option: str) -> tuple[str | list[float], float, float]:
-    """Return axis, rate and acceleration of ``AXIS:RATE[:ACCELERATION]``.
-
-    >>> _rates("z:-30:2.5", "--rotation")
-    ('z', -30.0, 2.5)
-    """
-    axis, *numbers = text.split(":")
-    if not axis or len(numbers) not in (1, 2):
-        raise InputError(f"{option}: expected AXIS:RATE[:ACCELERATION] such as z:30; got {text!r}")
-    rate, acceleration = (number(word, option) for word in (*numbers, "0")[:2])
-    return vector(axis, option) if "," in axis else axis, rate, acceleration
 
 
 def apply(model: Model, options: Namespace, materials: list[tuple[str | None, LinearMaterial]]) -> None:

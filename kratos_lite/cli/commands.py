@@ -25,13 +25,13 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def solve(options: Namespace) -> int:
-    """Run what an input and the options describe, print the summary, write what was asked for."""
+    """Run what an input and the options describe, print the summary, write the requested files."""
     use_threads(options.threads)
     return _within_numbers(_solve, options, perf_counter())
 
 
 def _within_numbers(action: Callable[..., int], options: Namespace, *more: Any) -> int:
-    """Do something with an input; an overflow, or what is no number, becomes an error in words."""
+    """Do something with an input; an overflow or NaN becomes a readable error."""
     import numpy as np
 
     from kratos_lite.io.formats import input_file
@@ -105,7 +105,7 @@ def _print(lines: list[str]) -> None:
 
 
 def info(options: Namespace) -> int:
-    """Describe a file; of a run file, what it means."""
+    """Describe a model file; of a run file or script, its case."""
     return _within_numbers(_info, options)
 
 
@@ -125,7 +125,7 @@ def _info(options: Namespace) -> int:
 
 
 def _document(options: Namespace) -> Document:
-    """Return what a file says; of a run file, what the model says that it means."""
+    """Return what a model file says; of a run file or script, a document of its model."""
     from kratos_lite.io.formats import ending, read_document
 
     if ending(options.input) not in (".json", ".py"):

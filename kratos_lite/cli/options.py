@@ -14,7 +14,7 @@ EXIT_CODES = """exit codes:
   0    done
   1    a defect of kratos-lite, or a row of verify that fails
   2    bad input, or an output that cannot be written
-  3    solved, but an expected value of the run file, or the error asked for, is missed
+  3    solved, but an expected value of the run file, or the requested error, is not reached
   130  interrupted with Ctrl-C; 143 by SIGTERM"""
 MODEL = (
     ".mdpa, any file of an .elem set or its stem, ProjectParameters.json or its folder, or any mesh that "
@@ -158,7 +158,7 @@ def _add_case(command: argparse.ArgumentParser) -> None:
     how = command.add_argument_group("solver")
     _add_options(how, ("--modes", "N", MODES), type=int)
     _add_options(how, ("--solver", "", "auto chooses by size"), choices=("auto", "dense", "direct", "amg"))
-    _add_options(how, ("--error", "SHARE", ERROR))
+    _add_options(how, ("--error", "FRACTION", ERROR))
     _add_options(how, ("--engine", "", ENGINE), choices=("own", "petsc"))
     _add_options(how, ("--petsc", "OPTIONS", "options of PETSc, such as '-pc_type hypre'"))
     _add_options(how, ("--tolerance", "", "relative residual of the iterative solver (1e-10)"), type=float)

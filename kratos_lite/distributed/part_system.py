@@ -12,9 +12,9 @@ from kratos_lite.assembly.gauss_point_fields import internal_load
 from kratos_lite.distributed.equations import Equations, Method
 from kratos_lite.distributed.partition import Partition
 from kratos_lite.distributed.petsc import parsed
-from kratos_lite.distributed.petsc_system import CURE, CURE_OF_FACTORS, PATIENCE
-from kratos_lite.distributed.preconditioner import choose
-from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear
+from kratos_lite.distributed.petsc_system import CURE, CURE_OF_FACTORS, PATIENCE, unused_words
+from kratos_lite.distributed.preconditioner import plan_of
+from kratos_lite.elements.formulations import bulk_over_shear
 from kratos_lite.errors import SolveError
 from kratos_lite.solvers.linear_solver import Solution
 from kratos_lite.typing import Array, Mask, Progress
@@ -55,9 +55,9 @@ class PartSystem:
         part = partition.equations(points, self._elastic, held)
         self._rows = part.own
         self.unknowns = ranks.sum(int((~held[part.own]).sum()))
-        nearly = ranks.any(any(bulk_over_shear(group.material.C) > NEAR_HALF for group in groups))
-        self.method, self.reason = choose(solver, self.unknowns, nearly, given)
-        self._equations = Equations(ranks, part, Method(self.method, given, False, PATIENCE), progress)
+        ratio = ranks.max(max((bulk_over_shear(group.material.C) for group in groups), default=0.0))
+        self.plan = plan_of(solver, self.unknowns, ratio, given)
+        self._equations = Equations(ranks, part, Method(self.plan.method, given, False, PATIENCE), progress)
         self.skipped = self._equations.skipped
         self.warnings: list[str] = []
 
@@ -74,14 +74,12 @@ class PartSystem:
         b = np.where(self._held, 0.0, load)[self._rows]
         x, name, iterations, error, failure = self._equations.solve(b, self._tolerance)
         if failure:
-            raise SolveError(f"{failure}; {CURE if self.method == 'amg' else CURE_OF_FACTORS}")
-        if unused := self._equations.unused_options():
-            words = " ".join(f"-{option}" for option in unused)
-            self.warnings = [f"PETSc has not used these options: {words}; they may be misspelt"]
+            raise SolveError(f"{failure}; {CURE if self.plan.iterates else CURE_OF_FACTORS}")
+        self.warnings = unused_words(self._equations.unused_options())
         u = prescribed.copy()
         u[self._rows] += x
         u = np.asarray(partition.fetch(u))
-        return u, Solution(u, name, self.reason, iterations, error)
+        return u, Solution(u, name, self.plan.reason, iterations, error)
 
     def destroy(self) -> None:
         """Release matrix and solver."""

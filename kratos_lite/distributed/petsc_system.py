@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from itertools import count
@@ -16,13 +16,14 @@ from kratos_lite.distributed.communicator import Alone
 from kratos_lite.distributed.cut import Cut, Part
 from kratos_lite.distributed.equations import Equations, Method
 from kratos_lite.distributed.petsc import parsed
-from kratos_lite.distributed.preconditioner import FALLBACK_LIMIT, choose
-from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear
+from kratos_lite.distributed.preconditioner import plan_of
+from kratos_lite.elements.formulations import bulk_over_shear
 from kratos_lite.errors import SolveError
-from kratos_lite.solvers.constrained_system import renumber
+from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.constraint_map import ConstraintMap
 from kratos_lite.solvers.iteration import MAX_ITERATIONS
 from kratos_lite.solvers.linear_solver import Solution
+from kratos_lite.solvers.plan import MUMPS_FALLBACK, Plan
 from kratos_lite.typing import Array, Ints, Progress
 
 PATIENCE = 5 * MAX_ITERATIONS
@@ -39,28 +40,16 @@ KEPT: dict[int, Equations] = {}
 """The equations of this rank, by the number of their system."""
 
 
-class PetscSystem:
-    """K u = f + reactions on the nodes of some elements, with u = T q + c, as a `ConstrainedSystem`.
-
-    The rank that makes it has all elements; all ranks assemble and solve their parts of the equations.
+class PetscSystem(ConstrainedSystem):
+    """A constrained system that rank 0 has, and of which all ranks assemble and solve a part.
 
     Parameters
     ----------
-    points : (n, 3) m.
-    groups : the elements, by indices of the points.
-    constraints : gives the constraint map of the nodes that carry equations, by their indices.
+    points, groups, constraints : as for a `ConstrainedSystem`.
     ranks : that assemble and solve.
-    solver : ``auto``, ``dense`` and ``direct`` (both MUMPS), or ``amg``.
-    tolerance : relative residual at which the iteration stops.
     options : of PETSc, which win over all others, such as ``-ksp_type cg -pc_type hypre``.
-    progress : called with the phase and the fraction done, 0 … 1.
-
-    Attributes
-    ----------
-    nodes : (a,) int, indices of the nodes of these elements.
-    reduced : the constraint map, from the free degrees of freedom to all 3a.
-    method, reason : which solver is used, and why.
-    skipped, warnings : what assembly left out, and what is to be said, in words.
+    solver : ``auto``, ``dense`` and ``direct`` (both MUMPS), or ``amg``.
+    tolerance, progress : as for a `ConstrainedSystem`.
     """
 
     def __init__(
@@ -69,54 +58,78 @@ class PetscSystem:
         groups: Sequence[ElementGroup],
         constraints: Callable[[Ints], ConstraintMap],
         ranks: Alone,
+        options: str | None = None,
         *,
         solver: str = "auto",
         tolerance: float = 1e-10,
-        options: str | None = None,
         progress: Progress | None = None,
     ) -> None:
-        self.n_nodes, self.ranks = len(points), ranks
-        self.nodes, self.groups = renumber(self.n_nodes, groups)
-        self.points = points[self.nodes]
-        self.reduced = constraints(self.nodes)
-        self.tolerance, self._progress = tolerance, Postponed(progress) if progress else None
-        self.skipped: list[str] = []
-        self.warnings: list[str] = []
-        self._elastic = [replace(group, prestress=None) for group in self.groups]
-        self._options = parsed(options)
-        self.unknowns = len(self.reduced.free)
-        nearly = any(bulk_over_shear(group.material.C) > NEAR_HALF for group in groups)
-        self.method, self.reason = choose(solver, self.unknowns, nearly, self._options)
-        self._key: int | None = None
+        self._ranks, self._options = ranks, parsed(options)
+        super().__init__(points, groups, constraints, solver=solver, tolerance=tolerance, progress=progress)
+
+    def _planned(self, solver: str) -> Plan:
+        ratios = [bulk_over_shear(group.material.C) for group in self.groups]
+        return plan_of(solver, len(self.constraint_map.free), max(ratios, default=0.0), self._options)
 
     @cached_property
-    def _cut(self) -> Cut:
-        return Cut(self.points, self._elastic, self.reduced, self.ranks.size)
+    def K(self) -> ElementProduct:
+        """The stiffness, as a product: nobody has all of the matrix."""
+        return ElementProduct(self.points, self.groups)
 
     @cached_property
+    def _equations(self) -> PetscSolver:  # type: ignore[override]
+        cut = Cut(self.points, self.K.groups, self.constraint_map, self._ranks.size)
+        return PetscSolver(self, cut, self._ranks, self._options)
+
+    def destroy(self) -> None:
+        """Let all ranks release matrix and solver."""
+        if "_equations" in vars(self):
+            self._equations.destroy()
+
+
+class ElementProduct:
+    """K, of which nobody has a matrix: its products element by element."""
+
+    def __init__(self, points: Array, groups: Sequence[ElementGroup]) -> None:
+        self.points, self.groups = points, [replace(group, prestress=None) for group in groups]
+
+    def __matmul__(self, u: Array) -> Array:
+        return internal_load(self.points, self.groups, u.reshape(-1, 3)).ravel()
+
+
+class PetscSolver:
+    """Solves the equations of a system on all ranks; the interface is that of a `LinearSolver`."""
+
+    def __init__(
+        self, system: PetscSystem, cut: Cut, ranks: Alone, options: Mapping[str, str | None]
+    ) -> None:
+        self._system, self._cut, self._ranks, self._options = system, cut, ranks, options
+        self._plan, self._key, self._norm = system.plan, -1, 0.0
+        self._unknowns = len(system.constraint_map.free)
+        self._progress = Postponed(system.progress) if system.progress else None
+
+    @property
     def norm(self) -> float:
         """The largest row sum of |K| at nodes with equations."""
         self._assemble()
         return self._norm
 
     def _assemble(self) -> None:
-        """Let all ranks make their equations."""
-        if self._key is not None:
+        """Let all ranks make their equations, once."""
+        if self._key >= 0:
             return
-        most = MAX_ITERATIONS if self.unknowns <= FALLBACK_LIMIT else PATIENCE
-        method = Method(self.method, self._options, self._cut.is_constrained, most)
+        most = MAX_ITERATIONS if self._unknowns <= MUMPS_FALLBACK else PATIENCE
+        method = Method(self._plan.method, self._options, self._cut.is_constrained, most)
         key = next(KEYS)
 
         def of_rank(rank: int) -> tuple[Part, Progress | None]:
             return self._cut.part(rank), None if rank else self._progress
 
-        self._norm, self.skipped = self._run(_make, key, method, each=of_rank)
+        self._norm, self._system.skipped = self._run(_make, key, method, each=of_rank)
         self._key = key
 
-    def _run(
-        self, task: Callable[..., Any], *arguments: Any, each: Callable[[int], Any] | None = None
-    ) -> Any:
-        found = self.ranks.run(task, *arguments, each=each)
+    def _run(self, task: Callable[..., Any], *arguments: Any, each: Callable[[int], Any]) -> Any:
+        found = self._ranks.run(task, *arguments, each=each)
         if self._progress:
             self._progress.raise_error()
         return found
@@ -124,51 +137,35 @@ class PetscSystem:
     def solve(
         self,
         forces: Array,
+        tolerance: float,
+        progress: Progress | None = None,
         prescribed: Array | None = None,
-        tolerance: float | None = None,
-        start: Array | None = None,
-    ) -> tuple[Array, Solution]:
-        """Return the displacements (n, 3) under nodal forces (n, 3), and how they were found.
-
-        Parameters
-        ----------
-        forces : (n, 3) N.
-        prescribed : (3a,) m, in place of c of the constraint map.
-        tolerance : in place of that of the system.
-        start : (n, 3) m, near the solution; an iteration begins there.
-
-        Raises
-        ------
-        SolveError
-            If the matrix is singular or the accuracy asked for cannot be reached.
-        """
-        c = self.reduced.c if prescribed is None else prescribed
-        load = self.gather(forces)
-        if c.any():
-            load = load - self._product(c)
-        b, x0 = np.zeros(len(c)), None
-        b[self.reduced.free] = self.reduced.reduce(load)
-        if start is not None:
-            x0 = np.zeros(len(c))
-            x0[self.reduced.free] = (self.gather(start) - c)[self.reduced.free]
-        x, solution = self._found(b, x0, self.tolerance if tolerance is None else tolerance)
-        u = self.scatter(self.reduced.expand(x[self.reduced.free], c))
-        return u, replace(solution, x=u)
+        near: Array | None = None,
+    ) -> Solution:
+        """Return the displacements (3a,) under forces (3a,), and how they were found."""
+        constraints = self._system.constraint_map
+        c = constraints.c if prescribed is None else prescribed
+        load = forces - self._system.K @ c if c.any() else forces
+        b, start = np.zeros(len(c)), None
+        b[constraints.free] = constraints.reduce(load)
+        if near is not None:
+            start = np.zeros(len(c))
+            start[constraints.free] = (near - c)[constraints.free]
+        x, solution = self._found(b, start, tolerance)
+        return replace(solution, x=constraints.expand(x[constraints.free], c))
 
     def _found(self, b: Array, start: Array | None, tolerance: float) -> tuple[Array, Solution]:
         """Solve for b (3a,); a small system whose iteration fails is factorized, unless options are given."""
         x, name, iterations, error, failure, unused = self._solve(b, start, tolerance)
-        reason = self.reason
-        if failure and self.method == "amg" and not self._options and self.unknowns <= FALLBACK_LIMIT:
+        reason = self._plan.reason
+        if failure and self._plan.iterates and not self._options and self._unknowns <= MUMPS_FALLBACK:
             self.destroy()
-            self.method, reason = "direct", failure
+            self._plan, reason = Plan("direct", failure), failure
             x, name, iterations, error, failure, unused = self._solve(b, None, tolerance)
         if failure:
-            raise SolveError(f"{failure}; {CURE if self.method == 'amg' else CURE_OF_FACTORS}")
-        if unused:
-            words = " ".join(f"-{option}" for option in unused)
-            self.warnings = [f"PETSc has not used these options: {words}; they may be misspelt"]
-        return x, Solution(np.zeros(0), name, reason, iterations, error)
+            raise SolveError(f"{failure}; {CURE if self._plan.iterates else CURE_OF_FACTORS}")
+        self._system.warnings = unused_words(unused)
+        return x, Solution(x, name, reason, iterations, error)
 
     def _solve(self, b: Array, start: Array | None, tolerance: float) -> Any:
         self._assemble()
@@ -184,33 +181,19 @@ class PetscSystem:
             x[nodes] = values
         return x.ravel(), *rest
 
-    def _product(self, u: Array) -> Array:
-        """Return K u (3a,)."""
-        return internal_load(self.points, self._elastic, u.reshape(-1, 3)).ravel()
-
-    def internal_load(self, u: Array) -> Array:
-        """Return ∫ B^T σ dV of displacements (n, 3) as nodal forces (n, 3) in N."""
-        return self.scatter(internal_load(self.points, self.groups, u[self.nodes]).ravel())
-
-    def residual(self, u: Array, forces: Array) -> Array:
-        """Return K u - f as nodal forces (n, 3) in N: reactions where something is prescribed."""
-        return self.scatter(self._product(self.gather(u))) - forces
-
-    def gather(self, values: Array) -> Array:
-        """Return nodal values (n, 3) as those of the nodes of the elements, (3a,)."""
-        return values[self.nodes].ravel()
-
-    def scatter(self, values: Array) -> Array:
-        """Return values (3a,) as nodal values (n, 3), 0 on other nodes."""
-        out = np.zeros((self.n_nodes, 3))
-        out[self.nodes] = values.reshape(-1, 3)
-        return out
-
     def destroy(self) -> None:
         """Let all ranks release matrix and solver."""
-        if self._key is not None:
-            key, self._key = self._key, None
-            self.ranks.run(_destroy, key)
+        if self._key >= 0:
+            key, self._key = self._key, -1
+            self._ranks.run(_destroy, key)
+
+
+def unused_words(options: Sequence[str]) -> list[str]:
+    """Return a warning of options that PETSc has not asked for."""
+    if not options:
+        return []
+    words = " ".join(f"-{option}" for option in options)
+    return [f"PETSc has not used these options: {words}; they may be misspelt"]
 
 
 class Postponed:

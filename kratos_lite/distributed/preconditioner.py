@@ -1,18 +1,11 @@
-"""Which solver and preconditioner of PETSc a system gets, and why."""
+"""Options of PETSc for a method of solution."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
 from kratos_lite.distributed.petsc import has_mumps
-from kratos_lite.elements.formulations import NEAR_HALF
-from kratos_lite.solvers.linear_solver import METHODS
-from kratos_lite.validation import choice
-
-DIRECT_LIMIT = 6_000
-"""Up to this many unknowns MUMPS takes no longer than an iteration (0.2 s; at 26 000 five times as long)."""
-FALLBACK_LIMIT = 300_000
-"""Up to this many unknowns a factorization is tried when the iteration fails."""
+from kratos_lite.solvers.plan import Facts, Plan, over_ranks
 
 CONJUGATE_GRADIENTS: dict[str, str | None] = {"ksp_type": "cg", "ksp_norm_type": "unpreconditioned"}
 """K is symmetric and positive definite; the norm is that of the residual, to which tolerances refer."""
@@ -41,33 +34,10 @@ FACTORIZATION: dict[str, str | None] = {
 """MUMPS, which factorizes over ranks."""
 
 
-def choose(solver: str, unknowns: int, nearly: bool, given: Mapping[str, str | None]) -> tuple[str, str]:
-    """Return the method, ``direct`` or ``amg``, and the reason in words.
-
-    Parameters
-    ----------
-    solver : ``auto``, ``dense``, ``direct`` or ``amg``.
-    unknowns : of all ranks.
-    nearly : whether a material is nearly incompressible.
-    given : options of the user.
-
-    Examples
-    --------
-    >>> choose("dense", 1000, False, {})[0], choose("auto", 1000, False, {"pc_type": "hypre"})[0]
-    ('direct', 'amg')
-    """
-    if choice(solver, "solver", METHODS) != "auto":
-        return "direct" if solver == "dense" else solver, "asked for"
-    if {"ksp_type", "pc_type"} & set(given):
-        return "amg", "PETSc options ask for it"
-    few = unknowns <= FALLBACK_LIMIT and has_mumps()
-    if few and unknowns <= DIRECT_LIMIT:
-        return "direct", f"{unknowns} unknowns ≤ {DIRECT_LIMIT}: a factorization is fastest"
-    if few and nearly:
-        return "direct", f"few unknowns with a bulk modulus > {NEAR_HALF:g} shear moduli: iterations are slow"
-    if not has_mumps():
-        return "amg", "PETSc was made without MUMPS, so that it iterates"
-    return "amg", f"{unknowns} unknowns > {DIRECT_LIMIT}: multigrid is fastest and takes least memory"
+def plan_of(solver: str, unknowns: int, ratio: float, given: Mapping[str, str | None]) -> Plan:
+    """Return how PETSc solves: of all ranks, the unknowns and the largest bulk over shear modulus."""
+    facts = Facts(unknowns, bulk_over_shear=lambda: (ratio, ratio))
+    return over_ranks(solver, facts, has_mumps(), bool({"ksp_type", "pc_type"} & set(given)))
 
 
 def options_of(method: str, given: Mapping[str, str | None], multigrid: bool) -> dict[str, str | None]:

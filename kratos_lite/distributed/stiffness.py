@@ -21,10 +21,10 @@ from kratos_lite.distributed.communicator import Alone
 from kratos_lite.distributed.ghosts import Ghosts
 from kratos_lite.distributed.multigrid import Level, Multigrid
 from kratos_lite.native import kernels
-from kratos_lite.solvers.coarse_level import has_corners, has_middle_nodes, is_stretched, linear_level
-from kratos_lite.solvers.constrained_system import LARGEST_CONTRAST
+from kratos_lite.solvers.coarse_level import has_corners, has_middle_nodes, is_stretched, p_coarse_level
 from kratos_lite.solvers.constraint_map import rigid_modes
 from kratos_lite.solvers.multigrid import multigrid
+from kratos_lite.solvers.plan import Facts, needs_no_matrix
 from kratos_lite.solvers.plate_level import plate_axes
 from kratos_lite.typing import Array, Ints, Mask, Progress
 
@@ -48,7 +48,7 @@ class OneProcess:
         groups: Sequence[ElementGroup],
         own: int,
     ) -> None:
-        self._multigrid = multigrid(K, free.ravel(), points, linear_level(points, groups))
+        self._multigrid = multigrid(K, free.ravel(), points, p_coarse_level(points, groups))
         self._all, self._own = 3 * len(points), own
 
     @property
@@ -106,16 +106,17 @@ class SharedStiffness:
 
     def _needs_no_matrix(self) -> bool:
         """Return whether products do on all ranks: quadratic elements of like stiffness, compact cells."""
-        moduli = [float(np.abs(group.material.C).max()) for group in self.groups]
-        low, high = self.ranks.min(min(moduli, default=np.inf)), self.ranks.max(max(moduli, default=0.0))
-        if self.ranks.size == 1 and plate_axes(self.points, self.free.ravel()) is not None:
-            return False
-        local = all(map(MatrixFree.takes, self.groups))
-        return bool(
-            self.ranks.all(local and bool(moduli) and not is_stretched(self.points, self.groups))
-            and high <= LARGEST_CONTRAST * low
-            and self.ranks.any(has_middle_nodes(self.groups))
+        ranks, groups = self.ranks, self.groups
+        moduli = [float(np.abs(group.material.C).max()) for group in groups]
+        takes = ranks.all(bool(groups) and all(map(MatrixFree.takes, groups)))
+        facts = Facts(
+            0,
+            has_product=lambda: takes and ranks.any(has_middle_nodes(groups)),
+            contrast=lambda: ranks.max(max(moduli)) / ranks.min(min(moduli)),
+            is_stretched=lambda: ranks.any(is_stretched(self.points, groups)),
+            is_plate=lambda: ranks.size == 1 and plate_axes(self.points, self.free.ravel()) is not None,
         )
+        return needs_no_matrix(facts)
 
     def _matrix(self, progress: Progress | None) -> BlockMatrix:
         """Return the rows of own nodes; on one rank all, for the multigrid of one process."""
@@ -169,7 +170,7 @@ class SharedStiffness:
         """Return the level of linear elements, the way to it, and places and freedom of its own nodes."""
         n, own = len(self.points), self.ghosts.own
         if self.groups:
-            linear = linear_level(self.points, self.groups, whole=False)
+            linear = p_coarse_level(self.points, self.groups, whole=False)
             assert linear is not None
             nodes, weights = linear.nodes, (linear.indptr, linear.indices, linear.weights)
             K = linear.K

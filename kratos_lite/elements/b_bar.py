@@ -30,7 +30,7 @@ class BBar(KinematicLinear):
 
     A subclass states `shape`, `rule` and the `dilatation`, the degree of the polynomials: 0 for the mean over
     the element, 1 for a linear one.  Neighbors have dilatations of their own.  Where displacements of other
-    dilatations alone would have no energy, `kept` is the share of mᵀB - Π(mᵀB) that stays.
+    dilatations alone would have no energy, `kept` is the fraction of mᵀB - Π(mᵀB) that stays.
 
     Source: Hughes, IJNME 15 (1980) 1413; for linear ones Boffi & Gastaldi, M3AS 12 (2002) 1577:
     polynomials in x, y, z, not in ξ, keep the order on distorted cells.
@@ -46,16 +46,16 @@ class BBar(KinematicLinear):
         functions = np.zeros((len(rule), len(cls.nodes) if cls.dilatation else 0))
         if cls.dilatation:
             functions += cls.N(rule.points) - cls.N(center)
-        share = 1 - float(cls(cls.nodes, rule).kept(C))
-        return StrainTables(cls.dN(center), functions, None, share)
+        fraction = 1 - float(cls(cls.nodes, rule).kept(C))
+        return StrainTables(cls.dN(center), functions, None, fraction)
 
     def B(self, xi: ArrayLike, C: ArrayLike | None = None) -> Array:
         """Return B̄ at points; see `KinematicLinear.B`."""
         B, points = super().B(xi), arguments.points(xi)
         projected = self._projected(points.reshape(-1, 3)).reshape(*B.shape[:-2], -1)
-        share = 1 - self.kept(C)
-        share = share.reshape(share.shape + (1,) * points.ndim)
-        B[..., :3, :] += (share * (projected - _trace(B)) / 3)[..., None, :]
+        fraction = 1 - self.kept(C)
+        fraction = fraction.reshape(fraction.shape + (1,) * points.ndim)
+        B[..., :3, :] += (fraction * (projected - _trace(B)) / 3)[..., None, :]
         return B
 
     def kept(self, C: ArrayLike | None) -> Array:

@@ -125,8 +125,8 @@ def _of_each(
 
     owner = next(base for base in cls.__mro__ if name in vars(base))
     if not vars(owner).get("batched", False):
-        found = [alone(e) for e in range(len(cells))]
-        return tuple(np.stack(part).reshape(*lead, *part[0].shape) for part in zip(*found, strict=True))
+        results = [alone(e) for e in range(len(cells))]
+        return tuple(np.stack(part).reshape(*lead, *part[0].shape) for part in zip(*results, strict=True))
     try:
         many = values(element, *arguments)
     except KratosLiteError:

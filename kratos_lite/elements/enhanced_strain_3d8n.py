@@ -68,7 +68,7 @@ class EnhancedStrain3D8N(KinematicLinear):
         _check_rule(rule)
         if not np.linalg.eigvalsh(C).min() > 0:
             raise _not_definite(cls, C)
-        return StrainTables(cls.dN(np.zeros(3)), _monomials(rule.points), C, share=0.0)
+        return StrainTables(cls.dN(np.zeros(3)), _monomials(rule.points), C, fraction=0.0)
 
     def B(self, xi: ArrayLike, C: ArrayLike | None = None) -> Array:
         """Return B - G D⁻¹ L; InputError without C or with few points, MaterialError if C is not definite."""
@@ -112,10 +112,10 @@ class EnhancedStrain3D8N(KinematicLinear):
 
 
 def _not_definite(cls: type[EnhancedStrain3D8N], C: Array) -> MaterialError:
-    found = np.linalg.eigvalsh(C)
+    eigenvalues = np.linalg.eigvalsh(C)
     return MaterialError(
         f"{cls.__name__} needs a C that is positive definite; got C with the eigenvalues "
-        f"{found.min():.3g} … {found.max():.3g} Pa"
+        f"{eigenvalues.min():.3g} … {eigenvalues.max():.3g} Pa"
     )
 
 

@@ -54,13 +54,13 @@ _LINES = {
 @remembered
 def degree_of(shape: type[Shape]) -> int:
     """Return the degree of shape functions along directions of a rule; `Shape.degree` if not polynomials."""
-    found, k = 0, np.arange(MOST + 2)
+    degree, k = 0, np.arange(MOST + 2)
     T = np.cos(np.outer(k, np.pi * (k + 0.5) / (MOST + 2)))  # Chebyshev polynomials at the zeros of the last
     for start, end in np.array(_LINES[shape.cell]):
         N = np.asarray(shape.N(start + (1 + T[1][:, None]) / 2 * (end - start)), dtype=float)
         size = np.abs(T @ N).max(axis=1)  # of the coefficients
-        found = max(found, int(np.flatnonzero(size > 1e-10 * size.max())[-1]))
-    return found if found <= MOST else shape.degree
+        degree = max(degree, int(np.flatnonzero(size > 1e-10 * size.max())[-1]))
+    return degree if degree <= MOST else shape.degree
 
 
 @remembered
@@ -95,8 +95,8 @@ def interpolations(shape: type[Shape]) -> list[tuple[Array, Array] | None]:
         return np.hstack([ones, points]) @ np.linalg.inv(np.column_stack([np.ones(4), xi[base]]))
 
     linear = shape.linear()
-    found: list[tuple[Array, Array] | None] = [_spanned(shape, np.array(base), affine)]
-    return [*found, _spanned(shape, np.arange(shape.corners), linear.N) if linear else None]
+    maps: list[tuple[Array, Array] | None] = [_spanned(shape, np.array(base), affine)]
+    return [*maps, _spanned(shape, np.arange(shape.corners), linear.N) if linear else None]
 
 
 def _spanned(
@@ -114,9 +114,9 @@ def geometries(shape: type[Shape], X: Array) -> Geometries:
     """Return AFFINE, STRAIGHT or CURVED of cells X (..., n, 3)."""
     near = ROUNDING * np.abs(X).max(axis=(-2, -1))
     X = X - X[..., :1, :]
-    found = np.full(X.shape[:-2], CURVED, dtype=np.int8)
+    kinds = np.full(X.shape[:-2], CURVED, dtype=np.int8)
     for geometry in (STRAIGHT, AFFINE):
         if spanned := interpolations(shape)[geometry]:
             nodes, C = spanned
-            found[np.abs(X - C @ X[..., nodes, :]).max(axis=(-2, -1)) <= near] = geometry
-    return found
+            kinds[np.abs(X - C @ X[..., nodes, :]).max(axis=(-2, -1)) <= near] = geometry
+    return kinds

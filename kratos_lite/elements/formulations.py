@@ -40,19 +40,19 @@ def element_of(
         if not is_unnamed(name):
             return element
         formulation = unnamed
-    found = formulations_of(element.shape)
+    classes = formulations_of(element.shape)
     if formulation == NON_LOCKING:
         if len(element.nodes) != element.shape.corners:
             formulation = "b_bar" if C is not None and is_nearly_incompressible(C) else "standard"
         else:
             formulation = "enhanced"
-        return found.get(formulation, found["standard"])
-    if formulation not in found:
+        return classes.get(formulation, classes["standard"])
+    if formulation not in classes:
         raise InputError(
             f"there is no formulation {formulation!r} of elements with {len(element.nodes)} nodes such as "
-            f"{element.__name__}; there is {', '.join([*found, NON_LOCKING])}"
+            f"{element.__name__}; there is {', '.join([*classes, NON_LOCKING])}"
         )
-    return found[formulation]
+    return classes[formulation]
 
 
 def checked_formulation(word: object) -> str:

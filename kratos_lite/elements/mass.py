@@ -42,20 +42,20 @@ class CellMass(PlacedCell):
             return [(np.ones(kinds.shape, dtype=bool), stated)]
         rules: dict[Rule, Mask] = {}
         for kind in (AFFINE, STRAIGHT, CURVED):
-            mine = np.asarray(kinds == kind)
-            if mine.any() or (kind == AFFINE and not kinds.size):
+            mask = np.asarray(kinds == kind)
+            if mask.any() or (kind == AFFINE and not kinds.size):
                 rule = exact_rule(cls.shape, factors, kind, flow)
-                rules[rule] = rules[rule] | mine if rule in rules else mine
+                rules[rule] = rules[rule] | mask if rule in rules else mask
         return [(mask, rule) for rule, mask in rules.items()]
 
     def _integrate(self, of: Callable[[Array, Array], Array], factors: int) -> Array:
         """Return integrals of products of `factors` functions, made of N (g, n) and γ det J (..., g)."""
         total: Array | None = None
-        for mine, rule in self.mass_rules(geometries(self.shape, self.X), factors):
-            found = of(self._N(rule), self._volumes(rule))
+        for mask, rule in self.mass_rules(geometries(self.shape, self.X), factors):
+            values = of(self._N(rule), self._volumes(rule))
             if total is not None:
-                found[~mine] = total[~mine]
-            total = found
+                values[~mask] = total[~mask]
+            total = values
         assert total is not None
         return total
 

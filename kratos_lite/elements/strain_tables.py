@@ -13,4 +13,4 @@ class StrainTables(NamedTuple):
     center: Array  # (n, 3), dN at the center
     functions: Array  # (g, 6) enhanced monomials; N - N(center) (g, n), or (g, 0), of a dilatation
     C: Array | None  # (6, 6) Pa, which enhanced modes depend on; None of a dilatation
-    share: float  # of the dilatation that is projected
+    fraction: float  # of the dilatation that is projected

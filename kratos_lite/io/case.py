@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 MOST_STEPS = 1_000_000_000
-"""Steps of one run; more take weeks, and rather mean that the step is a slip of the pen."""
+"""Steps of one run; more take weeks; the step is probably mistyped."""
 
 
 def number_of_steps(value: Any) -> int:
@@ -78,7 +78,17 @@ class TimeIntegration:
         flag(self.lumped, "lumped")
 
     def starting_from(self, supports: Supports, displacement: Array | None) -> TimeIntegration:
-        """Return the integration from an initial displacement (n, 3) in m, unless it has one of its own."""
+        """Return the integration from an initial displacement, unless it has one of its own.
+
+        Parameters
+        ----------
+        supports : the values at supports count there.
+        displacement : (n, 3) m, or None.
+
+        Returns
+        -------
+        TimeIntegration
+        """
         if displacement is None or self.displacement is not None:
             return self
         return replace(self, displacement=np.where(supports.fixed, supports.values, displacement))
@@ -124,14 +134,14 @@ class Outputs:
 class Case:
     """A model or body with all that an input says about its analysis, outputs and expected values.
 
-    Every input becomes one: model files, run files of Kratos and of kratos_lite, files and scripts of bodies,
-    and what the options of the command line add.
+    Every input becomes one: model files, run files of Kratos, Python scripts, and what the options of the
+    command line add.
 
     Attributes
     ----------
     subject : the model, whose `notes` tell what was not used; or the body, which may hold many.
     time : how it moves through time, or None where it rests.
-    modes : number of natural frequencies that are asked for instead, or 0.
+    modes : number of requested natural frequencies, or 0.
     solver, tolerance, error, engine, petsc : of a model at rest, as for `Model.solve`.
     outputs : files to write.
     expected : comparisons of the end of a model with expected values; each returns a line.

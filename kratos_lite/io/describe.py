@@ -1,4 +1,4 @@
-"""Describe: documents in words, for ``kratos-lite info``."""
+"""Describe: what a document holds, for ``kratos-lite info``."""
 
 from __future__ import annotations
 

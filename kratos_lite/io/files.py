@@ -27,7 +27,7 @@ def read(
     Parameters
     ----------
     path : .mdpa or any file of an .elem set or its stem (both also gzipped), a .json run file of Kratos, a
-        folder with a ``ProjectParameters.json``, or any format of meshio.
+        folder with a ``ProjectParameters.json``, a Python script with a case, or any format of meshio.
     materials : take the materials from the file; False leaves them to the caller (but for run files).
     strict : refuse `.mdpa` rows that do not stand on lines of their own (but in run files).
     initial_displacement : take the DISPLACEMENT of nodes that are not fixed for the state without stress,

@@ -49,7 +49,7 @@ def kratos_name(name: str) -> str:
 
 
 def nearest_variable(name: str, known: Iterable[str]) -> str:
-    """Return a hint like `errors.nearest`, but only for a likely slip of the pen.
+    """Return a hint like `errors.nearest`, but only for a likely misspelling.
 
     >>> nearest_variable("YOUNGS_MODULUS", ["YOUNG_MODULUS"]), nearest_variable("EMISSIVITY", ["VISCOSITY"])
     (' Did you mean YOUNG_MODULUS?', '')

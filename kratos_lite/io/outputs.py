@@ -10,12 +10,7 @@ from kratos_lite.analysis.result import Result
 from kratos_lite.errors import InputError
 from kratos_lite.io.case import Case, Outputs
 from kratos_lite.io.formats import ELEM_SET, ending
-from kratos_lite.io.writers.endings import (
-    check_ending,
-    check_modes,
-    check_result,
-    check_series,
-)
+from kratos_lite.io.writers.endings import check_ending, check_modes, check_result, check_series
 from kratos_lite.io.writers.pictures import check_picture, write_picture
 from kratos_lite.io.writers.results import write_result
 
@@ -36,11 +31,9 @@ def check_outputs(case: Case) -> None:
         else:
             check_series(path)
     of_many = bool(case.time or case.modes)
-    if outputs.mode and not outputs.results:
+    if outputs.mode and not any(not of_many or ending(path) == ".pvd" for path in outputs.results):
         kind = "OUT.pvd" if of_many else "OUT.vtu"
         raise InputError(f"--vtu {outputs.mode}: there is no output to write so; add -o {kind}")
-    if outputs.mode and of_many and not any(ending(path) == ".pvd" for path in outputs.results):
-        raise InputError(f"--vtu {outputs.mode}: there is no output to write so; add -o OUT.pvd")
     for single, wanted in ((outputs.json, ".json"), (outputs.state, ".npz")):
         if single is not None:
             check_ending(single, wanted)

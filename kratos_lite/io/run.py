@@ -40,7 +40,7 @@ def run(case: Case, progress: Progress | None = None) -> Outcome:
     Parameters
     ----------
     case : such as `kratos_lite.read_case` returns.
-    progress : called with the phase and the share done, 0 … 1.
+    progress : called with the phase and the fraction done, 0 … 1.
 
     Returns
     -------
@@ -108,7 +108,7 @@ def _check_statics(case: Case) -> None:
             f"engine='petsc' solves statics; this case has {NOT_OF_PETSC[case.analysis]}; leave it out"
         )
     if case.error is not None:
-        raise InputError("engine='petsc' solves on the mesh as it is; leave the error asked for out")
+        raise InputError("engine='petsc' solves on the mesh as it is; leave the requested error out")
 
 
 def prepare(case: Case, progress: Progress | None = None) -> tuple[Any, Iterator[Any]]:

@@ -210,9 +210,10 @@ class LinearMaterial:
         MaterialError
             If a variable is missing or outside its bounds.
         """
-        given = {field: values[name] for field, name in cls.variables.items() if name in values}
+        constants = {field: values[name] for field, name in cls.variables.items() if name in values}
         needed = {name for name in names_of(cls) if name != "density"}
-        missing = [f"{field} ({cls.variables.get(field, field)})" for field in sorted(needed - given.keys())]
+        absent = sorted(needed - constants.keys())
+        missing = [f"{field} ({cls.variables.get(field, field)})" for field in absent]
         if missing:
             raise MaterialError(f"{cls.__name__} needs {', '.join(missing)}")
-        return cls(**given)
+        return cls(**constants)

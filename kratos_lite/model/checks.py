@@ -157,6 +157,15 @@ def check_scales(mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
     return warnings + check_wave_speeds(group.material for group in groups)
 
 
+def check_nodes(mesh: Mesh) -> list[str]:
+    """Warn of nodes that no element uses."""
+    lost = mesh.node_ids[~mesh.used_nodes()]
+    if not len(lost):
+        return []
+    shown = " ".join(map(str, lost[:5])) + (" …" if len(lost) > 5 else "")
+    return [f"{len(lost)} nodes belong to no element and carry no equations: {shown}"]
+
+
 def check_wave_speeds(materials: Iterable[LinearMaterial]) -> list[str]:
     """Warn where the speed of waves sqrt(E/ρ) says that E and ρ can hardly both be in SI units."""
     warnings = []

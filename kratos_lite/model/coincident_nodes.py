@@ -8,7 +8,7 @@ import numpy as np
 
 from kratos_lite.mesh import Mesh
 from kratos_lite.solvers.constraint_map import MultiPointConstraint
-from kratos_lite.typing import Array, Ints, Mask
+from kratos_lite.typing import Array, Ints
 
 NORMAL = np.array([0.5257311, 0.6180340, 0.5844215])
 """Direction along which nodes are sorted; no plane of a usual mesh is normal to it."""
@@ -16,9 +16,9 @@ MOST = 64
 """Nodes at one place that are compared with one another."""
 
 
-def check_coincident(mesh: Mesh, used: Mask, constraints: Sequence[MultiPointConstraint] = ()) -> list[str]:
+def check_coincident(mesh: Mesh, constraints: Sequence[MultiPointConstraint] = ()) -> list[str]:
     """Warn of different nodes at the same place (within 1e-8 of the mean spacing) that nothing ties."""
-    rows = np.flatnonzero(used)
+    rows = np.flatnonzero(mesh.used_nodes())
     if len(rows) < 2:
         return []
     X, ids = mesh.points[rows], mesh.node_ids[rows]

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from kratos_lite.mesh import NO_ROWS, Faces, Mesh, equal_sets, with_rows
+from kratos_lite.mesh import NO_ROWS, Mesh, equal_sets, with_rows
 from kratos_lite.mesh.topology import Sets, corners, faces_of, set_keys
 from kratos_lite.typing import Ints
 
 
-def check_joints(mesh: Mesh, faces: Faces | None = None) -> list[str]:
+def check_joints(mesh: Mesh) -> list[str]:
     """Warn of elements with the same nodes, and of faces joined at their corners only."""
-    faces = faces or mesh.all_faces
+    faces = mesh.all_faces
     warnings = []
     one, other = equal_sets([(block.nodes, [range(block.nodes.shape[1])]) for block in mesh.blocks])
     count, ids = _pairs(mesh, one, other)

@@ -21,7 +21,7 @@ import numpy as np
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.errors import ModelError
-from kratos_lite.mesh import Faces, Mesh
+from kratos_lite.mesh import Mesh
 from kratos_lite.model.opposite_faces import OppositeFaces, opposite_of
 from kratos_lite.model.supports import Supports
 from kratos_lite.typing import Array, Ints, Mask
@@ -33,8 +33,8 @@ def has_chains(element: type[KinematicLinear]) -> bool:
 
 
 def check_spurious_modes(
-    mesh: Mesh, groups: Sequence[ElementGroup], supports: Supports | None, faces: Faces
-) -> None:
+    mesh: Mesh, groups: Sequence[ElementGroup], supports: Supports | None = None
+) -> list[str]:
     """Raise ModelError that names an element with reduced integration which can deform without stress.
 
     Constraints between degrees of freedom do not count as supports.
@@ -44,7 +44,8 @@ def check_spurious_modes(
         if has_chains(group.element) and group.rule is group.element.rule:
             reduced[group.rows] = True
     if not reduced.any():
-        return
+        return []
+    faces = mesh.all_faces
     across = OppositeFaces(mesh, faces)
     for open_ in faces.non_conforming():
         across.mate[open_] = -1
@@ -66,6 +67,7 @@ def check_spurious_modes(
             "elements have neighbors along one axis at most, and 2x2x2 points do not see all of their "
             "deformations; take BBar3D20N or KinematicLinear3D20N, or more elements side by side"
         )
+    return []
 
 
 def _name(groups: Sequence[ElementGroup], row: int) -> str:

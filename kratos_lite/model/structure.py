@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.sparsity_pattern import PatternCache
@@ -17,17 +15,19 @@ from kratos_lite.model import checks
 from kratos_lite.model.coincident_nodes import check_coincident
 from kratos_lite.model.equal import key_of
 from kratos_lite.model.free_motions import FreeMotions
+from kratos_lite.model.hourglass_modes import check_rules
 from kratos_lite.model.joints import check_joints
 from kratos_lite.model.loads import Load, ScaledLoad
 from kratos_lite.model.locking import check_locking
 from kratos_lite.model.rigid_body_modes import free_motions
+from kratos_lite.model.spurious_modes import check_spurious_modes
 from kratos_lite.model.supported_solid import SupportedSolid
 from kratos_lite.tabular import Tabular
 from kratos_lite.time_series import Factor
 from kratos_lite.validation import instance
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    pass
 
 
 class Attachment(ABC):
@@ -225,25 +225,8 @@ class Structure(SupportedSolid, Tabular):
         MeshError, ModelError, InputError
             With every element or part that is wrong.
         """
-        mesh = self.mesh
-        warnings = self.check_geometry()
-        groups = self.element_groups()
-        used, faces = mesh.used_nodes(), mesh.all_faces
-        if not all(group.is_proven for group in groups):
-            from kratos_lite.model.hourglass_modes import check_rules  # rarely needed
-
-            warnings += check_rules(mesh, groups)
-        warnings += check_joints(mesh, faces)
-        warnings += check_coincident(mesh, used, self.supports.constraints)
-        warnings += checks.check_scales(mesh, groups)
-        warnings += check_locking(mesh, groups)
-        if any(group.element.spurious_modes for group in groups):
-            from kratos_lite.model.spurious_modes import check_spurious_modes  # rarely needed
-
-            check_spurious_modes(mesh, groups, self.supports, faces)
-        warnings += _without_elements(mesh, used)
-        self.supports.check_used(used)
-        return groups, warnings
+        warnings, groups = self.check_geometry(), self.element_groups()
+        return groups, [*warnings, *(text for check in CHECKS for text in check(self, groups))]
 
     def free_motions(self, groups: list[ElementGroup]) -> FreeMotions:
         """Return the rigid motions that supports leave free, part by part.
@@ -299,13 +282,17 @@ class Structure(SupportedSolid, Tabular):
         return f"{name}({self.mesh.n_nodes} nodes, {self.mesh.n_elements} elements, {len(self.loads)} loads)"
 
 
-def _without_elements(mesh: Mesh, used: NDArray[np.bool_]) -> list[str]:
-    """Return a warning of the nodes that no element uses, by the mask (n,) of those used."""
-    lost = mesh.node_ids[~used]
-    if not len(lost):
-        return []
-    shown = " ".join(map(str, lost[:5])) + (" …" if len(lost) > 5 else "")
-    return [f"{len(lost)} nodes belong to no element and carry no equations: {shown}"]
+CHECKS: tuple[Callable[[Structure, Sequence[ElementGroup]], list[str]], ...] = (
+    lambda model, groups: check_rules(model.mesh, groups),
+    lambda model, groups: check_joints(model.mesh),
+    lambda model, groups: check_coincident(model.mesh, model.supports.constraints),
+    lambda model, groups: checks.check_scales(model.mesh, groups),
+    lambda model, groups: check_locking(model.mesh, groups),
+    lambda model, groups: check_spurious_modes(model.mesh, groups, model.supports),
+    lambda model, groups: checks.check_nodes(model.mesh),
+    lambda model, groups: model.supports.check_used(model.mesh.used_nodes()),
+)
+"""What is checked of each model with sound cells: a check returns warnings, or raises an error."""
 
 
 def _place(loads: list[Load], wanted: object) -> int | None:

@@ -263,12 +263,13 @@ class Supports:
             )
         return None
 
-    def check_used(self, used: Mask) -> None:
+    def check_used(self, used: Mask) -> list[str]:
         """Raise ModelError for constraints of nodes that no element uses, by the mask (n,) of those used."""
         dofs = np.array([dof for slave, (terms, _) in self.slaves().items() for dof in (slave, *terms)], int)
         unused = dofs[~used[dofs // 3]]
         if len(unused):
             raise ModelError(UNUSED.format(self.name(int(unused[0]))))
+        return []
 
     # ---- for the equations ------------------------------------------------------------------------------
 

@@ -45,7 +45,7 @@ def _checked(degree: int) -> int:
 
 
 def _orbits(d: int, orbits: Sequence[tuple[float, tuple[float, ...]]]) -> tuple[Array, Array]:
-    """Return all permutations of barycentric points with their weights (share of the volume)."""
+    """Return all permutations of barycentric points with their weights (fraction of the volume)."""
     points, weights = [], []
     for weight, barycentric in orbits:
         orbit = sorted(set(permutations(barycentric)))

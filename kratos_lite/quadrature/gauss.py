@@ -59,8 +59,8 @@ def conical_simplex(n: int, d: int) -> tuple[Array, Array]:
     rules = [jacobi(n, d - 1 - i) for i in range(d)]
     grid = np.meshgrid(*[x for x, _ in rules], indexing="ij")
     weights = np.meshgrid(*[w for _, w in rules], indexing="ij")
-    points, rest = [], np.ones_like(grid[0])
+    points, remainder = [], np.ones_like(grid[0])
     for x in grid:
-        points.append(x * rest)
-        rest = rest * (1 - x)
+        points.append(x * remainder)
+        remainder = remainder * (1 - x)
     return np.stack(points, axis=-1).reshape(-1, d), np.prod(weights, axis=0).ravel()

@@ -1,6 +1,6 @@
 """Shapes: reference cells with their shape functions, faces and node orders.
 
-A family, a file each, is imported when one of its shapes is asked for.
+A family, a file each, is imported when one of its shapes is requested.
 """
 
 from kratos_lite.shapes.base import LINEAR, SHAPES, Shape

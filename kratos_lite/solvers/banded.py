@@ -7,7 +7,7 @@ makes that.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,15 +16,11 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.errors import SolveError
 from kratos_lite.solvers import direct
+from kratos_lite.solvers.plan import of_band
 from kratos_lite.typing import Array, Ints, Rows
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
-
-BAND_LIMIT = 16.0
-"""Widths w up to this many times √n take the band: it needs n w² multiplications, a sparse solid some n²."""
-BAND_NUMBERS = 50_000_000
-"""A band of more numbers than this (0.4 GB) is not made."""
 
 
 class BandFactors:
@@ -41,32 +37,7 @@ class BandFactors:
 
 
 class Factorizer:
-    """Factorizes matrices (3n, 3n) of 3x3 node blocks that share a sparsity pattern.
-
-    Parameters
-    ----------
-    pattern : sparsity of the nodes.
-    symmetric : whether the matrices are symmetric positive definite; otherwise rows are exchanged.
-
-    Attributes
-    ----------
-    method, reason : ``band`` or ``sparse``, and why.
-    width : largest distance of an entry from the diagonal in the band.
-
-    Examples
-    --------
-    >>> import kratos_lite as kl
-    >>> from kratos_lite.assembly.sparsity_pattern import Pattern
-    >>> from kratos_lite.assembly.stiffness import assemble_stiffness
-    >>> model = kl.Model(kl.box((0.1, 0.1, 1.0), (1, 1, 9)), kl.Isotropic3D(E=1.0, nu=0.3))
-    >>> points, groups = model.mesh.points, model.element_groups()
-    >>> pattern = Pattern(len(points), [group.nodes for group in groups])
-    >>> A = assemble_stiffness(points, groups, pattern)
-    >>> A.add_scalar(np.full(len(points), 2.0), A.diagonal_blocks())
-    >>> b = np.arange(120.0)
-    >>> bool(np.allclose(A @ Factorizer(pattern).factorize(A).solve(b), b))
-    True
-    """
+    """Factorizes matrices (3n, 3n) of one sparsity pattern; rows are exchanged unless they are symmetric."""
 
     def __init__(self, pattern: Pattern, symmetric: bool = True) -> None:
         self.symmetric = symmetric
@@ -74,8 +45,8 @@ class Factorizer:
         self._nodes, nodal_width = _numbering(pattern, rows)
         self.width = w = 3 * nodal_width + 2
         self._height = w + 1 if symmetric else 3 * w + 1  # exchanged rows need room
-        self.method, self.reason = choose(3 * pattern.n_nodes, w, self._height)
-        if self.method == "band":
+        self.plan = of_band(3 * pattern.n_nodes, w, self._height)
+        if self.plan.method == "band":
             self._dofs = (3 * self._nodes[:, None] + np.arange(3)).ravel()
             self._prepare(rows, pattern.indices)
 
@@ -93,15 +64,8 @@ class Factorizer:
         self._to = to[self._from]
 
     def factorize(self, A: BlockMatrix) -> BandFactors | direct.Factorization:
-        """Return the factors of a matrix with the pattern; their `solve` gives x of A x = b.
-
-        Raises
-        ------
-        SolveError
-            If the matrix is singular, or not positive definite though it should be; a sparse
-            factorization may notice singular ones alone.
-        """
-        if self.method == "sparse":
+        """Return the factors of a matrix with the pattern; their `solve` gives x of A x = b."""
+        if self.plan.method == "sparse":
             return direct.factorize(A.scipy().tocsr(), symmetric=self.symmetric)
         band = np.zeros(len(self._dofs) * self._height)
         band[self._to] = A.data.ravel().take(self._from)
@@ -134,44 +98,33 @@ def _lu(band: Array, width: int, dofs: Ints) -> Callable[[Array], Array]:
     return lambda b: dgbtrs(factors, width, width, b, pivots, overwrite_b=1)[0]
 
 
-def choose(n: int, width: int, height: int) -> tuple[str, str]:
-    """Return how to factorize n unknowns in a band of a width, stored in so many rows, and why.
-
-    >>> choose(567, 44, 45)[0], choose(30_000, 4000, 4001)[0]
-    ('band', 'sparse')
-    """
-    limit = int(BAND_LIMIT * np.sqrt(n))
-    if width > limit:
-        return "sparse", f"width {width} > {limit}: a sparse factorization takes less work"
-    if n * height > BAND_NUMBERS:
-        return "sparse", f"{n * height} numbers > {BAND_NUMBERS}: a band takes too much memory"
-    return "band", f"width {width} ≤ {limit}: a band is fastest"
-
-
 def _numbering(pattern: Pattern, rows: Ints) -> tuple[Ints, int]:
-    """Return the nodes (n,) in the order with the least band, and its width in nodes."""
+    """Return the nodes (n,) in the order with the least band, and its width in nodes.
 
-    def width(order: Ints) -> int:
-        place = np.empty_like(order)
-        place[order] = np.arange(len(order))
-        return int(np.abs(place[rows] - place[pattern.indices]).max(initial=0))
-
-    widths, orders = zip(*((width(order), order) for order in _orders(pattern)), strict=True)
+    The orders are that of the mesh, reverse Cuthill–McKee, and layers from one end of the body.
+    """
+    graph, order = cuthill_mckee(pattern)
+    orders = [np.arange(pattern.n_nodes), order, _layers(graph, order)]
+    widths = [nodal_width(pattern, rows, order) for order in orders]
     best = int(np.argmin(widths))
     return orders[best], widths[best]
 
 
-def _orders(pattern: Pattern) -> Iterator[Ints]:
-    """Yield orders of the nodes: as they are, reverse Cuthill–McKee, and layers from one end of the body."""
+def cuthill_mckee(pattern: Pattern) -> tuple[csr_array, Ints]:
+    """Return the graph of the nodes (n, n), and their reverse Cuthill–McKee order (n,)."""
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import reverse_cuthill_mckee
 
     n = pattern.n_nodes
-    yield np.arange(n)
     graph = csr_array((np.ones(len(pattern.indices)), pattern.indices, pattern.indptr), shape=(n, n))
-    order = reverse_cuthill_mckee(graph, symmetric_mode=True).astype(np.int64)
-    yield order
-    yield _layers(graph, order)
+    return graph, reverse_cuthill_mckee(graph, symmetric_mode=True).astype(np.int64)
+
+
+def nodal_width(pattern: Pattern, rows: Ints, order: Ints) -> int:
+    """Return the largest distance in an order of nodes from one to a neighbor."""
+    place = np.empty_like(order)
+    place[order] = np.arange(len(order))
+    return int(np.abs(place[rows] - place[pattern.indices]).max(initial=0))
 
 
 def _layers(graph: csr_array, order: Ints) -> Ints:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from scipy.sparse import bsr_array
 
 STRONG = 0.4
-"""Nodes are strongly coupled where |A_ij| exceeds this share of sqrt(|A_ii| |A_jj|)."""
+"""Nodes are strongly coupled where |A_ij| exceeds this fraction of sqrt(|A_ii| |A_jj|)."""
 NEAR = 3.0
 """Distance of such nodes to that of the nearest ones at most: quadratic cells couple others as strongly."""
 LONGEST = 40
@@ -23,41 +23,35 @@ LONGEST = 40
 def block_inverse(A: BlockMatrix, free: Mask, points: Array, D: bsr_array, factor: Array) -> bsr_array:
     """Return the inverse (3n, 3n) of A - Dᵀ factor D within each group on its free components, else 0.
 
-    Parameters
-    ----------
-    A : symmetric, positive definite on the free components, less Dᵀ factor D, too.
-    free : (3n,).
-    points : (n, 3) m.
-    D : (p, 3n) sparse, of R x 3 blocks; nodes that share a row share a block of A.
-    factor : (p,).
+    Both are positive definite there; nodes that share a row of R x 3 blocks of D (p, 3n) share a block of A.
     """
     from scipy.sparse import bsr_array
 
     rows, columns, n = A.rows(), A.indices, len(A.indptr) - 1
     group, place = _groups(A, rows, points)
     within = np.flatnonzero(group[rows] == group[columns])
-    own = rows[within], columns[within], A.data[within]
+    stiffness = rows[within], columns[within], A.data[within]
     square = _square(D, factor, group)
-    less = block_rows(square.indptr), square.indices, square.data
+    dilatations = block_rows(square.indptr), square.indices, square.data
     size = np.bincount(group)
-    members, mask, found = np.argsort(group, kind="stable"), free.reshape(-1, 3), []
+    members, mask, inverses = np.argsort(group, kind="stable"), free.reshape(-1, 3), []
     for k in np.unique(size):
         nodes = members[size[group[members]] == k].reshape(-1, k)
         number = np.empty(len(size), dtype=int)
         number[group[nodes[:, 0]]] = np.arange(len(nodes))
         blocks = np.zeros((len(nodes), k, 3, k, 3))
-        for sign, (rows, columns, data) in ((1, own), (-1, less)):
-            mine = size[group[rows]] == k
-            i, j = rows[mine], columns[mine]
-            blocks[number[group[i]], place[i], :, place[j], :] += sign * data[mine]
+        for sign, (rows, columns, data) in ((1, stiffness), (-1, dilatations)):
+            alike = size[group[rows]] == k
+            i, j = rows[alike], columns[alike]
+            blocks[number[group[i]], place[i], :, place[j], :] += sign * data[alike]
         inverse = _inverse(blocks.reshape(-1, 3 * k, 3 * k), mask[nodes].reshape(-1, 3 * k))
         ends = np.repeat(nodes, k, axis=1), np.tile(nodes, (1, k))
-        found.append((*ends, inverse.reshape(-1, k, 3, k, 3).swapaxes(2, 3)))
-    i, j = (np.concatenate([part[end].ravel() for part in found]) for end in (0, 1))
-    inverses = np.concatenate([part[2].reshape(-1, 3, 3) for part in found])
+        inverses.append((*ends, inverse.reshape(-1, k, 3, k, 3).swapaxes(2, 3)))
+    i, j = (np.concatenate([part[end].ravel() for part in inverses]) for end in (0, 1))
+    data = np.concatenate([part[2].reshape(-1, 3, 3) for part in inverses])
     order = np.argsort(i, kind="stable")
     starts = np.concatenate([[0], np.cumsum(np.bincount(i, minlength=n))])
-    return bsr_array((inverses[order], j[order], starts), shape=A.shape)
+    return bsr_array((data[order], j[order], starts), shape=A.shape)
 
 
 def _square(D: bsr_array, factor: Array, group: Ints) -> bsr_array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -21,7 +21,8 @@ from kratos_lite.elements.kinematic_linear_3d8n import KinematicLinear3D8N
 from kratos_lite.mesh.centers import surroundings
 from kratos_lite.mesh.hanging import HangingNodes
 from kratos_lite.shapes import Shape
-from kratos_lite.typing import Array, Ints, Mask, Rows
+from kratos_lite.solvers.plan import EXTREME, PER_EXTREME, PER_STRETCHED, STRETCHED
+from kratos_lite.typing import Array, Ints, Rows
 
 LINEAR: dict[type[Shape] | None, type[KinematicLinear]] = {
     element.shape: element
@@ -31,23 +32,15 @@ LINEAR: dict[type[Shape] | None, type[KinematicLinear]] = {
 
 
 @dataclass(eq=False)
-class LinearLevel:
-    """The linear elements inside a mesh of quadratic ones, as the coarse level of a p-multigrid.
+class PCoarseLevel:
+    """The linear elements inside a mesh of quadratic ones, as the coarse level of a p-multigrid."""
 
-    Attributes
-    ----------
-    assemble : makes K.
-    nodes : (m,) int, row among all n nodes of each corner node that does not hang.
-    indptr, indices, weights : interpolation (n, m) from these nodes to all nodes in rows (CSR).
-    halved : whether long cells are two linear ones each.
-    """
-
-    assemble: Callable[[], BlockMatrix]
-    nodes: Ints
-    indptr: Rows
+    assemble: Callable[[], BlockMatrix]  # makes K
+    nodes: Ints  # (m,) the corner nodes that do not hang, among all n nodes
+    indptr: Rows  # with indices and weights: interpolation (n, m) from these to all nodes (CSR)
     indices: Rows
     weights: Array
-    halved: bool = False
+    halved: bool = False  # whether long cells are two linear ones each
 
     @cached_property
     def K(self) -> BlockMatrix:
@@ -55,10 +48,6 @@ class LinearLevel:
         return self.assemble()
 
 
-STRETCHED = 3.0
-"""Longest to shortest side of a cell above which smoothing single nodes is slow."""
-EXTREME = 30.0
-"""The same of few cells, which alone stall a smoother of single nodes."""
 SAMPLE = 2000
 """Cells of a group that show whether it is stretched."""
 LONG = 3.0
@@ -66,55 +55,46 @@ LONG = 3.0
 
 
 @dataclass(eq=False)
-class _Part:
+class _Submesh:
     """Some elements of a group, and the linear ones in each of them."""
 
     group: ElementGroup
     element: type[KinematicLinear]
     cells: Ints
-    """(s, c), rows among the nodes of an element that are the nodes of each linear one."""
+    """(s, c), the nodes of each linear element among those of an element."""
 
 
-def linear_level(
+def p_coarse_level(
     points: Array, groups: Sequence[ElementGroup], hanging: HangingNodes | None = None, whole: bool = True
-) -> LinearLevel | None:
+) -> PCoarseLevel | None:
     """Return stiffness and interpolation of the linear elements on the corners of `groups`.
 
     Elements that are linear already take part as they are.  Long ones are halved, unless they are few, as
     the nodes in their middle are far from their corners compared with the others, which no smoothing of
-    single nodes makes up for.  Each node that is left takes the shape functions of the corners, at its
+    single nodes makes up for.  Each other node takes the shape functions of the corners, at its
     reference place, in the first element that has it; what they interpolate is a linear field wherever
-    cells are straight-sided.
-
-    Parameters
-    ----------
-    points : (n, 3) float, m.
-    groups : elements with these points.
-    hanging : the nodes among them that hang on larger neighbors, if any.
-    whole : False for a share of a mesh, for which others decide as well: nothing is halved, and elements that
-        are all linear make a level, too.
-
-    Returns
-    -------
-    The level, or None if all elements are linear or some have no linear element on their corners.
+    cells are straight-sided.  In a partition, where the mesh is not `whole`, nothing is
+    halved, and elements that are all linear make a level, too.
     """
     corners = [c for group in groups if (c := _corners(group.element.shape)) is not None]
     if len(corners) < len(groups) or (whole and not has_middle_nodes(groups)):
         return None
     halved = whole and hanging is None  # else a middle node would be a corner of smaller neighbors
-    parts = [p for group, c in zip(groups, corners, strict=True) for p in _parts(points, group, c, halved)]
+    submeshes = [
+        p for group, c in zip(groups, corners, strict=True) for p in _submeshes(points, group, c, halved)
+    ]
     number = np.full(len(points), -1, dtype=np.int32)
-    for part in parts:
+    for part in submeshes:
         number[part.group.nodes[:, sorted(set(part.cells.ravel().tolist()))]] = 0
     nodes = np.flatnonzero(number == 0)
     number[nodes] = np.arange(len(nodes))
-    linear = [_linear(part, cell, number) for part in parts for cell in part.cells]
+    linear = [_linear(part, cell, number) for part in submeshes for cell in part.cells]
 
     def assemble() -> BlockMatrix:
         return assemble_stiffness(points[nodes], linear, Pattern(len(nodes), [g.nodes for g in linear]))
 
-    halves = any(len(part.cells) > 1 for part in parts)
-    level = LinearLevel(assemble, nodes, *_interpolation(parts, number), halves)
+    halves = any(len(part.cells) > 1 for part in submeshes)
+    level = PCoarseLevel(assemble, nodes, *_interpolation(submeshes, number), halves)
     return level if hanging is None else _continuous(level, groups, number, hanging)
 
 
@@ -130,19 +110,19 @@ def has_corners(groups: Sequence[ElementGroup]) -> bool:
 
 def is_stretched(points: Array, groups: Sequence[ElementGroup]) -> bool:
     """Return whether, of some elements of each group, one of 20 is long or flat, or one of 200 extremely."""
-    seen = stretched = extreme = 0
+    count = stretched = extreme = 0
     for group in groups:
         linear = group.element.shape.linear() or group.element.shape
-        some: Ints = np.arange(len(group))
-        if len(some) > SAMPLE:  # places that no order of the cells repeats: golden section
-            some = (0.6180339887498949 * some[:SAMPLE] % 1 * len(some)).astype(np.int64)
-        corners = points[group.nodes[some, : linear.corners]]
+        sample: Ints = np.arange(len(group))
+        if len(sample) > SAMPLE:  # places that no order of the cells repeats: golden section
+            sample = (0.6180339887498949 * sample[:SAMPLE] % 1 * len(sample)).astype(np.int64)
+        corners = points[group.nodes[sample, : linear.corners]]
         sides = sides_of(linear, corners)
-        seen += len(sides)
+        count += len(sides)
         long, short = sides.max(axis=1), sides.min(axis=1)
         stretched += int(np.count_nonzero(long > STRETCHED * short))
         extreme += int(np.count_nonzero(long > EXTREME * short))
-    return 20 * stretched > seen or 200 * extreme > seen
+    return PER_STRETCHED * stretched > count or PER_EXTREME * extreme > count
 
 
 def sides_of(shape: type[Shape], nodes: Array) -> Array:
@@ -152,7 +132,7 @@ def sides_of(shape: type[Shape], nodes: Array) -> Array:
 
 
 def _corners(shape: type[Shape]) -> Ints | None:
-    """Return the rows among the nodes of a shape that are the nodes of its linear element."""
+    """Return which nodes of a shape are those of its linear element."""
     linear = shape.linear()
     if linear is None or linear not in LINEAR:
         return None
@@ -164,20 +144,20 @@ def _is_linear(shape: type[Shape]) -> bool:
     return len(shape.nodes) == shape.corners
 
 
-def _parts(points: Array, group: ElementGroup, corners: Ints, halved: bool) -> list[_Part]:
+def _submeshes(points: Array, group: ElementGroup, corners: Ints, halved: bool) -> list[_Submesh]:
     """Return the elements of a group that are not long, and those long along each axis, with their halves."""
     shape = group.element.shape
     if _is_linear(shape):
-        return [_Part(group, group.element, corners[None])]
+        return [_Submesh(group, group.element, corners[None])]
     element = LINEAR[shape.linear()]
     halves = [_halves(shape, corners, axis) if halved else None for axis in range(3)]
     if all(cells is None for cells in halves):
-        return [_Part(group, element, corners[None])]
+        return [_Submesh(group, element, corners[None])]
     sides = sides_of(element.shape, points[group.nodes[:, corners]])
     order = np.sort(sides, axis=1)
     long = order[:, 2] > LONG * order[:, 1]
     if 2 * np.count_nonzero(long) < len(long):  # a few come apart from their neighbors, which takes more
-        return [_Part(group, element, corners[None])]
+        return [_Submesh(group, element, corners[None])]
     along = np.where(long, sides.argmax(axis=1), -1)
     parts = []
     for axis in (-1, 0, 1, 2):
@@ -185,17 +165,8 @@ def _parts(points: Array, group: ElementGroup, corners: Ints, halved: bool) -> l
         if not chosen.any():
             continue
         cells = None if axis < 0 else halves[axis]
-        some = _some(group, chosen)
-        parts.append(_Part(some, element, corners[None] if cells is None else cells))
+        parts.append(_Submesh(group.take(chosen), element, corners[None] if cells is None else cells))
     return parts
-
-
-def _some(group: ElementGroup, chosen: Mask) -> ElementGroup:
-    return (
-        group
-        if chosen.all()
-        else replace(group, nodes=group.nodes[chosen], rows=group.rows[chosen], prestress=None)
-    )
 
 
 def _halves(shape: type[Shape], corners: Ints, axis: int) -> Ints | None:
@@ -210,7 +181,7 @@ def _halves(shape: type[Shape], corners: Ints, axis: int) -> Ints | None:
     return np.array([np.where(low, corners, between), np.where(low, between, corners)])
 
 
-def _linear(part: _Part, cell: Ints, number: Rows) -> ElementGroup:
+def _linear(part: _Submesh, cell: Ints, number: Rows) -> ElementGroup:
     """Return one linear element of each element of a part, on numbered corners."""
     same = part.element is part.group.element
     rule = part.group.rule if same else part.element.rule
@@ -219,7 +190,7 @@ def _linear(part: _Part, cell: Ints, number: Rows) -> ElementGroup:
     )
 
 
-def _weights(part: _Part) -> Array:
+def _weights(part: _Submesh) -> Array:
     """Return the interpolation (k, k) from the nodes of linear elements to all nodes of an element."""
     shape = part.element.shape
     nodes, low, high = part.group.element.shape.nodes, shape.nodes.min(axis=0), shape.nodes.max(axis=0)
@@ -234,36 +205,36 @@ def _weights(part: _Part) -> Array:
     return weights
 
 
-def _interpolation(parts: Sequence[_Part], number: Rows) -> tuple[Rows, Rows, Array]:
+def _interpolation(submeshes: Sequence[_Submesh], number: Rows) -> tuple[Rows, Rows, Array]:
     """Return rows (indptr, indices, weights) from corners to all nodes; `number` is that of each corner."""
     owner, counts = np.full(len(number), -1), (number >= 0).astype(np.int64)
-    found = []
-    for part in parts:
+    blocks = []
+    for part in submeshes:
         group, N = part.group, _weights(part)
         k = group.nodes.shape[1]
         first = np.full(len(number), -1)
         flat = group.nodes.ravel()
         first[flat[::-1]] = np.arange(len(flat))[::-1]  # the first element with a node is written last
-        rows = np.flatnonzero((first >= 0) & (number < 0) & (owner < 0))
-        owner[rows], local = np.divmod(first[rows], k)
+        nodes = np.flatnonzero((first >= 0) & (number < 0) & (owner < 0))
+        owner[nodes], local = np.divmod(first[nodes], k)
         for node in range(k):
-            mine, corners = rows[local == node], np.flatnonzero(N[node])
-            if len(mine):
-                counts[mine] = len(corners)
-                found.append((mine, number[group.nodes[owner[mine]][:, corners]], N[node, corners]))
+            same, corners = nodes[local == node], np.flatnonzero(N[node])
+            if len(same):
+                counts[same] = len(corners)
+                blocks.append((same, number[group.nodes[owner[same]][:, corners]], N[node, corners]))
     indptr = np.concatenate([[0], np.cumsum(counts)])
     indices, weights = np.empty(indptr[-1], dtype=np.int32), np.ones(indptr[-1])
     indices[indptr[:-1][number >= 0]] = number[number >= 0]
-    for mine, columns, N in found:
-        at = indptr[mine][:, None] + np.arange(len(N))
+    for nodes, columns, N in blocks:
+        at = indptr[nodes][:, None] + np.arange(len(N))
         order = columns.argsort(axis=1)
         indices[at], weights[at] = np.take_along_axis(columns, order, axis=1), N[order]
     return indptr.astype(np.int32), indices, weights
 
 
 def _continuous(
-    level: LinearLevel, groups: Sequence[ElementGroup], number: Rows, hanging: HangingNodes
-) -> LinearLevel:
+    level: PCoarseLevel, groups: Sequence[ElementGroup], number: Rows, hanging: HangingNodes
+) -> PCoarseLevel:
     """Return the level of continuous fields: corners in the middle of larger edges and faces follow these.
 
     Without it the linear elements of both sides come apart there, and iterations grow fivefold.
@@ -274,12 +245,12 @@ def _continuous(
     at = np.repeat(np.arange(n), np.diff(level.indptr))
     rows, columns, weights = [at], [level.nodes[level.indices]], [level.weights]
     follows = np.zeros(n, dtype=bool)
-    for nodes, leaders, shares in _followers(groups, number, hanging):
+    for nodes, leaders, factors in _followers(groups, number, hanging):
         new = ~follows[nodes]
         follows[nodes] = True
         rows.append(np.repeat(nodes[new], leaders.shape[1]))
         columns.append(leaders[new].ravel())
-        weights.append(shares[new].ravel())
+        weights.append(factors[new].ravel())
     kept = ~follows[at]
     rows[0], columns[0], weights[0] = rows[0][kept], columns[0][kept], weights[0][kept]
     entries = (np.concatenate(weights), (np.concatenate(rows), np.concatenate(columns)))
@@ -296,46 +267,37 @@ def _continuous(
     return _on(level, nodes, P[level.nodes], P)
 
 
-def _on(level: LinearLevel, nodes: Ints, inner: Any, P: Any) -> LinearLevel:
+def _on(level: PCoarseLevel, nodes: Ints, inner: Any, P: Any) -> PCoarseLevel:
     """Return the level on some nodes, from which `inner` leads to its corner nodes and P to all nodes."""
     from scipy.sparse import kron
 
     def assemble() -> BlockMatrix:
         axes: Any = kron(inner, np.eye(3)).tocsr()
-        A = (axes.T @ level.K.scipy().tocsr() @ axes).tobsr((3, 3))
-        A.sort_indices()
-        return BlockMatrix(
-            np.ascontiguousarray(A.data), A.indices.astype(np.int32), A.indptr.astype(np.int32)
-        )
+        return BlockMatrix.of(axes.T @ level.K.scipy().tocsr() @ axes)
 
     P.sort_indices()
-    rows = P.indptr.astype(np.int32), P.indices.astype(np.int32)
-    return LinearLevel(assemble, nodes, *rows, P.data, level.halved)
+    return PCoarseLevel(
+        assemble, nodes, P.indptr.astype(np.int32), P.indices.astype(np.int32), P.data, level.halved
+    )
 
 
-def tied(level: LinearLevel, T: Any, free: Ints) -> LinearLevel:
+def apply_ties(level: PCoarseLevel, T: Any, free: Ints) -> PCoarseLevel:
     """Return the level of fields that keep the ties of nodes, where these tie all components alike.
 
     Without it the linear elements of both sides come apart.  Other ties leave the level as it is.
-
-    Parameters
-    ----------
-    level : the linear elements of the nodes, tied or not.
-    T : (3n, q) sparse, all components of the nodes from those that are free.
-    free : (q,) rows of the free components.
     """
     from scipy.sparse import csr_array, diags_array
 
     n, m = T.shape[0] // 3, len(level.nodes)
     entries = T.tocoo()
     column = free[entries.col]
-    slave = np.flatnonzero(~np.isin(np.arange(3 * n), free))
-    is_slave = np.zeros(n, dtype=bool)
-    is_slave[np.intersect1d(slave, entries.row) // 3] = True
-    if not is_slave[level.nodes].any():
+    dependent = np.flatnonzero(~np.isin(np.arange(3 * n), free))
+    is_dependent = np.zeros(n, dtype=bool)
+    is_dependent[np.intersect1d(dependent, entries.row) // 3] = True
+    if not is_dependent[level.nodes].any():
         return level  # as with hanging nodes, which the level has left out
-    mine = is_slave[entries.row // 3]
-    row, column, data = entries.row[mine], column[mine], entries.data[mine]
+    chosen = is_dependent[entries.row // 3]
+    row, column, data = entries.row[chosen], column[chosen], entries.data[chosen]
     by_axis = [
         csr_array((data[at], (row[at] // 3, column[at] // 3)), shape=(n, n))
         for at in (row % 3 == axis for axis in range(3))
@@ -344,7 +306,7 @@ def tied(level: LinearLevel, T: Any, free: Ints) -> LinearLevel:
     if not alike or (row % 3 != column % 3).any():
         return level
     W = csr_array((level.weights, level.indices, level.indptr), shape=(n, m))
-    inner = diags_array(1.0 * ~is_slave[level.nodes]) + (by_axis[0] @ W)[level.nodes]
+    inner = diags_array(1.0 * ~is_dependent[level.nodes]) + (by_axis[0] @ W)[level.nodes]
     return _on(level, level.nodes, inner, (W @ inner).tocsr())
 
 
@@ -354,9 +316,9 @@ def _followers(
     """Yield nodes (h,), each once, with the nodes (h, k) that they follow and the weights (h, k) of these."""
     counts = np.diff(hanging.start)
     for k in np.unique(counts):
-        mine = np.flatnonzero(counts == k)
-        take = hanging.start[mine][:, None] + np.arange(k)
-        yield hanging.nodes[mine], hanging.masters[take], hanging.weights[take]
+        same = np.flatnonzero(counts == k)
+        take = hanging.start[same][:, None] + np.arange(k)
+        yield hanging.nodes[same], hanging.masters[take], hanging.weights[take]
     for group in groups:
         shape = group.element.shape
         around = () if _is_linear(shape) else surroundings(shape)
@@ -364,5 +326,5 @@ def _followers(
             nodes, first = np.unique(group.nodes[:, node].astype(np.int64), return_index=True)
             inner = number[nodes] >= 0
             leaders = group.nodes[first[inner]][:, list(corners)].astype(np.int64)
-            shares: Array = np.full(leaders.shape, 1 / len(corners))
-            yield nodes[inner], leaders, shares
+            factors: Array = np.full(leaders.shape, 1 / len(corners))
+            yield nodes[inner], leaders, factors

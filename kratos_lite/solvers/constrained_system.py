@@ -13,28 +13,20 @@ from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.gauss_point_fields import internal_load
 from kratos_lite.assembly.sparsity_pattern import Pattern, PatternCache
 from kratos_lite.assembly.stiffness import assemble_dense, assemble_stiffness
-from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear
-from kratos_lite.errors import InputError
+from kratos_lite.elements.formulations import bulk_over_shear
 from kratos_lite.solvers.constraint_map import ConstraintMap
-from kratos_lite.solvers.direct import is_quick
-from kratos_lite.solvers.linear_solver import DENSE_MAX, LinearSolver, Solution, choose, quick_to_factorize
+from kratos_lite.solvers.linear_solver import LinearSolver, Solution
+from kratos_lite.solvers.plan import Facts, Plan, choose
 from kratos_lite.typing import Array, Ints, Progress
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from kratos_lite.assembly.matrix_free import MatrixFree
     from kratos_lite.mesh.hanging import HangingNodes
-    from kratos_lite.solvers.coarse_level import LinearLevel
+    from kratos_lite.solvers.coarse_level import PCoarseLevel
 
-LARGEST_CONTRAST = 1e3
-"""Stiffest to softest material up to which products without a matrix are as exact in soft parts."""
 NO_MATRIX = "the stiffness matrix, as its products are computed element by element"
 """What is skipped with linear elements inside the quadratic ones."""
-NEARLY = f"few unknowns with a bulk modulus > {NEAR_HALF:g} shear moduli: a factorization is fastest"
-"""Reason for the method ``direct``."""
-LOCKED = 3000.0
-"""Bulk over shear modulus (ν = 0.4998) from which plain elements take too many iterations."""
 
 
 class ConstrainedSystem:
@@ -42,40 +34,6 @@ class ConstrainedSystem:
 
     Pattern, matrix and whatever the solver prepares (factors, multigrid) are made when they are first
     needed and kept.  Nodes that no element uses carry no equations.
-
-    Parameters
-    ----------
-    points : (n, 3) m.
-    groups : the elements, by rows of the points.
-    constraints : gives the constraint map of the nodes that carry equations, by their rows (a,), such as
-        ``model.supports.constraint_map``.
-    solver : ``auto``, ``dense``, ``direct`` or ``amg``.
-    tolerance : relative residual at which the iterative solver stops.
-    patterns : where sparsity patterns are kept from one system to the next.
-    progress : called with the phase and the share done, 0 … 1.
-    hanging : the nodes of the mesh that hang on larger neighbors, which the constraints hold, too.
-
-    Attributes
-    ----------
-    points, groups : the nodes that carry equations, and the elements by rows of these.
-    nodes : (a,) int, rows of these nodes among all n.
-    reduced : the constraint map, from the free degrees of freedom to all 3a.
-    method, reason : which solver is used, and why.
-    skipped, warnings : what assembly left out, and what is to be said, in words.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import kratos_lite as kl
-    >>> model = kl.Model(kl.box(), kl.Isotropic3D(E=1e9, nu=0.0))
-    >>> model.fix("z-")
-    >>> constraints = model.supports.constraint_map
-    >>> system = ConstrainedSystem(model.mesh.points, model.element_groups(), constraints)
-    >>> f = np.zeros((8, 3))
-    >>> f[model.mesh.nodes("z+"), 2] = 1.0
-    >>> u, solution = system.solve(f)
-    >>> print(f"{u[:, 2].max():.3e} m, {solution.method}")
-    4.000e-09 m, dense
     """
 
     def __init__(
@@ -93,33 +51,52 @@ class ConstrainedSystem:
         self.n_nodes = len(points)
         self.nodes, self.groups = renumber(self.n_nodes, groups)
         self.points = points[self.nodes]
-        self.reduced = constraints(self.nodes)
+        self.constraint_map = constraints(self.nodes)
         self.tolerance, self.progress = tolerance, progress
         self._hanging = hanging if hanging is None else hanging.among(self.nodes, self.n_nodes)
         self.skipped: list[str] = []
         self.warnings: list[str] = []
         self._patterns = patterns or PatternCache()
-        dofs = 3 * len(self.nodes)
-        self.method, self.reason = choose(solver, len(self.reduced.free), dofs)
-        if solver == "auto" and self.method == "amg" and self._is_soon_factorized():
-            self.method, self.reason = "direct", NEARLY
-        if self.method == "dense" and dofs > DENSE_MAX:
-            raise InputError(f"solver='dense' is for up to {DENSE_MAX} degrees of freedom; got {dofs}")
+        self.plan = self._planned(solver)
 
-    def _is_soon_factorized(self) -> bool:
-        """Return whether a material is nearly incompressible and a factorization is fastest."""
-        if not self._is_nearly_incompressible():
-            return False
-        unknowns = len(self.reduced.free)
-        if is_quick(unknowns, lambda: self.pattern):
-            return True
-        from kratos_lite.solvers.dilatation import is_split  # a quick start for small models
+    def _planned(self, solver: str) -> Plan:
+        return choose(solver, self._facts())
 
-        locked = (group for group in self.groups if bulk_over_shear(group.material.C) > LOCKED)
-        return quick_to_factorize(unknowns) and not all(map(is_split, locked))
+    def _facts(self) -> Facts:
+        return Facts(
+            len(self.constraint_map.free),
+            3 * len(self.nodes),
+            bulk_over_shear=lambda: largest_bulk_over_shear(self.groups),
+            bandwidth=self._bandwidth,
+            has_product=self._has_product,
+            contrast=lambda: stiffness_contrast(self.groups),
+            is_stretched=self._is_stretched,
+            is_plate=self._is_plate,
+        )
 
-    def _is_nearly_incompressible(self) -> bool:
-        return any(bulk_over_shear(group.material.C) > NEAR_HALF for group in self.groups)
+    def _bandwidth(self) -> float:
+        from kratos_lite.solvers.banded import cuthill_mckee, nodal_width  # rarely needed
+
+        width = nodal_width(self.pattern, self.pattern.rows(), cuthill_mckee(self.pattern)[1])
+        return width * len(self.constraint_map.free) / len(self.nodes)
+
+    def _has_product(self) -> bool:
+        from kratos_lite.assembly.matrix_free import MatrixFree  # a quick start for small models
+
+        tied = self.constraint_map.T is not None or self._hanging is not None
+        return not tied and all(map(MatrixFree.takes, self.groups))
+
+    def _is_stretched(self) -> bool:
+        from kratos_lite.solvers.coarse_level import is_stretched  # a quick start for small models
+
+        return is_stretched(self.points, self.groups)
+
+    def _is_plate(self) -> bool:
+        from kratos_lite.solvers.plate_level import plate_axes  # a quick start for small models
+
+        free = np.zeros(3 * len(self.points), dtype=bool)
+        free[self.constraint_map.free] = True
+        return plate_axes(self.points, free) is not None
 
     @cached_property
     def pattern(self) -> Pattern:
@@ -130,47 +107,26 @@ class ConstrainedSystem:
     def K(self) -> Any:
         """The stiffness matrix (3a, 3a) in N/m: a BlockMatrix, or a full array for the method ``dense``.
 
-        For the method ``amg`` it is a MatrixFree where that is enough, and a SplitMatrix where elements are
-        nearly incompressible.
+        It is a MatrixFree where the plan needs no matrix, and a SplitMatrix for ``displacement-pressure``.
         """
-        if self.method == "dense":
+        if self.plan.method == "dense":
             return assemble_dense(self.points, self.groups)
-        product = self._matrix_free()
-        return self._assembled(self._is_nearly_incompressible()) if product is None else product
-
-    def _assembled(self, split: bool = False) -> Any:
-        skipped: set[str] = set()
-        if self.method == "amg" and split:
-            from kratos_lite.solvers.dilatation import assemble  # a quick start for small models
-        else:
-            assemble = assemble_stiffness
-        K = assemble(self.points, self.groups, self.pattern, self.progress, skipped)
-        self.skipped += sorted(skipped)
-        return K
-
-    def _matrix_free(self) -> MatrixFree | None:
-        """Return the product of K alone, if multigrid smooths well with it.
-
-        A plate, stretched cells and materials of a large contrast need a matrix.
-        """
-        if self.method != "amg" or self.reduced.T is not None or self._hanging is not None:
-            return None
+        if not self.plan.matrix_free:
+            return self._assembled(self.plan.method == "displacement-pressure")
         from kratos_lite.assembly.matrix_free import MatrixFree  # a quick start for small models
-        from kratos_lite.solvers.coarse_level import is_stretched
-        from kratos_lite.solvers.plate_level import plate_axes
 
-        free = np.zeros(3 * len(self.points), dtype=bool)
-        free[self.reduced.free] = True
-        if (
-            not all(map(MatrixFree.takes, self.groups))
-            or stiffness_contrast(self.groups) > LARGEST_CONTRAST
-            or is_stretched(self.points, self.groups)
-            or plate_axes(self.points, free) is not None
-        ):
-            return None
         if any(len(group.element.shape.nodes) > group.element.shape.corners for group in self.groups):
             self.skipped.append(NO_MATRIX)
         return MatrixFree(self.points, self.groups, self._assembled)
+
+    def _assembled(self, split: bool = False) -> Any:
+        skipped: set[str] = set()
+        assemble: Callable[..., Any] = assemble_stiffness
+        if split:
+            from kratos_lite.solvers.dilatation import assemble  # a quick start for small models
+        K = assemble(self.points, self.groups, self.pattern, self.progress, skipped)
+        self.skipped += sorted(skipped)
+        return K
 
     @cached_property
     def norm(self) -> float:
@@ -179,13 +135,13 @@ class ConstrainedSystem:
 
     @cached_property
     def _equations(self) -> LinearSolver:
-        return LinearSolver(self.K, self.reduced, self.points, self.method, self.reason, self._linear_level)
+        return LinearSolver(self.K, self.constraint_map, self.points, self.plan, self._p_coarse_level)
 
-    def _linear_level(self) -> LinearLevel | None:
-        from kratos_lite.solvers.coarse_level import linear_level  # a quick start for small models
+    def _p_coarse_level(self) -> PCoarseLevel | None:
+        from kratos_lite.solvers.coarse_level import p_coarse_level  # a quick start for small models
 
         groups = getattr(self.K, "groups", self.groups)  # those of a split matrix have other materials
-        return linear_level(self.points, groups, self._hanging)
+        return p_coarse_level(self.points, groups, self._hanging)
 
     def solve(
         self,
@@ -194,20 +150,7 @@ class ConstrainedSystem:
         tolerance: float | None = None,
         start: Array | None = None,
     ) -> tuple[Array, Solution]:
-        """Return the displacements (n, 3) under nodal forces (n, 3), and how they were found.
-
-        Parameters
-        ----------
-        forces : (n, 3) N.
-        prescribed : (3a,) m, in place of c of the constraint map.
-        tolerance : in place of that of the system.
-        start : (n, 3) m, near the solution; an iteration begins there.
-
-        Raises
-        ------
-        SolveError
-            If the matrix is singular or the accuracy asked for cannot be reached.
-        """
+        """Return the displacements (n, 3) under nodal forces (n, 3), and the Solution."""
         tolerance = self.tolerance if tolerance is None else tolerance
         near = None if start is None else self.gather(start)
         solution = self._equations.solve(self.gather(forces), tolerance, self.progress, prescribed, near)
@@ -223,13 +166,16 @@ class ConstrainedSystem:
         out[self.nodes] = (self.K @ self.gather(u) - self.gather(forces)).reshape(-1, 3)
         return out
 
+    def destroy(self) -> None:
+        """Release what is kept outside of Python."""
+
     def reduce(self, forces: Array) -> Array:
         """Return what nodal forces (n, 3) do on the free degrees of freedom, (q,)."""
-        return self.reduced.reduce(self.gather(forces))
+        return self.constraint_map.reduce(self.gather(forces))
 
     def expand(self, q: Array) -> Array:
         """Return the displacements (n, 3) of the free degrees of freedom (q,)."""
-        return self.scatter(self.reduced.expand(q))
+        return self.scatter(self.constraint_map.expand(q))
 
     def gather(self, values: Array) -> Array:
         """Return nodal values (n, 3) as those of the equations, (3a,)."""
@@ -242,6 +188,17 @@ class ConstrainedSystem:
         out = np.zeros((self.n_nodes, 3))
         out[self.nodes] = values.reshape(-1, 3)
         return out
+
+
+def largest_bulk_over_shear(groups: Sequence[ElementGroup]) -> tuple[float, float]:
+    """Return the largest ratio of moduli of elements with known dilatations, and of the others."""
+    from kratos_lite.solvers.dilatation import has_dilatations  # a quick start for small models
+
+    largest = {True: 0.0, False: 0.0}
+    for group in groups:
+        known = has_dilatations(group)
+        largest[known] = max(largest[known], bulk_over_shear(group.material.C))
+    return largest[True], largest[False]
 
 
 def stiffness_contrast(groups: Sequence[ElementGroup]) -> float:
@@ -262,7 +219,7 @@ def renumber(n_nodes: int, groups: Sequence[ElementGroup]) -> tuple[Ints, list[E
     return nodes, [replace(group, nodes=local[group.nodes]) for group in groups]
 
 
-def among(groups: Sequence[ElementGroup], moving: NDArray[np.bool_]) -> list[ElementGroup]:
+def select(groups: Sequence[ElementGroup], moving: NDArray[np.bool_]) -> list[ElementGroup]:
     """Return the elements that have a node in `moving` (n,), group by group."""
     if moving.all():
         return list(groups)

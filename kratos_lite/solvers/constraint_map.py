@@ -25,41 +25,27 @@ Slaves: TypeAlias = "dict[int, tuple[dict[int, float], float]]"
 
 @dataclass(frozen=True)
 class MultiPointConstraint:
-    """One linear multi-point constraint: u[slave] = Σ weights · u[masters] + constant.
-
-    Parameters
-    ----------
-    slave, masters : degrees of freedom, 3·node + axis.
-    weights : one for each master.
-    constant : m.
-    symmetric : of a tie u[slave] = u[master]: where supports hold the slave, the master follows.
-    """
+    """One linear multi-point constraint: u[slave] = Σ weights · u[masters] + constant (dofs)."""
 
     slave: int
     masters: tuple[int, ...]
     weights: tuple[float, ...]
     constant: float = 0.0
-    symmetric: bool = False
+    symmetric: bool = False  # a tie: where supports hold the slave, the master follows
 
 
 @dataclass(eq=False)
 class ConstraintMap:
-    """The map u = T q + c from the free degrees of freedom q to all.
+    """The map u = T q + c from the free degrees of freedom q to all."""
 
-    Attributes
-    ----------
-    free : (q,) int, the free degrees of freedom.
-    c : (N,) float, the displacement at q = 0 in m.
-    T : (N, q) sparse; None without slaves, where q is added to the free components of c.
-    """
-
-    free: Ints
-    c: Array
+    free: Ints  # (q,) int, the free degrees of freedom
+    c: Array  # (N,) float, the displacement at q = 0 in m
+    # (N, q) sparse; None without dependent dofs, where q is added to the free components of c
     T: csr_array[Any, Any] | None = None
 
-    def holding(self, held: Mask) -> ConstraintMap:
-        """Return the map with some of the free ones (N,) held, too, where they are at q = 0."""
-        keep = ~held.ravel()[self.free]
+    def holding(self, constrained: Mask) -> ConstraintMap:
+        """Return the map with some of the free ones (N,) constrained, too, where they are at q = 0."""
+        keep = ~constrained.ravel()[self.free]
         if keep.all():
             return self
         return ConstraintMap(self.free[keep], self.c, None if self.T is None else self.T[:, keep])
@@ -101,25 +87,20 @@ class ConstraintMap:
 def constraint_map(fixed: Mask, values: Array, slaves: Slaves | None = None) -> ConstraintMap:
     """Return the map of nodes with prescribed displacements and slaves.
 
-    Where all supports displace the nodes alike along an axis, c carries the free ones along: what is left to
-    solve for is the strain alone, and its error does not grow with the displacement.
-
-    Parameters
-    ----------
-    fixed, values : (a, 3) which degrees of freedom are prescribed, and their displacements in m.
-    slaves : as of `eliminate`, by the rows of these nodes; None where the structure has no constraints.
+    Where all supports displace the nodes alike along an axis, c carries the free ones along: what remains to
+    be solved for is the strain alone, and its error does not grow with the displacement.
     """
-    held, c = fixed.ravel(), values.ravel() * fixed.ravel()
+    constrained, c = fixed.ravel(), values.ravel() * fixed.ravel()
     if slaves is None:
         for axis in range(3):
-            at_axis, along = held[axis::3], c[axis::3]
+            at_axis, along = constrained[axis::3], c[axis::3]
             if at_axis.any() and np.ptp(along[at_axis]) == 0 and along[at_axis][0] != 0:
                 along[:] = along[at_axis][0]
-        return ConstraintMap(np.flatnonzero(~held), c)
-    is_free = ~held
+        return ConstraintMap(np.flatnonzero(~constrained), c)
+    is_free = ~constrained
     is_free[list(slaves)] = False
     free = np.flatnonzero(is_free)
-    column = np.full(len(held), -1)
+    column = np.full(len(constrained), -1)
     column[free] = np.arange(len(free))
     rows, columns, weights = [free], [column[free]], [np.ones(len(free))]
     for slave, (terms, constant) in sorted(slaves.items()):
@@ -130,25 +111,13 @@ def constraint_map(fixed: Mask, values: Array, slaves: Slaves | None = None) -> 
     from scipy.sparse import csr_array
 
     entries = (np.concatenate(weights), (np.concatenate(rows), np.concatenate(columns)))
-    return ConstraintMap(free, c, csr_array(entries, shape=(len(held), len(free))))
+    return ConstraintMap(free, c, csr_array(entries, shape=(len(constrained), len(free))))
 
 
 def eliminate(
     constraints: Iterable[MultiPointConstraint], fixed: Mask, values: Array, name: Callable[[int], str]
 ) -> Slaves:
-    """Express every slave by free degrees of freedom alone.
-
-    Parameters
-    ----------
-    constraints : multi-point constraints; symmetric ties already turned so that their slaves are free.
-    fixed, values : (n, 3) which degrees of freedom are prescribed, and their displacements in m.
-    name : gives the name of a degree of freedom for messages.
-
-    Raises
-    ------
-    ModelError
-        If a slave is fixed or has two constraints, or constraints form a cycle.
-    """
+    """Express every dependent dof by free ones; ModelError for cycles and dofs constrained twice."""
     by_slave: dict[int, MultiPointConstraint] = {}
     for constraint in constraints:
         slave = constraint.slave
@@ -197,11 +166,6 @@ def rigid_modes(points: Array, center: ArrayLike | None = None) -> Array:
 
     They are translations along x y z and rotations about x y z through `center`, the mean of the points if
     not given.
-
-    Examples
-    --------
-    >>> rigid_modes(np.eye(3)).shape
-    (9, 6)
     """
     X = points - (points.mean(axis=0) if center is None else np.asarray(center))
     R = np.zeros((len(points), 3, 6))

@@ -1,7 +1,7 @@
 """K of nearly incompressible elements, split into their dilatations and a stiffness without most of them.
 
 K = A + Dᵀ κ D, where D u are the dilatations that elements have, by orthonormal polynomials, κ is the bulk
-modulus that is taken off the material, and A is the stiffness with what is left of it: λ = μ.
+modulus that is taken off the material, and A is the stiffness with the rest of it: λ = μ.
 """
 
 from __future__ import annotations
@@ -26,35 +26,21 @@ from kratos_lite.typing import Array, Progress
 if TYPE_CHECKING:
     from scipy.sparse import bsr_array, csr_array
 
-REASON = f"a bulk modulus > {NEAR_HALF:g} shear moduli: pressures beside displacements keep multigrid fast"
-"""Reason for the method ``displacement-pressure``."""
 KEPT = 1.0
 """λ / μ that A keeps: pressures are better known the more it is, and multigrid is still as good."""
 
 
 @dataclass(eq=False)
 class SplitMatrix:
-    """K = A + Dᵀ κ D, (3n, 3n) in N/m, which is only multiplied.
+    """K = A + Dᵀ κ D, (3n, 3n) in N/m, which is only multiplied."""
 
-    Attributes
-    ----------
-    A : the stiffness without most of the bulk modulus.
-    D : (p, 3n) sparse, orthonormal dilatations of the elements in √m³ / m, R x 3 blocks with R = 1 or 4.
-    bulk : (p,) Pa, κ.
-    kept : (p,) Pa, λ in A.
-    modulus : (p,) Pa, λ + 2μ in A.
-    means : of the pressures, with λ + 2μ of the stiffest element at a node, λ = 0 in those that are split.
-    groups : the elements, with materials as in A.
-    """
-
-    A: BlockMatrix
-    D: bsr_array
-    bulk: Array
-    kept: Array
-    modulus: Array
-    means: PressureMeans
-    groups: list[ElementGroup]
-    is_split = True
+    A: BlockMatrix  # the stiffness without most of the bulk modulus
+    D: bsr_array  # (p, 3n) orthonormal dilatations of elements, √m³ / m; R x 3 blocks, R = 1 or 4
+    bulk: Array  # (p,) Pa, κ
+    kept: Array  # (p,) Pa, λ in A
+    modulus: Array  # (p,) Pa, λ + 2μ in A
+    means: PressureMeans  # with λ + 2μ of the stiffest element at a node; λ = 0 where it is split
+    groups: list[ElementGroup]  # the elements, with materials as in A
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -84,51 +70,48 @@ def assemble(
     pattern: Pattern,
     progress: Progress | None = None,
     skipped: set[str] | None = None,
-) -> BlockMatrix | SplitMatrix:
-    """Return the stiffness matrix, split where elements are nearly incompressible.
-
-    Parameters
-    ----------
-    points, groups, pattern, progress, skipped : see `assemble_stiffness`.
-    """
-    left, soft, at_once, parts = list(groups), list(groups), list(groups), {}
+) -> SplitMatrix:
+    """Return the stiffness matrix of elements some of which are nearly incompressible."""
+    elastic, soft, at_once, parts = list(groups), list(groups), list(groups), {}
     for number, group in enumerate(groups):
         if not is_split(group):
             continue
         bulk, shear = _moduli(group.material.C)
-        part = _Part(group, bulk - (KEPT + 2 / 3) * shear, shear, *_dilatations(points, group))
+        part = _SplitGroup(group, bulk - (KEPT + 2 / 3) * shear, shear, *_dilatations(points, group))
         parts[number] = part
-        left[number] = _softened(group, part.bulk)
-        soft[number] = _softened(left[number], KEPT * shear)
-        at_once[number] = left[number] if part.is_all() else group
+        elastic[number] = _softened(group, part.bulk)
+        soft[number] = _softened(elastic[number], KEPT * shear)
+        at_once[number] = elastic[number] if part.is_all() else group
     K = assemble_stiffness(points, at_once, pattern, progress, skipped)
-    if not parts:
-        return K
     for number, part in parts.items():
         if not part.is_all():
             part.take_off(K, pattern, number)
-    found = list(parts.values())
-    taken, shears = (
-        np.concatenate([np.full(part.count, getattr(part, name)) for part in found])
+    split = list(parts.values())
+    bulks, shears = (
+        np.concatenate([np.full(part.count, getattr(part, name)) for part in split])
         for name in ("bulk", "shear")
     )
-    means = pressure_means(points, found, _stiffest(len(points), soft))
-    D = _assembled(len(points), found)
-    return SplitMatrix(K, D, taken, KEPT * shears, (KEPT + 2) * shears, means, left)
+    means = pressure_means(points, split, _stiffest(len(points), soft))
+    D = _assembled(len(points), split)
+    return SplitMatrix(K, D, bulks, KEPT * shears, (KEPT + 2) * shears, means, elastic)
 
 
 def is_split(group: ElementGroup) -> bool:
-    """Return whether the dilatations of a group are known and its material is nearly incompressible.
+    """Return whether the dilatations of a group are known and its material is nearly incompressible."""
+    return has_dilatations(group) and bulk_over_shear(group.material.C) > NEAR_HALF
+
+
+def has_dilatations(group: ElementGroup) -> bool:
+    """Return whether the dilatations of a group are known.
 
     Those of the library's B-bar elements are their projected ones, those of enhanced elements their means:
     the modes take up the others.
     """
-    known = not group.element.custom and group.strain_tables() is not None
-    return known and bulk_over_shear(group.material.C) > NEAR_HALF
+    return not group.element.custom and group.strain_tables() is not None
 
 
 @dataclass(eq=False)
-class _Part:
+class _SplitGroup:
     """A group, the bulk modulus taken off it, its shear modulus; its dilatations and their polynomials."""
 
     group: ElementGroup
@@ -144,7 +127,7 @@ class _Part:
     def is_all(self) -> bool:
         """Return whether there are no other dilatations: without κ the stiffness is of a softer material."""
         tables = self.group.strain_tables()
-        return tables is not None and tables.C is None and tables.share == 1.0
+        return tables is not None and tables.C is None and tables.fraction == 1.0
 
     def take_off(self, K: BlockMatrix, pattern: Pattern, number: int) -> None:
         """Subtract Dᵀ κ D from the matrix."""
@@ -165,7 +148,7 @@ def _dilatations(points: Array, group: ElementGroup) -> tuple[Array, Array]:
     assert tables is not None
     linear = tables.C is None and tables.functions.shape[1] > 0
     derivatives, weights = np.swapaxes(dN, 1, 2).reshape(-1, dN.shape[1]), group.rule.weights
-    found, polynomials = [], []
+    dilatations, polynomials = [], []
     for chunk in group.chunks():
         elements = group.at(points, chunk)
         J = elements._jacobian(dN)
@@ -179,8 +162,8 @@ def _dilatations(points: Array, group: ElementGroup) -> tuple[Array, Array]:
         m, r = polynomials[-1].shape[:2]
         rows = np.einsum("mgr,mgji->mrigj", P, normals * weights[:, None, None]).reshape(m, 3 * r, -1)
         integrals = np.swapaxes((rows @ derivatives).reshape(m, r, 3, -1), 2, 3).reshape(m, r, -1)
-        found.append(polynomials[-1] @ integrals)
-    return np.concatenate(found), np.concatenate(polynomials)
+        dilatations.append(polynomials[-1] @ integrals)
+    return np.concatenate(dilatations), np.concatenate(polynomials)
 
 
 def _moduli(C: Array) -> tuple[float, float]:
@@ -197,20 +180,20 @@ def _longitudinal(group: ElementGroup) -> float:
 
 def _stiffest(n_nodes: int, groups: Sequence[ElementGroup]) -> Array:
     """Return the largest λ + 2μ of the elements at each node, (n,)."""
-    found = np.ones(n_nodes)
+    modulus = np.ones(n_nodes)
     for group in sorted(groups, key=_longitudinal):
-        found[group.nodes] = _longitudinal(group)
-    return found
+        modulus[group.nodes] = _longitudinal(group)
+    return modulus
 
 
-def _softened(group: ElementGroup, taken: float) -> ElementGroup:
+def _softened(group: ElementGroup, bulk: float) -> ElementGroup:
     """Return a group whose material has a smaller bulk modulus."""
     C = group.material.C.copy()
-    C[:3, :3] -= taken
+    C[:3, :3] -= bulk
     return replace(group, material=cast("LinearMaterial", SimpleNamespace(C=C)))
 
 
-def _assembled(n_nodes: int, parts: Sequence[_Part]) -> bsr_array:
+def _assembled(n_nodes: int, parts: Sequence[_SplitGroup]) -> bsr_array:
     """Return D (p, 3n) of the dilatations of each group, a row of blocks for each element if they allow."""
     from scipy.sparse import bsr_array
 

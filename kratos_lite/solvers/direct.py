@@ -19,17 +19,10 @@ from kratos_lite.typing import Array
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-    from kratos_lite.assembly.sparsity_pattern import Pattern
-
 NO_MEMORY = -2
 """PARDISO's error code for too little memory; the others mean a matrix it cannot factorize."""
 REPLACED_PIVOTS = 14
 """PARDISO's parameter (from 1) that counts pivots too small to divide by."""
-
-FEW, MANY = 1000, 10_000
-"""Up to this many unknowns SuperLU always takes less time than 30 iterations; above the other, never."""
-QUICK = 2e9
-"""Unknowns times the square of their band up to which it does: some 5,000 in one layer of cells."""
 
 
 class Unsuitable(Exception):
@@ -37,20 +30,7 @@ class Unsuitable(Exception):
 
 
 class Factorization:
-    """A factorized matrix A.
-
-    Attributes
-    ----------
-    method : ``dense``, ``pardiso`` or ``superlu``.
-    A : the matrix, for one step of iterative refinement.
-    apply : function of b that returns x without refinement.
-
-    Examples
-    --------
-    >>> factors = factorize_dense(np.array([[2.0, 0.0], [0.0, 4.0]]))
-    >>> factors.method, factors.solve(np.array([1.0, 1.0]))
-    ('dense', array([0.5 , 0.25]))
-    """
+    """A factorized matrix A, by ``dense``, ``pardiso`` or ``superlu``; `apply` solves without refinement."""
 
     def __init__(self, method: str, A: Any, apply: Callable[[Array], Array]) -> None:
         self.method, self.A, self.apply = method, A, apply
@@ -64,41 +44,8 @@ class Factorization:
         return x + self.apply(b - self.A @ x)
 
 
-def is_quick(unknowns: int, pattern: Callable[[], Pattern]) -> bool:
-    """Return whether a factorization takes less time than 30 iterations.
-
-    Parameters
-    ----------
-    unknowns : the number of free components.
-    pattern : gives the sparsity of the nodes, which is not needed for `FEW` unknowns.
-
-    Examples
-    --------
-    >>> is_quick(FEW, lambda: None), is_quick(MANY + 1, lambda: None)
-    (True, False)
-    """
-    if unknowns <= FEW or unknowns > MANY:
-        return unknowns <= FEW
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import reverse_cuthill_mckee
-
-    nodal = pattern()
-    n = nodal.n_nodes
-    graph = csr_array((np.ones(len(nodal.indices)), nodal.indices, nodal.indptr), shape=(n, n))
-    place = np.empty(n, dtype=np.int64)
-    place[reverse_cuthill_mckee(graph, symmetric_mode=True)] = np.arange(n)
-    width = np.abs(place[nodal.rows()] - place[nodal.indices]).max(initial=0)
-    return bool(unknowns * (width * unknowns / n) ** 2 <= QUICK)
-
-
 def factorize_dense(A: Array) -> Factorization:
-    """Return a full matrix (n, n) factorized: its inverse, as NumPy alone keeps no other factors.
-
-    Raises
-    ------
-    SolveError
-        If the matrix is singular.
-    """
+    """Return a full matrix (n, n) factorized: its inverse, as NumPy keeps no other factors."""
     try:
         inverse = np.linalg.inv(A)
     except np.linalg.LinAlgError:
@@ -107,18 +54,7 @@ def factorize_dense(A: Array) -> Factorization:
 
 
 def factorize(A: csr_array, symmetric: bool = True) -> Factorization:
-    """Return a sparse matrix (n, n) factorized, by the fastest of `BACKENDS` that does.
-
-    Parameters
-    ----------
-    A : the matrix.
-    symmetric : whether A is symmetric positive definite.
-
-    Raises
-    ------
-    SolveError
-        If the matrix is singular, or its factors do not fit into memory.
-    """
+    """Return a sparse matrix (n, n) factorized, by the fastest of `BACKENDS` that does."""
     for backend in BACKENDS:
         try:
             return Factorization(backend.__name__, A, backend(A, symmetric))

@@ -27,9 +27,9 @@ import numpy as np
 from kratos_lite.solvers import multigrid
 from kratos_lite.solvers.blas import one_thread
 from kratos_lite.solvers.block_inverse import block_inverse
-from kratos_lite.solvers.coarse_level import LinearLevel
+from kratos_lite.solvers.coarse_level import PCoarseLevel
 from kratos_lite.solvers.dilatation import SplitMatrix
-from kratos_lite.solvers.iteration import Share
+from kratos_lite.solvers.iteration import GoOn, Share
 from kratos_lite.typing import Array, Mask, Progress, Rows
 
 if TYPE_CHECKING:
@@ -37,26 +37,21 @@ if TYPE_CHECKING:
     from scipy.sparse import bsr_array
 
 DIRECTIONS = 80
-"""Iterations after which they start anew from what is left: their directions are kept until then."""
+"""Iterations after which they start anew from the residual: their directions are kept until then."""
 REDUCED = 1e-10
-"""Share of the residual at which they start anew, as rounding leaves no more."""
+"""Fraction of the residual at which they start anew, as rounding allows no more."""
 MAX_ITERATIONS = 400
 """Iterations after which it does not converge."""
 DEGREE = 3
 """Degree of the smoother: an iteration more takes longer than a better cycle."""
 INNER, INNER_MAX = 0.1, 120
-"""Share of the energy at which a solution with S ends, and its most iterations."""
+"""Fraction of the energy at which a solution with S ends, and its most iterations."""
 
 
 class DisplacementPressure:
-    """What solves K u = b for one right side after another, where K is split.
+    """What solves K u = b for one right side after another, where K is split."""
 
-    Attributes
-    ----------
-    levels : unknowns of each level of the multigrid for A.
-    """
-
-    def __init__(self, K: SplitMatrix, free: Mask, points: Array, linear: LinearLevel | None = None) -> None:
+    def __init__(self, K: SplitMatrix, free: Mask, points: Array, linear: PCoarseLevel | None = None) -> None:
         self._K, self._fixed = K, ~free
         self._cycle = multigrid.multigrid(K.A, free, points, linear, DEGREE)
         self.levels: list[int] = self._cycle.levels
@@ -77,29 +72,21 @@ class DisplacementPressure:
         tolerance: float,
         norm: float,
         progress: Progress | None,
-        go_on: multigrid.GoOn | None = None,
+        go_on: GoOn | None = None,
     ) -> tuple[Array, int, bool]:
         """Return u, iterations and success."""
-        share = Share(tolerance, progress) if progress else None
-
-        def each(residual: float) -> bool:
-            if share:
-                share(residual)
-            return go_on is None or go_on(residual)
-
+        each = Share(tolerance, progress, go_on)
         if self._kernel is None:
             with one_thread():
                 u, iterations, converged = self._solve(b, tolerance, norm, each)
         else:
             limits = MAX_ITERATIONS, DIRECTIONS, REDUCED
             u, iterations, converged = self._kernel.solve(b, tolerance, norm, *limits, each)
-        if share and converged:
-            share.finish()
+        if converged:
+            each.finish()
         return u, iterations, converged
 
-    def _solve(
-        self, b: Array, tolerance: float, norm: float, each: multigrid.GoOn
-    ) -> tuple[Array, int, bool]:
+    def _solve(self, b: Array, tolerance: float, norm: float, each: GoOn) -> tuple[Array, int, bool]:
         n, norm_b = len(b), float(np.linalg.norm(b))
         x = np.zeros(len(self._weight))
         if norm_b == 0:
@@ -114,17 +101,17 @@ class DisplacementPressure:
             exhausted = space.full or estimate <= REDUCED * space.start or iteration == MAX_ITERATIONS
             if not (stop or exhausted or estimate <= aim):
                 continue
-            found = space.added_to(x)
-            r = self._residual(b, found)
-            left = self._left(r)
-            rounding = 2 * np.finfo(float).eps * (norm * float(np.linalg.norm(found[:n])) + norm_b)
+            y = space.added_to(x)
+            r = self._residual(b, y)
+            residual = self._residual_norm(r)
+            rounding = 2 * np.finfo(float).eps * (norm * float(np.linalg.norm(y[:n])) + norm_b)
             limit = max(float(rounding), tolerance * norm_b)
-            if left <= limit or stop or (exhausted and left > before / 2):
+            if residual <= limit or stop or (exhausted and residual > before / 2):
                 break
-            aim = estimate * min(limit / left, 0.5)
+            aim = estimate * min(limit / residual, 0.5)
             if exhausted:
-                x, before, space = found, left, _Directions(r)
-        return found[:n], iteration, left <= limit
+                x, before, space = y, residual, _Directions(r)
+        return y[:n], iteration, residual <= limit
 
     def _product(self, x: Array) -> Array:
         """Return the product of the matrix of displacements and pressures with both."""
@@ -140,8 +127,8 @@ class DisplacementPressure:
         r[: len(b)] += b
         return self._weight * r
 
-    def _left(self, r: Array) -> float:
-        """Return |b - K u|: the pressures that the displacements have are not quite those found."""
+    def _residual_norm(self, r: Array) -> float:
+        """Return |b - K u|: the pressures that the displacements have are not quite those of the solution."""
         r = r * self._inverse_weight
         n = self._K.shape[0]
         forces = r[:n] + self._K.D.T @ (self._K.bulk * r[n:])
@@ -200,10 +187,10 @@ class _Directions:
 
     def added_to(self, x: Array) -> Array:
         """Return x changed along the directions so that the residual is smallest."""
-        found = x.copy()
+        x = x.copy()
         for factor, z in zip(self._y, self._Z, strict=False):
-            found += factor * z.astype(float)  # NumPy before 2 keeps single precision otherwise
-        return found
+            x += factor * z.astype(float)  # NumPy before 2 keeps single precision otherwise
+        return x
 
 
 def _arrays(A: bsr_array) -> tuple[Rows, Rows, Array]:
@@ -217,7 +204,7 @@ class _Schur:
     def __init__(self, K: SplitMatrix, inverse: bsr_array, loose: Mask) -> None:
         from scipy.sparse import diags_array
 
-        free = loose[K.means.ends].any(axis=1)  # around held nodes checkerboards have means, too
+        free = loose[K.means.ends].any(axis=1)  # around constrained nodes checkerboards have means, too
         means = K.means.matrix @ diags_array(np.where(free, 1.0, 0.0))
         S = (K.D @ inverse @ K.D.T).tocsr() + means @ means.T + diags_array(1 / K.bulk)
         self.scale = 1 / np.sqrt(S.diagonal())

@@ -11,54 +11,27 @@ import numpy as np
 
 from kratos_lite.errors import InputError, SolveError
 from kratos_lite.solvers import direct
+from kratos_lite.solvers.plan import DENSE_MODES
 from kratos_lite.typing import Array, Progress
 from kratos_lite.validation import whole_number
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-DENSE_MODES = 1200
-"""Up to this many unknowns all modes at once take no longer than some by iteration."""
 SHIFTS = (1.0, 1e-2, 1e-4, 1e-6)
-"""Shares of the first shift that are tried."""
+"""Factors on the first shift that are tried."""
 RESTARTS = 40
 """Restarts of Lanczos after which a lower shift is tried."""
 RESIDUAL = 1e-6
-"""Share of its terms that may be left of an equation."""
+"""Fraction of its terms that an equation may miss."""
 ROUNDING = 1e-13
-"""Share of the norms of its matrices that may be."""
+"""Fraction of the norms of its matrices that it may miss."""
 
 
 def modes(
     K: csr_array[Any, Any], M: csr_array[Any, Any], count: int, progress: Progress | None = None
 ) -> tuple[Array, Array]:
-    """Return the lowest natural frequencies and their shapes.
-
-    Parameters
-    ----------
-    K, M : sparse (n, n), symmetric; K positive semidefinite, M positive definite.
-    count : how many, 1 … n.
-    progress : called with ``"factorize"`` or ``"modes"`` and the share done, 0 … 1, of an iteration.
-
-    Returns
-    -------
-    omega (count,) in rad/s, ascending; rigid motions have 0 but for rounding.
-    shapes (n, count) with φ^T M φ = 1.
-
-    Raises
-    ------
-    InputError
-        If so many modes do not exist.
-    SolveError
-        If the iteration does not converge, or what it finds does not satisfy the equations.
-
-    Examples
-    --------
-    >>> from scipy.sparse import csr_array
-    >>> omega, _ = modes(csr_array(np.diag([4.0, 9.0])), csr_array(np.eye(2)), 2)
-    >>> omega.round(12).tolist()
-    [2.0, 3.0]
-    """
+    """Return the lowest ω (count,) in rad/s, ascending, and their shapes (n, count) with φ^T M φ = 1."""
     n = K.shape[0]
     if whole_number(count, "count") > n:
         raise InputError(f"this body has 1 … {n} modes; got {count}")
@@ -104,8 +77,8 @@ def _by_iteration(K: Any, M: Any, count: int, progress: Progress | None) -> tupl
 
     start = np.random.default_rng(0).standard_normal(n)  # the same vector gives the same modes each time
     inverse = LinearOperator((n, n), matvec=solve, dtype=np.float64)
-    for share in SHIFTS:
-        shift = share * first_shift(K, M)
+    for factor in SHIFTS:
+        shift = factor * first_shift(K, M)
         if progress:
             progress("factorize", 0.0)
         factors = direct.factorize((K + shift * M).tocsr())
@@ -134,22 +107,16 @@ def not_converged(count: int) -> SolveError:
 
 
 def check_residuals(terms: list[tuple[Any, Any]], shapes: Any) -> None:
-    """Raise SolveError unless the sum of terms is 0 but for rounding, for each shape.
-
-    Parameters
-    ----------
-    terms : factors (count,), and the matrix (n, n) that they multiply.
-    shapes : (n, count).
-    """
+    """Raise SolveError unless the sum of terms, factors and matrices, is 0 for each shape (n, count)."""
     parts = [factor * (A @ shapes) for factor, A in terms]
-    noise = sum(np.abs(factor) * float(abs(A).sum(axis=0).max()) for factor, A in terms)
-    left = np.linalg.norm(sum(parts), axis=0)
+    norms = sum(np.abs(factor) * float(abs(A).sum(axis=0).max()) for factor, A in terms)
+    residual = np.linalg.norm(sum(parts), axis=0)
     size = sum(np.linalg.norm(part, axis=0) for part in parts)
-    allowed = RESIDUAL * size + ROUNDING * noise * np.linalg.norm(shapes, axis=0)
-    if not (left <= allowed).all():  # nor if it is no number
-        worst = int(np.argmax(np.nan_to_num(left / allowed, nan=np.inf)))
+    allowed = RESIDUAL * size + ROUNDING * norms * np.linalg.norm(shapes, axis=0)
+    if not (residual <= allowed).all():  # nor if it is NaN
+        worst = int(np.argmax(np.nan_to_num(residual / allowed, nan=np.inf)))
         raise SolveError(
-            f"mode {worst + 1} misses its equation by {left[worst] / size[worst]:.1e} of its terms, which is "
-            "more than rounding explains; ask for another number of modes, and look for very thin elements, "
-            "a large stiffness contrast or nearly free parts"
+            f"mode {worst + 1} misses its equation by {residual[worst] / size[worst]:.1e} of its "
+            "terms, which is more than rounding explains; ask for another number of modes, and look for very "
+            "thin elements, a large stiffness contrast or nearly free parts"
         )

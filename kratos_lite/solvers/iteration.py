@@ -1,40 +1,29 @@
-"""Conjugate gradients, the share of the work they have done, and when to give them up."""
+"""Conjugate gradients, the fraction of the work they have done, and when to give them up."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
+from kratos_lite.solvers import plan
 from kratos_lite.typing import Array, Progress
 
 MAX_ITERATIONS = 1000
 """A multigrid that needs more than these does not converge."""
 STALLED = 200
 """A multigrid that finds no smaller residual in as many iterations does not converge either."""
-
-
-PATIENCE, PATIENCE_FROM = 400, 60
-"""Iterations that take as long as a factorization, and those that show a rate."""
+GoOn: TypeAlias = Callable[[float], bool]
+"""Takes a residual as a fraction of the first; returns whether to go on."""
 
 
 class ConvergenceForecast:
-    """Forecasts from the residuals so far, as shares of the first, whether an iteration ends soon.
+    """Forecasts from the residuals so far, as fractions of the first, whether an iteration ends soon.
 
-    It does not if, after 60 iterations, their rate promises more than `PATIENCE` in all.  The rate is
+    It does not if, after 60 iterations, their rate promises more than `plan.PATIENCE` in all.  The rate is
     that between the last two quarters, each the mean of its logarithms: residuals grow at first and jump.
-
-    Attributes
-    ----------
-    stopped : whether the forecast was too many iterations.
-
-    Examples
-    --------
-    >>> fast, slow = ConvergenceForecast(1e-8), ConvergenceForecast(1e-8)
-    >>> all(fast(0.9**k) for k in range(150)), [slow(0.99**k) for k in range(100)].index(False)
-    (True, 59)
     """
 
     def __init__(self, tolerance: float) -> None:
@@ -44,32 +33,34 @@ class ConvergenceForecast:
     def __call__(self, residual: float) -> bool:
         """Take the next residual; return whether to go on."""
         self._logs.append(math.log(max(residual, 1e-300)))
-        done, left = len(self._logs), self._logs[-1] - math.log(self.tolerance)
-        if done < PATIENCE_FROM or left <= 0:
+        done, remaining = len(self._logs), self._logs[-1] - math.log(self.tolerance)
+        if done < plan.PATIENCE_FROM or remaining <= 0:
             return True
         quarter = done // 4
         before, now = self._logs[-2 * quarter : -quarter], self._logs[-quarter:]
         rate = (math.fsum(before) - math.fsum(now)) / quarter**2
-        self.stopped = (PATIENCE - done) * rate < left
+        self.stopped = (plan.PATIENCE - done) * rate < remaining
         return not self.stopped
 
 
 class Share:
-    """Turns residuals, as shares of the first, into the share of the work that is done; it never falls."""
+    """Turns residuals, as fractions of the first, into the fraction of work that is done; it never falls."""
 
-    def __init__(self, tolerance: float, progress: Progress) -> None:
-        self.tolerance, self.progress, self.done = tolerance, progress, 0.0
+    def __init__(self, tolerance: float, progress: Progress | None, go_on: GoOn | None = None) -> None:
+        self.tolerance, self.progress, self.go_on, self.done = tolerance, progress, go_on, 0.0
 
-    def __call__(self, residual: float) -> None:
-        """Report after an iteration."""
-        share = float(np.log(max(residual, 1e-300)) / np.log(self.tolerance))
-        self.done = min(max(self.done, share), 1.0)
-        self.progress("solve", self.done)
+    def __call__(self, residual: float) -> bool:
+        """Report after an iteration; return whether to go on."""
+        if self.progress:
+            fraction = float(np.log(max(residual, 1e-300)) / np.log(self.tolerance))
+            self.done = min(max(self.done, fraction), 1.0)
+            self.progress("solve", self.done)
+        return self.go_on is None or self.go_on(residual)
 
     def finish(self) -> None:
         """Report that all is done, where round-off ended the iteration before its tolerance did."""
-        if self.done < 1:
-            self(self.tolerance)
+        if self.progress and self.done < 1:
+            self.progress("solve", 1.0)
 
 
 def conjugate_gradients(
@@ -80,7 +71,7 @@ def conjugate_gradients(
     norm_A: float,
     max_iterations: int = MAX_ITERATIONS,
     progress: Progress | None = None,
-    go_on: Callable[[float], bool] | None = None,
+    go_on: GoOn | None = None,
 ) -> tuple[Array, int, bool]:
     """Solve A x = b with symmetric positive definite A; return x, iterations and success.
 
@@ -93,7 +84,7 @@ def conjugate_gradients(
     norm_b = float(np.linalg.norm(b))
     if norm_b == 0:
         return x, 0, True
-    each = Share(tolerance, progress) if progress else None
+    each = Share(tolerance, progress, go_on)
     best, best_at = np.inf, 0  # residuals may grow at first
     z = precondition(r)
     p, rz = z.copy(), float(r @ z)
@@ -106,14 +97,12 @@ def conjugate_gradients(
         x += alpha * p
         r -= alpha * Ap
         norm = float(np.linalg.norm(r))
-        if each:
-            each(norm / norm_b)
+        going = each(norm / norm_b)
         limit = max(tolerance * norm_b, 2 * np.finfo(float).eps * (norm_A * np.linalg.norm(x) + norm_b))
         if norm <= limit:
-            if each:
-                each.finish()
+            each.finish()
             return x, iteration, True
-        if go_on and not go_on(norm / norm_b):
+        if not going:
             return x, iteration, False
         if norm < best:
             best, best_at = norm, iteration

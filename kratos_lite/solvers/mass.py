@@ -24,12 +24,7 @@ if TYPE_CHECKING:
 class Mass:
     """The mass matrix of elements: consistent, or lumped at the nodes.
 
-    It is built when it is first asked for: a body at rest needs none.
-
-    Attributes
-    ----------
-    lumped : whether the mass stands in the nodes.
-    pattern : the sparsity of matrices on the nodes.
+    It is built when it is first needed: a body at rest has none.
     """
 
     def __init__(
@@ -49,9 +44,9 @@ class Mass:
 
         if self.lumped:
             return diags_array(self.nodal, format="csr")
-        made = inertia_matrices(self._points, self._groups, self.pattern, "M")
+        M = inertia_matrices(self._points, self._groups, self.pattern, "M")["M"]
         n = self.pattern.n_nodes
-        return csr_array((made["M"], self.pattern.indices, self.pattern.indptr), shape=(n, n))
+        return csr_array((M, self.pattern.indices, self.pattern.indptr), shape=(n, n))
 
     @cached_property
     def nodal(self) -> Array:

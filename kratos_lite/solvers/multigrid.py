@@ -12,7 +12,6 @@ Phys. 188 (2003) 593-610 (Chebyshev smoothing).
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, Protocol
 
 import numpy as np
@@ -21,20 +20,18 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.matrix_free import MatrixFree
 from kratos_lite.native import kernels
 from kratos_lite.solvers.blas import one_thread
-from kratos_lite.solvers.coarse_level import LinearLevel
+from kratos_lite.solvers.coarse_level import PCoarseLevel
 from kratos_lite.solvers.constraint_map import rigid_modes
-from kratos_lite.solvers.iteration import MAX_ITERATIONS, Share, conjugate_gradients
+from kratos_lite.solvers.iteration import MAX_ITERATIONS, GoOn, Share, conjugate_gradients
 from kratos_lite.solvers.plate_level import bending_modes, is_very_thin, plate_axes, plate_level
 from kratos_lite.typing import Array, Mask, Progress
-
-GoOn = Callable[[float], bool]
 
 DEGREE = 2
 """Degree of the Chebyshev smoother: 1 … 3 cost the same in all."""
 RATIO = 12.0
 """Largest to smallest eigenvalue that a smoother has to damp."""
 STRENGTH = 0.005
-"""|A_ij| below this share of sqrt(|A_ii| |A_jj|) means a stiffness contrast: the nodes do not aggregate."""
+"""|A_ij| / sqrt(|A_ii| |A_jj|) below this means a stiffness contrast: the nodes do not aggregate."""
 
 CLOSER = 0.2
 """Factor on distances across a plate: there, nodes above each other are close in cubes of cells, too."""
@@ -50,7 +47,7 @@ class Solver(Protocol):
     ) -> tuple[Array, int, bool]:
         """Return x, iterations and success; b and x (3n,) are zero at fixed components.
 
-        After each iteration `go_on` is called with the residual as a share of |b|; False stops.
+        After each iteration `go_on` is called with the residual as a fraction of |b|; False stops.
         """
 
 
@@ -58,19 +55,10 @@ def multigrid(
     A: BlockMatrix | MatrixFree,
     free: Mask,
     points: Array,
-    linear: LinearLevel | None = None,
+    linear: PCoarseLevel | None = None,
     degree: int = DEGREE,
 ) -> Compiled | Pyamg:
-    """Return the solver of A on its free components (3n,).
-
-    Parameters
-    ----------
-    A : blocks, (3n, 3n), or their product alone, which needs the linear elements.
-    free : (3n,) the components that are unknown; rows and columns of the others do not matter.
-    points : (n, 3) m, from which come the rigid modes.
-    linear : the linear elements within quadratic ones.
-    degree : of the smoother of the kernels.
-    """
+    """Return the solver of A on its free components (3n,)."""
     compiled = kernels("multigrid")
     if compiled is None:
         return Pyamg(A.assembled() if isinstance(A, MatrixFree) else A, free, points, linear)
@@ -82,13 +70,6 @@ class Compiled:
 
     Where A is a product alone, its matrix is made for aggregation and forgotten; with linear elements below
     it is not made at all.
-
-    Attributes
-    ----------
-    levels : unknowns of each level.
-    clusters : parts of each level that its smoother solves exactly; 0 where these are the single nodes.
-    memory : bytes of the hierarchy, which is kept in single precision.
-    complexity : numbers in the matrices of all levels to those of the finest one.
     """
 
     def __init__(
@@ -97,7 +78,7 @@ class Compiled:
         A: BlockMatrix | MatrixFree,
         free: Mask,
         points: Array,
-        linear: LinearLevel | None,
+        linear: PCoarseLevel | None,
         degree: int = DEGREE,
     ) -> None:
         axes = None if isinstance(A, MatrixFree) else plate_axes(points, free)
@@ -129,7 +110,7 @@ class Compiled:
         fixed: Any,
         points: Array,
         places: Array,
-        linear: LinearLevel | None,
+        linear: PCoarseLevel | None,
         axes: Array | None,
     ) -> None:
         """Aggregate nodes, or those of the linear level."""
@@ -162,16 +143,10 @@ class Compiled:
         self, b: Array, tolerance: float, norm: float, progress: Progress | None, go_on: GoOn | None = None
     ) -> tuple[Array, int, bool]:
         """Return x, iterations and success."""
-        share = Share(tolerance, progress) if progress else None
-
-        def each(residual: float) -> bool:
-            if share:
-                share(residual)
-            return go_on is None or go_on(residual)
-
+        each = Share(tolerance, progress, go_on)
         x, iterations, converged = self._kernel.solve(b, tolerance, norm, MAX_ITERATIONS, each)
-        if share and converged:
-            share.finish()
+        if converged:
+            each.finish()
         return x, iterations, converged
 
 
@@ -181,14 +156,9 @@ def _closer(points: Array, normal: Array) -> Array:
 
 
 class Pyamg:
-    """The hierarchy of pyamg: block Gauss-Seidel, forward before and backward after each coarser level.
+    """The hierarchy of pyamg: block Gauss-Seidel, forward before and backward after each coarser level."""
 
-    Attributes
-    ----------
-    levels : unknowns of each level.
-    """
-
-    def __init__(self, A: BlockMatrix, free: Mask, points: Array, linear: LinearLevel | None = None) -> None:
+    def __init__(self, A: BlockMatrix, free: Mask, points: Array, linear: PCoarseLevel | None = None) -> None:
         import pyamg  # noqa: F401 (libraries that are loaded later would not heed the limit)
 
         self._A = uncoupled(A, free)
@@ -238,7 +208,7 @@ def aggregated(A: BlockMatrix, free: Mask, points: Array) -> Any:
     )
 
 
-def above_linear(A: BlockMatrix, free: Mask, points: Array, linear: LinearLevel) -> Any:
+def above_linear(A: BlockMatrix, free: Mask, points: Array, linear: PCoarseLevel) -> Any:
     """Return pyamg's hierarchy of the linear elements below a level of quadratic ones."""
     from pyamg import MultilevelSolver
     from pyamg.relaxation.smoothing import change_smoothers

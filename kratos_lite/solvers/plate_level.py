@@ -6,12 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kratos_lite.solvers.coarse_level import LinearLevel
+from kratos_lite.solvers.coarse_level import PCoarseLevel
 from kratos_lite.solvers.constraint_map import rigid_modes
+from kratos_lite.solvers.plan import FLAT
 from kratos_lite.typing import Array, Ints, Mask, Rows
-
-FLAT = 0.1
-"""Thickness of a body to its width, up to which it bends like a plate."""
 
 VERY_THIN = 0.004
 """The same from which single precision no longer holds energies of bending beside those of shear."""
@@ -25,36 +23,18 @@ class PlateLevel:
     u - z s1 e1 - z s2 e2 + z e n of its nodes at heights z.  A node between lines takes the mean of theirs
     and, along n, half of what their slopes say at its place: what bends without shear at the lines then
     bends so between them (Hermite interpolation, Kirchhoff's hypothesis).
-
-    Attributes
-    ----------
-    indptr, indices, blocks : interpolation from m lines to n nodes in rows, blocks (k, 3, 6).
-    modes : (6m, 12) rigid modes, and those of constant curvature or quadratic along the normals.
     """
 
-    indptr: Rows
+    indptr: Rows  # interpolation from m lines to n nodes in rows, blocks (k, 3, 6)
     indices: Rows
     blocks: Array
-    modes: Array
+    modes: Array  # (6m, 12) rigid modes, and those of constant curvature or quadratic along the normals
 
 
 def plate_level(
-    points: Array, free: Mask, axes: Array | None, labels: Rows, linear: LinearLevel
+    points: Array, free: Mask, axes: Array | None, labels: Rows, linear: PCoarseLevel
 ) -> PlateLevel | None:
-    """Return the lines of the corner nodes of a thin body, with the interpolation from them.
-
-    Parameters
-    ----------
-    points : (n, 3) m.
-    free : (3n,) the components that are unknown.
-    axes : (3, 3) of a flat body in columns, its normal first; None for a curved one.
-    labels : (n,) the line of each node.
-    linear : gives the corner nodes and their interpolation to all nodes.
-
-    Returns
-    -------
-    The level, or None if the lines are not those of a thin body that bends.
-    """
+    """Return the lines of the corner nodes of a thin body, with the interpolation from them."""
     n = len(points)
     _, line = np.unique(labels[linear.nodes], return_inverse=True)
     ends = points[linear.nodes]
@@ -89,15 +69,15 @@ def _frames(offsets: Array, line: Ints) -> Array:
 
 
 def _is_shell(
-    points: Array, free: Mask, offsets: Array, frames: Array, line: Ints, linear: LinearLevel
+    points: Array, free: Mask, offsets: Array, frames: Array, line: Ints, linear: PCoarseLevel
 ) -> bool:
     """Return whether lines are short beside the body, of several nodes each, and free along themselves."""
     if not np.isfinite(frames).all():
         return False
     X = points - points.mean(axis=0)
     width = np.sqrt(12 * np.linalg.eigvalsh(X.T @ X)[1] / len(X))
-    held = ~free.reshape(-1, 3)[linear.nodes]
-    along = (held * frames[line, :, 0] ** 2).sum(axis=1).mean()
+    constrained = ~free.reshape(-1, 3)[linear.nodes]
+    along = (constrained * frames[line, :, 0] ** 2).sum(axis=1).mean()
     return bool(2 * np.linalg.norm(offsets, axis=1).max() < FLAT * width and along <= 0.5)
 
 
@@ -142,17 +122,11 @@ def _shell_modes(centers: Array, frames: Array, height: float) -> Array:
 
 
 def plate_axes(points: Array, free: Mask) -> Array | None:
-    """Return the axes (3, 3) of a thin flat body in columns, its normal first; None for other bodies.
-
-    Parameters
-    ----------
-    points : (n, 3) m.
-    free : (3n,) the components that are unknown; a body whose normal displacements are held does not bend.
-    """
+    """Return the axes (3, 3) of a thin flat body in columns, its normal first; None for other bodies."""
     X = points - points.mean(axis=0)
     moments, axes = np.linalg.eigh(X.T @ X)
-    held = (~free.reshape(-1, 3) @ axes[:, 0] ** 2).mean()
-    return None if moments[0] > FLAT**2 * moments[1] or held > 0.5 else axes
+    constrained = (~free.reshape(-1, 3) @ axes[:, 0] ** 2).mean()
+    return None if moments[0] > FLAT**2 * moments[1] or constrained > 0.5 else axes
 
 
 def is_very_thin(points: Array, axes: Array) -> bool:

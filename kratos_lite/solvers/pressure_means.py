@@ -34,27 +34,14 @@ class Pressures(Protocol):
 
 @dataclass(eq=False)
 class PressureMeans:
-    """The means (p, c) of pressures around c places, over the root of the modulus there.
+    """The means (p, c) of pressures around c places, over the root of the modulus there."""
 
-    Attributes
-    ----------
-    matrix : (p, c) sparse.
-    ends : (c, 2) int, the ends of the edge of each place, or a node twice.
-    """
-
-    matrix: csr_array
-    ends: Ints
+    matrix: csr_array  # (p, c) sparse
+    ends: Ints  # (c, 2) int, the ends of the edge of each place, or a node twice
 
 
 def pressure_means(points: Array, parts: Sequence[Pressures], modulus: Array) -> PressureMeans:
-    """Return the means of pressures; of polynomials up to the first degree around halves of long edges.
-
-    Parameters
-    ----------
-    points : (n, 3) m.
-    parts : the elements; their pressures follow one another.
-    modulus : (n,) Pa, at each node.
-    """
+    """Return the means of pressures; of polynomials up to the first degree around halves of long edges."""
     from scipy.sparse import coo_array
 
     n, first, entries = len(points), 0, []
@@ -63,12 +50,12 @@ def pressure_means(points: Array, parts: Sequence[Pressures], modulus: Array) ->
         for axis in np.unique(along):
             entries.append(_entries(points, part, np.flatnonzero(along == axis), int(axis), first))
         first += part.polynomials[..., 0].size
-    keys, shares, rows, owners, values = (np.concatenate(column) for column in zip(*entries, strict=True))
+    keys, volumes, rows, owners, values = (np.concatenate(column) for column in zip(*entries, strict=True))
     edges, place = np.unique(keys[keys >= n], return_inverse=True)
     keys[keys >= n] = n + place
     nodes, pairs = np.arange(n), edges // 2 - n
     ends = np.column_stack([np.concatenate([nodes, pairs // n]), np.concatenate([nodes, pairs % n])])
-    size = np.bincount(keys, shares, len(ends)) * modulus[ends].max(axis=1)
+    size = np.bincount(keys, volumes, len(ends)) * modulus[ends].max(axis=1)
     columns = keys[owners]
     matrix = coo_array((values / np.sqrt(size)[columns], (rows, columns)), shape=(first, len(ends)))
     return PressureMeans(matrix.tocsr(), ends)
@@ -98,7 +85,7 @@ def _entries(
     shape, polynomials = part.group.element.shape, part.polynomials[chosen]
     corners = part.group.nodes[chosen, : shape.corners].astype(np.int64)
     (m, k), n, r = corners.shape, len(points), polynomials.shape[1]
-    shares = np.repeat(polynomials[:, 0, 0] ** -2 / k, k)
+    volumes = np.repeat(polynomials[:, 0, 0] ** -2 / k, k)
     partners = None if axis < 0 else _partners(shape, axis)
     if partners is None:
         keys, values = corners, np.repeat(polynomials[:, None, :1, 0], k, axis=1)
@@ -110,8 +97,8 @@ def _entries(
     degrees = values.shape[-1]
     rows = first + r * chosen[:, None, None] + np.arange(degrees)
     owners = np.repeat(np.arange(m * k), degrees)
-    weighted = shares[:, None] * values.reshape(-1, degrees)
-    return keys.ravel(), shares, np.broadcast_to(rows, (m, k, degrees)).ravel(), owners, weighted.ravel()
+    weighted = volumes[:, None] * values.reshape(-1, degrees)
+    return keys.ravel(), volumes, np.broadcast_to(rows, (m, k, degrees)).ravel(), owners, weighted.ravel()
 
 
 def _at_halves(points: Array, part: Pressures, chosen: Ints, axis: int) -> Array:

@@ -17,7 +17,8 @@ import numpy as np
 
 from kratos_lite.errors import InputError
 from kratos_lite.solvers import direct
-from kratos_lite.solvers.eigen import DENSE_MODES, RESTARTS, check_residuals, first_shift, not_converged
+from kratos_lite.solvers.eigen import RESTARTS, check_residuals, first_shift, not_converged
+from kratos_lite.solvers.plan import DENSE_MODES
 from kratos_lite.typing import Array, Complexes
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 ROUNDS = 6
 """Shifts that are tried."""
 NEUTRAL = 1e-11
-"""Share of the stiffness up to which a motion is not resisted at all."""
+"""Fraction of the stiffness up to which a motion is not resisted at all."""
 
 
 @dataclass(frozen=True)
@@ -43,25 +44,17 @@ class Pencil:
     neutral: Array
 
     def modes(self, count: int) -> tuple[Complexes, Complexes]:
-        """Return λ (count,) in 1/s, nearest to 0 first, and shapes (n, count) of length 1.
-
-        Raises
-        ------
-        InputError
-            If there are not so many.
-        SolveError
-            If the iteration does not converge, or what it finds does not satisfy the equations.
-        """
+        """Return λ (count,) in 1/s, nearest to 0 first, and shapes (n, count) of length 1."""
         n, zeros = self.K.shape[0], 2 * self.neutral.shape[1]
         if count > 2 * n:
             raise InputError(f"this model has 1 … {2 * n} complex modes; got {count}")
         values = np.zeros(zeros, dtype=complex)
         shapes = np.repeat(self.neutral, 2, axis=1).astype(complex)
-        if (left := count - zeros) > 0:
-            whole = 2 * n <= DENSE_MODES or left > n // 4
-            found = self._all() if whole else self._nearest(left)
-            order = np.argsort(np.abs(found[0]), kind="stable")[:left]
-            values, shapes = np.append(values, found[0][order]), np.hstack([shapes, found[1][:, order]])
+        if (further := count - zeros) > 0:
+            whole = 2 * n <= DENSE_MODES or further > n // 4
+            elastic, vectors = self._all() if whole else self._nearest(further)
+            order = np.argsort(np.abs(elastic), kind="stable")[:further]
+            values, shapes = np.append(values, elastic[order]), np.hstack([shapes, vectors[:, order]])
         values, shapes = values[:count], shapes[:, :count]
         shapes = shapes / np.linalg.norm(shapes, axis=0)
         self.check(values, shapes)

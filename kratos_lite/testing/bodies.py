@@ -162,8 +162,8 @@ def tangent(make: Make) -> Measured:
     c, h = 1e-4, 1e-6
     x = body.solver(body.q, c)(body.times_mass(body.u))
     slope = (body.internal_force(body.q + h * x) - body.internal_force(body.q - h * x)) / (2 * h)
-    found = body.times_mass(x) + c * slope
-    return Measured(difference(found, body.times_mass(body.u)), 1e-7, "(M + c K) x differs from b")
+    product = body.times_mass(x) + c * slope
+    return Measured(difference(product, body.times_mass(body.u)), 1e-7, "(M + c K) x differs from b")
 
 
 def conservation(make: Make) -> Measured:

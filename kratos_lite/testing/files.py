@@ -59,19 +59,19 @@ def run_file(path: str | Path) -> list[tuple[str, list[Finding]]]:
         stack.enter_context(beside(Path(path)))
         defined = vars(run_module(Path(path)))
         kinds = [v for v in list(defined.values()) if isinstance(v, type) and v.__module__ == MODULE]
-        found = _check_all(defined, kinds)
+        results = _check_all(defined, kinds)
         for kind in kinds:
             extra = _forgotten(kind)
-            same = [f for name, f in found if name == kind.__name__ or name.endswith(f" ({kind.__name__})")]
+            same = [f for name, f in results if name == kind.__name__ or name.endswith(f" ({kind.__name__})")]
             if same:
                 same[0].extend(extra)
             elif extra:
-                found.append((kind.__name__, extra))
-    if not found:
+                results.append((kind.__name__, extra))
+    if not results:
         raise InputError(
             f"{path}: nothing to check; a file defines a subclass of KinematicLinear, Shape or LinearMaterial"
         )
-    return found
+    return results
 
 
 def _check_all(defined: dict[str, Any], kinds: list[type]) -> list[tuple[str, list[Finding]]]:
@@ -79,15 +79,15 @@ def _check_all(defined: dict[str, Any], kinds: list[type]) -> list[tuple[str, li
     used = {getattr(kind, "shape", None) for kind in kinds}
     materials = {name: v for name, v in defined.items() if isinstance(v, LinearMaterial)}
     made = {type(v) for v in materials.values()}
-    found = [(kind.__name__, check_element(kind)) for kind in kinds if issubclass(kind, KinematicLinear)]
-    found += [(k.__name__, check_shape(k)) for k in kinds if issubclass(k, Shape) and k not in used]
-    found += [(f"{name} ({type(v).__name__})", check_material(v)) for name, v in materials.items()]
+    results = [(kind.__name__, check_element(kind)) for kind in kinds if issubclass(kind, KinematicLinear)]
+    results += [(k.__name__, check_shape(k)) for k in kinds if issubclass(k, Shape) and k not in used]
+    results += [(f"{name} ({type(v).__name__})", check_material(v)) for name, v in materials.items()]
     for kind in kinds:
         if issubclass(kind, LinearMaterial) and kind not in made:
             text = "a material is checked as an instance: make one at the top level of the file, for example "
             text += f"soil = {kind.__name__}(…) with its constants"
-            found.append((kind.__name__, [Finding("instance", False, nan, nan, text, skipped=True)]))
-    return found
+            results.append((kind.__name__, [Finding("instance", False, nan, nan, text, skipped=True)]))
+    return results
 
 
 @contextmanager
@@ -157,7 +157,7 @@ def _lacks_decorator(kind: type) -> bool:
 
 
 def _cure(error: BaseException, defined: dict[str, Any]) -> str:
-    """Return what to do about an error that a decorator left out has led to, or an empty text."""
+    """Return what to do about an error that a missing decorator has led to, or an empty text."""
     if not isinstance(error, TypeError):
         return ""
     if "non-frozen dataclass" in str(error):

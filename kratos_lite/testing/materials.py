@@ -63,8 +63,8 @@ def positive_definite(material: LinearMaterial) -> Measured:
 
 def stress_at_rest(material: LinearMaterial) -> Measured:
     """Check that no strain gives no stress."""
-    rest = np.asarray(material.stress(np.zeros(6)), dtype=float)
-    return Measured(float(np.abs(rest).max()), 0, f"stress(0) = {rest.tolist()} Pa")
+    unstrained = np.asarray(material.stress(np.zeros(6)), dtype=float)
+    return Measured(float(np.abs(unstrained).max()), 0, f"stress(0) = {unstrained.tolist()} Pa")
 
 
 def tangent(material: LinearMaterial) -> Measured:

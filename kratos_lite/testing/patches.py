@@ -73,10 +73,10 @@ def on_box(points: Array) -> Mask:
 
 def errors(cells: KinematicLinear, u: Array, exact: Array, stress: Array) -> tuple[float, float]:
     """Return the largest errors of u (m, k, 3) and of its stress at the Gauss points, relative, two-sided."""
-    found = cells.stress(MATERIAL.C, u)
+    computed = cells.stress(MATERIAL.C, u)
     return (
         float(np.abs(u - exact).max() / np.abs(exact).max()),
-        float(np.abs(found - stress).max() / np.abs(stress).max()),
+        float(np.abs(computed - stress).max() / np.abs(stress).max()),
     )
 
 

@@ -106,9 +106,9 @@ def monomials(subject: CellRule) -> Measured:
     errors: dict[str, float] = {}
     for e in exponents(rule.points.shape[1], rule.degree):
         values = np.prod(rule.points ** np.array(e, dtype=int), axis=1)
-        found, exact = float(rule.weights @ values), integral(cell, e)
+        value, exact = float(rule.weights @ values), integral(cell, e)
         size = max(float(np.abs(rule.weights) @ np.abs(values)), abs(exact), 1e-300)
-        errors[f"∫ {monomial(e)} gives {found:.17g}; exact is {exact:.17g}"] = abs(found - exact) / size
+        errors[f"∫ {monomial(e)} gives {value:.17g}; exact is {exact:.17g}"] = abs(value - exact) / size
     error, text = worst(errors)
     return Measured(error, 1e-13, f"{text} (degree claimed: {rule.degree})")
 

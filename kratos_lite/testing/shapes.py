@@ -52,9 +52,9 @@ def check_functions(shape: type[Shape]) -> list[Finding]:
 
 def definition(shape: type[Shape]) -> Measured:
     """Check that the class states its cell, nodes, corners, degree and VTK number as they must be."""
-    found = problems(shape) or unsaved(shape)
-    text = f"{shape.__name__} {'; '.join(found) or 'is stated well'}"
-    return Measured(np.inf if found else 0, 0, text)
+    wrong = problems(shape) or unsaved(shape)
+    text = f"{shape.__name__} {'; '.join(wrong) or 'is stated well'}"
+    return Measured(np.inf if wrong else 0, 0, text)
 
 
 def problems(shape: type[Shape]) -> list[str]:
@@ -68,17 +68,17 @@ def problems(shape: type[Shape]) -> list[str]:
     d, c = ideal.shape[1], len(ideal)
     if shape.nodes.ndim != 2 or shape.nodes.shape[1] != d or not c <= n <= MAX_NODES:
         return [f"has nodes {shape.nodes.shape}; a {shape.cell} has ({c} to {MAX_NODES}, {d})"]
-    found = []
+    wrong = []
     if shape.corners != c:
-        found.append(f"says corners = {shape.corners}; a {shape.cell} has {c}")
+        wrong.append(f"says corners = {shape.corners}; a {shape.cell} has {c}")
     elif not (np.sort(distances(shape.nodes[:c], ideal), axis=1)[:, :1] == 0).all():
-        found.append(f"has first nodes that are not the corners {ideal.tolist()} of the {shape.cell}")
+        wrong.append(f"has first nodes that are not the corners {ideal.tolist()} of the {shape.cell}")
     if shape.degree not in range(MAX_DEGREE + 1):
-        found.append(f"says degree = {shape.degree}; an integer from 0 to {MAX_DEGREE} is needed")
+        wrong.append(f"says degree = {shape.degree}; an integer from 0 to {MAX_DEGREE} is needed")
     lists = [*shape.edges, *shape.faces]
     if any(a not in range(n) for nodes in lists for a in nodes):
-        found.append(f"lists nodes in edges or faces that are not 0 to {n - 1}")
-    return found
+        wrong.append(f"lists nodes in edges or faces that are not 0 to {n - 1}")
+    return wrong
 
 
 def unsaved(shape: type[Shape]) -> list[str]:
@@ -97,8 +97,8 @@ def distances(X: Array, Y: Array) -> Array:
 def inside(shape: type[Shape], count: int) -> Array:
     """Return seeded points at no symmetric place of a cell, of two digits, as messages show them."""
     corners = shape.nodes[: shape.corners]
-    share = np.random.default_rng(7).dirichlet(np.ones(len(corners)), count)
-    return (share @ corners).round(2)
+    weights = np.random.default_rng(7).dirichlet(np.ones(len(corners)), count)
+    return (weights @ corners).round(2)
 
 
 def values(shape: type[Shape], points: Array) -> Array:
@@ -149,13 +149,13 @@ def broadcasting(shape: type[Shape]) -> Measured:
     errors: dict[str, float] = {}
     for name, table in (("N", values), ("dN", gradients)):
         expected = table(shape, points)
-        found = np.asarray(getattr(shape, name)(many), dtype=float)
+        values_of_many = np.asarray(getattr(shape, name)(many), dtype=float)
         wanted = (2, 3, *expected.shape[1:])
-        if found.shape != wanted:
+        if values_of_many.shape != wanted:
             raise ConformanceError(
-                f"{name} of points {many.shape} has shape {found.shape}; expected {wanted}"
+                f"{name} of points {many.shape} has shape {values_of_many.shape}; expected {wanted}"
             )
-        errors[name] = float(np.abs(found - expected.reshape(wanted)).max(initial=0.0))
+        errors[name] = float(np.abs(values_of_many - expected.reshape(wanted)).max(initial=0.0))
     error, name = worst(errors)
     return Measured(error, 1e-14, f"{name} of points {many.shape} against that of single points")
 

@@ -37,11 +37,11 @@ def norms(
     field: fields.Field, points: Array, groups: Sequence[ElementGroup], u: Array
 ) -> tuple[float, float]:
     """Return the relative errors of nodal displacements u (n, 3): L2 norm, and energy norm."""
-    found = np.zeros(4)
+    integrals = np.zeros(4)
     for group in groups:
         for start in range(0, len(group), 1000):
-            found += _integrals(points, field, group, slice(start, start + 1000), u)
-    return float(np.sqrt(found[0] / found[1])), float(np.sqrt(found[2] / found[3]))
+            integrals += _integrals(points, field, group, slice(start, start + 1000), u)
+    return float(np.sqrt(integrals[0] / integrals[1])), float(np.sqrt(integrals[2] / integrals[3]))
 
 
 def _integrals(points: Array, field: fields.Field, group: ElementGroup, chunk: slice, u: Array) -> Array:

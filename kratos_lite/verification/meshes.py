@@ -89,13 +89,13 @@ def straight(kind: str, cells: Sequence[int], place: Place) -> Mesh:
     return split(place(grid.points), grid.blocks[0].nodes, kind)
 
 
-def joined(pieces: Sequence[Mesh]) -> Mesh:
+def joined(blocks: Sequence[Mesh]) -> Mesh:
     """Return meshes of one kind as one: nodes at one place become one node."""
-    starts = np.cumsum([0, *(piece.n_nodes for piece in pieces)])
-    points = np.vstack([piece.points for piece in pieces])
-    nodes = np.vstack([piece.blocks[0].nodes + start for piece, start in zip(pieces, starts, strict=False)])
+    starts = np.cumsum([0, *(block.n_nodes for block in blocks)])
+    points = np.vstack([block.points for block in blocks])
+    nodes = np.vstack([block.blocks[0].nodes + start for block, start in zip(blocks, starts, strict=False)])
     _, first, same = np.unique(points.round(9), axis=0, return_index=True, return_inverse=True)
-    return Mesh(points[first], [Block(pieces[0].blocks[0].name, same.ravel()[nodes])])
+    return Mesh(points[first], [Block(blocks[0].blocks[0].name, same.ravel()[nodes])])
 
 
 def octant(n: int, kind: str, outer: Place) -> Mesh:
@@ -154,8 +154,8 @@ def body_forces(mesh: Mesh, force: Place) -> Array:
     for start in range(0, len(block), 2000):
         nodes = block.nodes[start : start + 2000]
         placed = kind(mesh.points[nodes], rule)
-        share = N.T @ (force(N @ mesh.points[nodes]) * placed.dV[..., None])
-        np.add.at(total, nodes, share)
+        forces = N.T @ (force(N @ mesh.points[nodes]) * placed.dV[..., None])
+        np.add.at(total, nodes, forces)
     return total
 
 

@@ -32,8 +32,8 @@ def number(value: float) -> str:
     return f"{value:.3e}" if "e" in text else text
 
 
-def found(row: Row, value: float) -> str:
-    """Return the value found; where it has to be 0, a bound stands for what is rounding."""
+def shown(row: Row, value: float) -> str:
+    """Return the value shown; where it has to be 0, a bound stands for what is rounding."""
     if row.problem.reference == 0 and abs(value) <= (row.problem.tolerance or 0.0) <= SMALL:
         return f"< {row.problem.tolerance:.0e}"
     return number(value)
@@ -63,21 +63,21 @@ def header(width: int = 9) -> str:
     return f"{'problem':<51} {'element':<{width}}{'value':>12}{'reference':>12}{'error':>11}  grade"
 
 
-def line(row: Row, width: int = 9, told: bool = False) -> str:
-    """Return a row for a terminal; a note that was told is not repeated."""
+def line(row: Row, width: int = 9, reported: bool = False) -> str:
+    """Return a row for a terminal; a note that was reported is not repeated."""
     error = "" if row.note else f"{row.error:9.1e}"
-    value, reference = found(row, row.value), number(row.problem.reference)
+    value, reference = shown(row, row.value), number(row.problem.reference)
     text = f"{row.problem.name:<51} {row.kind:<{width}}{value:>12}{reference:>12}{error:>11}  {row.grade:<8}"
     note = row.note.splitlines()[0] if row.note else ""
-    return f"{text}{'as above' if told and note else note}".rstrip()
+    return f"{text}{'as above' if reported and note else note}".rstrip()
 
 
 def summary(rows: Sequence[Row]) -> str:
     """Return how many rows there are of each grade."""
     grades = [PASS, FAIL, REFUSED, *(letter for _, letter in GRADES), "F"]
     counts = {grade: sum(row.grade == grade for row in rows) for grade in grades}
-    told = [f"{count} {grade}" for grade, count in counts.items() if count]
-    return f"{len(rows)} rows" + (": " + ", ".join(told) if told else "")
+    reported = [f"{count} {grade}" for grade, count in counts.items() if count]
+    return f"{len(rows)} rows" + (": " + ", ".join(reported) if reported else "")
 
 
 # ---- Markdown ----------------------------------------------------------------------------------------
@@ -108,9 +108,9 @@ PEERS = (
 def markdown(rows: Sequence[Row], programs: dict[str, str] | None = None, command: str = "") -> str:
     """Return the page; `programs` are other programs with their versions, each a column."""
     programs = programs or {}
-    told = ", ".join(f"{name} {version}" for name, version in programs.items())
+    reported = ", ".join(f"{name} {version}" for name, version in programs.items())
     parts = ["# Verification\n", *(f"{text}\n" for text in INTRO)]
-    parts += [PEERS.format(told) + "\n"] if programs else []
+    parts += [PEERS.format(reported) + "\n"] if programs else []
     parts.append(f"Made by `{command or 'kratos-lite verify'}`; {summary(rows)}.\n")
     if len({row.kind for row in rows}) > 1:
         parts.append(_overview(rows))
@@ -126,12 +126,11 @@ def _cells(cells: Iterable[str]) -> str:
 
 def _overview(rows: Sequence[Row]) -> str:
     """Return the grades of all elements, one line for each problem."""
-    kinds = list(dict.fromkeys(row.kind for row in rows if row.kind))
+    kinds = list(dict.fromkeys(row.kind for row in rows))
     lines: dict[str, dict[str, str]] = {}
     for row in rows:
-        if row.kind:
-            name = row.problem.name.removesuffix("_linear").removesuffix("_quadratic")
-            lines.setdefault(name, {})[row.kind] = row.grade
+        name = row.problem.name.removesuffix("_linear").removesuffix("_quadratic")
+        lines.setdefault(name, {})[row.kind] = row.grade
     text = "## Overview\n\n" + _cells(["problem", *kinds]) + _cells(["---"] * (len(kinds) + 1))
     return text + "".join(
         _cells([name, *(grades.get(kind, "") for kind in kinds)]) for name, grades in lines.items()
@@ -143,14 +142,14 @@ def _table(rows: Sequence[Row], programs: Iterable[str]) -> str:
     head = ["problem", "element", "value", *named, "reference", "limit", "grade", "source"]
     text = _cells(head) + _cells(["---"] * len(head))
     for row in rows:
-        others = [found(row, row.others[name]) if name in row.others else "" for name in named]
+        others = [shown(row, row.others[name]) if name in row.others else "" for name in named]
         problem = row.problem
-        first = [problem.name.partition("/")[2], row.kind or "–", found(row, row.value)]
+        first = [problem.name.partition("/")[2], row.kind, shown(row, row.value)]
         last = [number(problem.reference), limit(row), row.grade, problem.source]
         text += _cells([*first, *others, *last])
     quantities = dict.fromkeys((row.problem.name, row.problem.quantity) for row in rows)
-    told = "".join(f"- {name.partition('/')[2]}: {quantity}\n" for name, quantity in quantities)
-    return f"{told}\n{text}"
+    reported = "".join(f"- {name.partition('/')[2]}: {quantity}\n" for name, quantity in quantities)
+    return f"{reported}\n{text}"
 
 
 def _citations(rows: Sequence[Row]) -> str:

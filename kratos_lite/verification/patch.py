@@ -101,8 +101,8 @@ def stress_off(stress: Callable[[Array], Array]) -> Callable[[Result], float]:
         worst, largest = 0.0, 0.0
         for group in result.groups:
             exact = stress(group.at(result.mesh.points).gauss_points())
-            found = at_gauss(result.mesh.points, group, result.u, stress=True)
-            worst = max(worst, float(np.abs(found - exact).max()))
+            computed = at_gauss(result.mesh.points, group, result.u, stress=True)
+            worst = max(worst, float(np.abs(computed - exact).max()))
             largest = max(largest, float(np.abs(exact).max()))
         return worst / largest
 

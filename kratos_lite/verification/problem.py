@@ -11,7 +11,6 @@ from kratos_lite.analysis.model import Model
 from kratos_lite.analysis.result import Result
 from kratos_lite.errors import InputError, KratosLiteError
 from kratos_lite.verification.meshes import kind_of, short
-from kratos_lite.verification.sources import SOURCES
 
 ELEMENTS = (
     *(f"KinematicLinear3D{n}N" for n in (4, 5, 6, 8)), "EnhancedStrain3D8N", "BBar3D8N",
@@ -39,14 +38,10 @@ class Problem:
     quantity: str  # with its unit
     source: str  # a key of SOURCES, and where it stands in there
     reference: float  # errors are relative to it, or absolute where it is 0
-    of: Callable[[str], float]  # takes the name of an element, or "", to the value
+    of: Callable[[str], float]  # takes the name of an element to the value
     tolerance: float | None = None  # up to which a row passes; all are graded without
     exact: Of = every  # elements that have to pass; others are graded
-    takes: Of | None = every  # elements that it is for; None where it has none
-
-    def __post_init__(self) -> None:
-        if self.cited not in SOURCES:
-            raise ValueError(f"{self.name}: {self.source!r} names none of the sources")
+    takes: Of = every  # elements that it is for
 
     @property
     def question(self) -> object:
@@ -71,8 +66,8 @@ class Problem:
         return next((letter for limit, letter in GRADES if error <= limit * (1 + 1e-9)), "F")
 
     def elements(self, wanted: tuple[str, ...] = ELEMENTS) -> tuple[str, ...]:
-        """Return those of some elements that the problem is for; ("",) where it has none."""
-        return ("",) if self.takes is None else tuple(filter(self.takes, wanted))
+        """Return those of some elements that the problem is for."""
+        return tuple(filter(self.takes, wanted))
 
     def row(self, element: str) -> Row:
         """Find the value for an element; an error of the library becomes a row that fails."""
@@ -81,24 +76,13 @@ class Problem:
         except KratosLiteError as error:
             value, note = float("nan"), str(error)
         except Exception as error:
-            if element in ("", *ELEMENTS):
+            if element in ELEMENTS:
                 raise
             raise InputError(
                 f"{element} raises {type(error).__name__}: {error}, in {self.name}; "
                 "'kratos-lite check' of its file says where"
             ) from error
         return Row(self, element, value, note=note)
-
-
-def bounded(
-    name: str, quantity: str, source: str, reference: float, tolerance: float, of: Callable[[str], float],
-    takes: Of | None = None,
-) -> Problem:  # fmt: skip
-    """Return a problem with a tolerance; without an element unless `takes` says for which it is."""
-    return Problem(
-        name=name, quantity=quantity, source=source, reference=float(reference), tolerance=tolerance, of=of,
-        takes=takes,
-    )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,7 +94,6 @@ class StaticProblem(Problem):
     of: Callable[[str], float] = field(init=False)
 
     def __post_init__(self) -> None:
-        super().__post_init__()
         object.__setattr__(self, "of", self._solved)
 
     @property
@@ -147,7 +130,7 @@ class Row:
     def grade(self) -> str:
         """``pass``, ``FAIL`` or a letter; ``refused`` where spurious modes of the element may spoil it."""
         if self.note:
-            return REFUSED if self.element and kind_of(self.element).spurious_modes else FAIL
+            return REFUSED if kind_of(self.element).spurious_modes else FAIL
         return self.problem.grade(self.value, self.element)
 
     @property

@@ -61,8 +61,6 @@ def verify(
     problems = chosen(names)
     solved.cache_clear()  # an element of this name may have been another one
     wanted = tuple(kind_of(name).__name__ for name in elements) or ELEMENTS
-    if elements:
-        problems = [problem for problem in problems if problem.takes is not None]
     kinds = {problem.name: problem.elements(tuple(map(element, wanted))) for problem in problems}
     done = 0
     for _, group in groupby(problems, key=lambda problem: problem.question):

@@ -114,15 +114,15 @@ def _ffmpeg(path: str | Path) -> str:
     """Return the program that writes films."""
     import shutil
 
-    found = shutil.which("ffmpeg")
-    if found is None:
+    program = shutil.which("ffmpeg")
+    if program is None:
         try:
             from imageio_ffmpeg import get_ffmpeg_exe
 
-            found = str(get_ffmpeg_exe())
+            program = str(get_ffmpeg_exe())
         except (ImportError, RuntimeError):
             raise KratosLiteError(
                 f"{path}: films need ffmpeg: apt install ffmpeg, or pip install imageio-ffmpeg; "
                 ".gif needs neither"
             ) from None
-    return found
+    return program

@@ -25,13 +25,7 @@ SLENDER = 3.0
 
 
 def rows_of(view: View | None, X: Array) -> Array:
-    """Return right, up and towards the viewer as rows (3, 3).
-
-    Parameters
-    ----------
-    view : a name, azimuth and elevation in degrees, or a direction; None chooses one for the body.
-    X : (n, 3) m, points of the body.
-    """
+    """Return right, up and towards the viewer as rows (3, 3); without a view, one for points (n, 3) m."""
     if view is None:
         return _rows(_side_of(np.ptp(X, axis=0)))
     if isinstance(view, str):
@@ -76,8 +70,8 @@ def _side_of(sides: Array) -> Array:
     x, y, z = sides
     across = max(min(x, y), z)
     slenderness = max(x, y) / across if across > 0 else np.inf
-    share = min(1.0, SLENDER / slenderness)
-    off, elevation = np.pi / 4 * share, np.arctan(1 / np.sqrt(2)) * (0.4 + 0.6 * share)
+    fraction = min(1.0, SLENDER / slenderness)
+    off, elevation = np.pi / 4 * fraction, np.arctan(1 / np.sqrt(2)) * (0.4 + 0.6 * fraction)
     azimuth = off - np.pi / 2 if x >= y else -off
     flat = np.cos(elevation) * np.array([np.cos(azimuth), np.sin(azimuth)])
     return np.append(flat, np.sin(elevation))

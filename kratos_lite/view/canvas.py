@@ -60,12 +60,6 @@ def without_frame(axes: Any) -> Any:
     return axes
 
 
-def new_figure(size: tuple[float, float]) -> tuple[Any, Any]:
-    """Return a figure that needs no screen, and axes without frame in which a metre is a metre."""
-    figure = empty(size)
-    return figure, without_frame(figure.add_subplot())
-
-
 def axes_for_curves(figure: Any, place: Any, size: Any) -> Any:
     """Return new axes for curves, with their lower left corner and size in inches."""
     axes = axes_in_inches(figure, place, size)
@@ -74,29 +68,19 @@ def axes_for_curves(figure: Any, place: Any, size: Any) -> Any:
     return axes
 
 
-def new_log_plot(size: tuple[float, float]) -> tuple[Any, Any]:
-    """Return a figure with axes for curves alone, both logarithmic."""
+def new_plot(size: tuple[float, float], *units: str, log: bool = False) -> tuple[Any, Any]:
+    """Return a figure with axes for curves alone, numbers with prefixes of their units, if any."""
     figure = empty(size)
-    from matplotlib.ticker import LogLocator
+    from matplotlib.ticker import EngFormatter, LogLocator
 
-    axes = figure.add_subplot(xscale="log", yscale="log")
-    axes.spines[["top", "right"]].set_visible(False)
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-        axis.set_major_formatter(lambda value, _: f"{value:g}")
-        axis.set_minor_formatter(lambda value, _: "")
-    return figure, axes
-
-
-def new_plot(size: tuple[float, float], *units: str) -> tuple[Any, Any]:
-    """Return a figure with axes for curves alone, numbers with prefixes of their units."""
-    figure = empty(size)
-    from matplotlib.ticker import EngFormatter
-
-    axes = figure.add_subplot()
+    scale = "log" if log else "linear"
+    axes = figure.add_subplot(xscale=scale, yscale=scale)
     axes.spines[["top", "right"]].set_visible(False)
     for axis, unit in zip((axes.xaxis, axes.yaxis), units, strict=True):
-        axis.set_major_formatter(EngFormatter(unit) if unit else lambda value, _: f"{value:g}")
+        axis.set_major_formatter(EngFormatter(unit) if unit else "{x:g}")
+        if log:
+            axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+            axis.set_minor_formatter("")
     return figure, axes
 
 
@@ -245,17 +229,13 @@ def polygons(axes: Any, corners: Array, colors: Array) -> Any:
     from matplotlib.collections import PolyCollection
 
     flat: Any = corners
-    return axes.add_collection(
-        PolyCollection(flat, facecolors=colors, edgecolors=colors, linewidths=0.45, zorder=2),
-        autolim=False,
-    )
+    style: Any = {"facecolors": colors, "edgecolors": colors, "linewidths": 0.45, "zorder": 2}
+    return axes.add_collection(PolyCollection(flat, **style), autolim=False)
 
 
-def lines(axes: Any, ends: Array, color: str = "0.55", width: float = 0.8, zorder: float = 1) -> Any:
-    """Draw thin lines (m, 2, 2), by default behind everything else."""
+def lines(axes: Any, ends: Array) -> Any:
+    """Draw thin lines (m, 2, 2) behind everything else."""
     from matplotlib.collections import LineCollection
 
     pieces: Any = ends
-    return axes.add_collection(
-        LineCollection(pieces, colors=color, linewidths=width, zorder=zorder), autolim=False
-    )
+    return axes.add_collection(LineCollection(pieces, colors="0.55", linewidths=0.8, zorder=1), autolim=False)

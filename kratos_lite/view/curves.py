@@ -1,4 +1,4 @@
-"""Curves: numbers against a length, in one picture."""
+"""Curves: numbers along a line, and the errors of an adaptive solution."""
 
 from __future__ import annotations
 
@@ -8,34 +8,33 @@ from typing import Any
 from kratos_lite.typing import Array
 from kratos_lite.view.canvas import label, new_plot
 
-STYLES = (("-", "#2b6ca8", 1.8), ((0, (5, 3)), "#c8442b", 1.4), ((0, (1, 2)), "0.35", 1.6))
+BLUE, RED = "#2b6ca8", "#c8442b"
+STYLES = (("-", BLUE, 1.8), ((0, (5, 3)), RED, 1.4), ((0, (1, 2)), "0.35", 1.6))
 """Dashes, color and width of one curve after the other."""
 
 
-def curves_figure(
-    x: Array, curves: Mapping[str, Array], *, unit: str, title: str = "", size: tuple[float, float] = (6, 4)
+def line_figure(
+    x: Array, curves: Mapping[str, Array], unit: str, title: str, size: tuple[float, float]
 ) -> Any:
-    """Return a figure of up to three curves (k,) by their labels, against a distance x (k,) in m.
-
-    Parameters
-    ----------
-    x, curves : what is drawn; the first label is that of the axis, too.
-    unit : of the curves.
-    title : above the picture.
-    size : width and height in inches, at 150 dots per inch.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    KratosLiteError
-        matplotlib is missing.
-    """
+    """Return a figure of up to three curves (k,) by their labels, against a distance x (k,) in m."""
     figure, axes = new_plot(size, "m", unit)
     for (name, values), (dashes, color, width) in zip(curves.items(), STYLES, strict=False):
         axes.plot(x, values, ls=dashes, color=color, lw=width, label=name)
     axes.margins(x=0)
     label(axes, "distance along the line", next(iter(curves)), title)
+    return figure
+
+
+def convergence_figure(
+    unknowns: Array, errors: Array, goal: float | None, of: str, title: str, size: tuple[float, float]
+) -> Any:
+    """Return a figure of relative errors (k,) of a quantity against unknowns (k,), and of its goal."""
+    figure, axes = new_plot(size, "", "", log=True)
+    unknowns, percent = unknowns[errors > 0], 100 * errors[errors > 0]
+    axes.plot(unknowns, percent, "o-", color=BLUE, lw=1.8, ms=5, label="reported")
+    if goal is not None:
+        axes.axhline(100 * goal, color=RED, lw=1.2, ls=(0, (4, 3)), label="asked for", zorder=1)
+    for number, point in enumerate(zip(unknowns, percent, strict=True), 1):
+        axes.annotate(str(number), point, (4, 4), textcoords="offset points", size=8, color="0.35")
+    label(axes, "unknowns", f"error of {of} in %" if of else "error in %", title)
     return figure

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kratos_lite.mesh import Block, Mesh
+from kratos_lite.mesh import Block, Mesh, with_rows
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array, Ints, Numbers
 from kratos_lite.view.canvas import polygons
@@ -29,20 +29,12 @@ FINEST, SHADES = 40, 8
 
 @dataclass(eq=False)
 class Facets:
-    """What of a body is seen.
+    """What of a body is seen."""
 
-    Attributes
-    ----------
-    corners : (m, 4, 3) m, in their places; triangles repeat a corner.
-    light : (m,) brightness, 0 … 1.
-    values : (m,).
-    edges : (k, 2, 3) m, pieces of edges of elements.
-    """
-
-    corners: Array
-    light: Array
-    values: Array
-    edges: Array
+    corners: Array  # (m, 4, 3) m, in their places; triangles repeat a corner
+    light: Array  # (m,) brightness, 0 … 1
+    values: Array  # (m,)
+    edges: Array  # (k, 2, 3) m, pieces of edges of elements
 
 
 def facets_of(
@@ -54,29 +46,17 @@ def facets_of(
     most: int = MANY,
     window: tuple[Array, Array] | None = None,
 ) -> Facets:
-    """Return what is seen of the surface of a body.
-
-    Parameters
-    ----------
-    mesh : the undeformed body.
-    x : (n, 3) m, where its nodes are.
-    values : (n,) of nodes or (m,) of elements.
-    rows : of the camera.
-    plane : where the body is cut; the part towards the viewer is taken away.
-    most : facets to aim at.
-    window : what is shown, lower left and upper right in the picture; all if not given.
-    """
+    """Return what is seen of a body with nodes at x (n, 3) m in a window, in about `most` facets."""
     faces = [_inside(block, x, rows, window) for block in mesh.boundary]
     n, edged = fineness(sum(map(len, faces)), most)
     if values is None or len(values) != mesh.n_nodes:
         n = min(n, SHADES)  # as fine as shape and order in depth need
     parts = [_of_block(block, mesh, x, values, rows, plane, n) for block in faces]
     if plane is not None:
-        parts += [_of_cut(block, start, mesh, x, values, rows, plane) for block, start in _blocks(mesh)]
-    joined = Facets(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
-    if not edged:
-        joined.edges = joined.edges[:0]
-    return joined
+        solids = [(b, at) for b, at in with_rows(mesh.blocks) if b.shape is not None and b.shape.faces]
+        parts += [_of_cut(block, at.start, mesh, x, values, rows, plane) for block, at in solids]
+    corners, light, value, edges = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    return Facets(corners, light, value, edges if edged else edges[:0])
 
 
 def _inside(block: Block, x: Array, rows: Array, window: tuple[Array, Array] | None) -> Block:
@@ -94,31 +74,20 @@ def fineness(count: int, most: int = MANY) -> tuple[int, bool]:
     return int(np.clip(np.sqrt(most / max(count, 1)), 1, FINEST)), count < MANY
 
 
-def _blocks(mesh: Mesh) -> list[tuple[Block, int]]:
-    starts = np.cumsum([0, *map(len, mesh.blocks)])
-    return [
-        (b, int(at))
-        for b, at in zip(mesh.blocks, starts, strict=False)
-        if b.shape is not None and b.shape.faces
-    ]
-
-
 def _of_block(
     block: Block, mesh: Mesh, x: Array, values: Array | None, rows: Array, plane: Plane | None, n: int
 ) -> tuple[Array, Array, Array, Array]:
     """Return corners, light, value and edges of the faces of one shape that face the viewer."""
     assert block.shape is not None
-    xi, corners = _grid(block.shape.cell, n)
+    xi, corners = grid(block.shape.cell, n)
     N = block.shape.N(xi)
     P = np.einsum("pa,mad->mpd", N, x[block.nodes])[:, corners].reshape(-1, 4, 3)
     normal = _normals(P)
     front = normal @ rows[2] > EDGE_ON
-    light, value = (
-        _light(normal[front]),
-        _values(block.nodes, block.ids, mesh, values, N[corners].mean(axis=1))[front],
-    )
+    light = _light(normal[front])
+    value = _values(block.nodes, block.ids, mesh, values, N[corners].mean(axis=1))[front]
     facing = front.reshape(len(block), len(corners)).any(axis=1)
-    N_rim = block.shape.N(_rim(block.shape, n))
+    N_rim = block.shape.N(rim(block.shape, n))
     E = np.einsum("spa,mad->mspd", N_rim, x[block.nodes[facing]]).reshape(-1, 2, 3)
     P = P[front]
     if plane is not None:
@@ -162,7 +131,7 @@ def _light(normal: Array) -> Array:
     return 0.86 + 0.14 * np.clip(normal @ LIGHT, 0, 1)
 
 
-def _grid(cell: str, n: int) -> tuple[Array, Ints]:
+def grid(cell: str, n: int) -> tuple[Array, Ints]:
     """Return grid points on a reference face, and the corners of its n² facets."""
     steps = np.linspace(0, 1, n + 1)
     grid = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -175,7 +144,7 @@ def _grid(cell: str, n: int) -> tuple[Array, Ints]:
     return grid, np.vstack([np.stack([a, b, d, d], -1)[lower], np.stack([b, c, d, d], -1)[upper]])
 
 
-def _rim(shape: type[Shape], n: int) -> Array:
+def rim(shape: type[Shape], n: int) -> Array:
     """Return the pieces of the edges of a reference face, (edges · n, 2, 2)."""
     t = np.linspace(0, 1, n + 1)[:, None]
     pieces = [(1 - t) * shape.nodes[a] + t * shape.nodes[b] for a, b in shape.edges]
@@ -227,8 +196,9 @@ def _sharp(mesh: Mesh) -> tuple[Ints, Array]:
             straight = len(block.shape.nodes) == block.shape.corners
             middles.append(X[:, list(edge)].mean(axis=1) if straight else X[:, number])
             normals.append(normal)
-    found = np.unique(np.vstack(pairs), axis=0, return_index=True, return_inverse=True, return_counts=True)
-    unique, first, which, counts = found
+    unique, first, which, counts = np.unique(
+        np.vstack(pairs), axis=0, return_index=True, return_inverse=True, return_counts=True
+    )
     mean = np.zeros((len(unique), 3))
     np.add.at(mean, which.ravel(), np.vstack(normals))
     # Two unit normals at an angle a add up to a length of 2 cos(a/2).

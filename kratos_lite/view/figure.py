@@ -40,34 +40,23 @@ def compose(scene: Scene, options: Options, title: str | None = None) -> tuple[A
     extent = scene.window[1] - scene.window[0]
     columns = _columns(len(scene.subjects), extent, options.size)
     counts = np.array([columns, -(-len(scene.subjects) // columns)])
-    last: list[Any] = []
-
-    def lay_out(inch: float) -> Any:
-        last[:] = [*_laid_out(scene, options, columns, inch, title), inch]
-        return last[0]
-
-    fitted(extent, counts, options.size, lay_out)
-    return last[0], last[1], last[2]
+    return fitted(extent, counts, options.size, lambda inch: _laid_out(scene, options, columns, inch, title))
 
 
-def fitted(extent: Array, counts: Array, size: tuple[float, float], lay_out: Callable[[float], Any]) -> Any:
-    """Return the figure of a size that `lay_out` makes for the m of an inch.
+def fitted(
+    extent: Array, counts: Array, size: tuple[float, float], lay_out: Callable[[float], tuple[Any, list[Any]]]
+) -> tuple[Any, list[Any], float]:
+    """Return a figure of a size, its panels, and how many m are an inch in them.
 
-    Texts keep their size, so that what they leave for the bodies is found by laying it out twice.
-
-    Parameters
-    ----------
-    extent : (2,) m of each panel.
-    counts : (2,) panels from left to right and from top to bottom.
-    size : largest width and height in inches.
-    lay_out : makes a figure, for the number of m that are an inch in the picture.
+    `lay_out` makes figure and panels for the m of an inch.  Texts keep their size: what they leave for the
+    panels, `counts` across and down of `extent` m each, is known by laying out twice.
     """
     inside = whole = np.array(size, dtype=float)
     for _ in range(2):
         per_metre = float((np.maximum(inside, 0.2 * whole) / (extent * counts)).min())
-        figure = lay_out(1 / per_metre)
+        figure, panels = lay_out(1 / per_metre)
         inside = whole - (figure.get_size_inches() - per_metre * extent * counts)
-    return figure
+    return figure, panels, 1 / per_metre
 
 
 def _columns(count: int, extent: Array, size: tuple[float, float]) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,23 +14,13 @@ COILS = 7
 """Of a spring."""
 
 
-def _none() -> Array:
-    return np.zeros((0, 2, 3))
-
-
 @dataclass(frozen=True, eq=False)
 class Marks:
-    """What holds a body.
+    """What holds a body."""
 
-    Attributes
-    ----------
-    rods, springs : (k, 2, 3) m, from a point of the body to an anchor in space.
-    pivots : (k, 3) m, points of the body that are held.
-    """
-
-    rods: Array = field(default_factory=_none)
-    springs: Array = field(default_factory=_none)
-    pivots: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    rods: Array  # (k, 2, 3) m, from a point of the body to an anchor in space
+    springs: Array  # the same
+    pivots: Array  # (k, 3) m, points of the body that are fixed
 
     def points(self) -> Array:
         """Return all that must be in the picture, (k, 3) m."""
@@ -40,13 +30,10 @@ class Marks:
 def draw_marks(axes: Any, rows: Array, marks: Marks, inch: float, strength: float = 1.0) -> list[Any]:
     """Draw marks over the bodies; return what was drawn.  `inch` is that many m in the picture."""
     flat = rows[:2].T
-    drawn = []
-    for a, b in marks.rods @ flat:
-        drawn += axes.plot(*np.array([a, b]).T, color=DARK, lw=2.0, alpha=strength, zorder=4, clip_on=False)
-    for a, b in marks.springs @ flat:
-        drawn += axes.plot(
-            *_coil(a, b, 0.06 * inch).T, color=DARK, lw=1.0, alpha=strength, zorder=4, clip_on=False
-        )
+    curves = [(ends, 2.0) for ends in marks.rods @ flat]
+    curves += [(_coil(a, b, 0.06 * inch), 1.0) for a, b in marks.springs @ flat]
+    style = {"color": DARK, "alpha": strength, "zorder": 4, "clip_on": False}
+    drawn = [line for points, width in curves for line in axes.plot(*points.T, lw=width, **style)]
     anchors = np.concatenate([marks.rods[:, 1], marks.springs[:, 1]]) @ flat
     joints = np.concatenate([marks.rods[:, 0], marks.springs[:, 0], marks.pivots]) @ flat
     drawn += _dots(axes, anchors, "s", 7, DARK, 1.0)

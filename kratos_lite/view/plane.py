@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import permutations, product
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -25,22 +25,29 @@ COLLAPSED = {
 POLYGONS = 6000
 """Cells of lattices to aim at in a section."""
 FINEST = 8
+Corners: TypeAlias = "dict[int, list[tuple[int, int]]]"
+CLIPPED_LINES: Corners = {1: [(0, 0), (0, 1)], 2: [(0, 0), (1, 1)]}
+CLIPPED_TRIANGLES: Corners = {
+    1: [(0, 0), (0, 1), (0, 2), (0, 2)],
+    2: [(0, 2), (0, 0), (1, 1), (1, 2)],
+    3: [(0, 0), (1, 1), (2, 2), (2, 2)],
+}
+CUT_TRIANGLES: Corners = {1: [(0, 1), (0, 2)], 2: [(0, 2), (1, 2)]}
+CUT_TETRAHEDRA: Corners = {
+    1: [(0, 1), (0, 2), (0, 3), (0, 3)],
+    2: [(0, 2), (0, 3), (1, 3), (1, 2)],
+    3: [(0, 3), (1, 3), (2, 3), (2, 3)],
+}
+"""See `_parts`."""
 
 
 @dataclass(frozen=True, eq=False)
 class Plane:
-    """The plane n·X = offset of the undeformed body; what lies on one side is taken away.
+    """The plane n·X = offset of the undeformed body; what lies on one side is taken away."""
 
-    Attributes
-    ----------
-    normal : (3,) unit vector.
-    offset : m.
-    side : 1 if n·X > offset is taken away, else -1.
-    """
-
-    normal: Array
-    offset: float
-    side: float
+    normal: Array  # (3,) unit vector
+    offset: float  # m
+    side: float  # 1 if n·X > offset is taken away, else -1
 
     def distance(self, X: Array) -> Array:
         """Return how far points (n, 3) lie beyond the plane, (n,) m."""
@@ -79,36 +86,27 @@ def plane_of(clip: Any, towards: Array) -> Plane | None:
     return Plane(normal / length, number(offset, "the offset of clip", unit="m") / length, sign)
 
 
-def clip_facets(P: Array, d: Array) -> tuple[Array, Ints]:
-    """Return the parts of facets (m, 4, 3) with d ≤ 0, d (m, 4) linear, and the facet of each part."""
-    inside = d <= 0
-    whole, mixed = (
-        np.flatnonzero(inside.all(axis=1)),
-        np.flatnonzero(inside.any(axis=1) & ~inside.all(axis=1)),
-    )
-    # Triangles of the mixed ones; the corner that is alone on its side goes first.
-    two = [mixed[:, None], mixed[:, None]], [np.array([[0, 1, 2]]), np.array([[0, 2, 3]])]
-    T, e = (
-        np.concatenate([array[row, column] for row, column in zip(*two, strict=True)]) for array in (P, d)
-    )
-    owner = np.concatenate([mixed, mixed])
-    inner = e <= 0
-    count = inner.sum(axis=1)
-    parts, owners = [P[whole], _as_quads(T[count == 3])], [whole, owner[count == 3]]
-    for number_inside in (1, 2):
-        at = count == number_inside
-        alone = (inner[at] if number_inside == 1 else ~inner[at]).argmax(axis=1)
-        turn = (alone[:, None] + np.arange(3)) % 3
-        t, f = np.take_along_axis(T[at], turn[..., None], axis=1), np.take_along_axis(e[at], turn, axis=1)
-        p, q = (_between(t[:, 0], t[:, k], f[:, 0], f[:, k]) for k in (1, 2))
-        corners = [t[:, 0], p, q, q] if number_inside == 1 else [p, t[:, 1], t[:, 2], q]
-        parts.append(np.stack(corners, axis=1))
-        owners.append(owner[at])
-    return np.concatenate(parts), np.concatenate(owners)
+# ---- parts of simplices ----------------------------------------------------------------------------
 
 
-def _as_quads(T: Array) -> Array:
-    return T[:, [0, 1, 2, 2]]
+def _parts(d: Array, field: Array, simplices: Ints, corners_of: Corners) -> tuple[Ints, Array]:
+    """Return cells (p,) and corners (p, k, *) of parts of simplices, where d is linear in each.
+
+    `corners_of` says by the number of points with d ≤ 0, which count first, between which points d = 0 is the
+    corner of a part; (i, i) is the point itself.
+    """
+    inside = d[:, simplices] <= 0
+    count = inside.sum(axis=2)
+    cells, parts = [], []
+    for number_inside, corners in corners_of.items():
+        cell, which = np.nonzero(count == number_inside)
+        order = np.argsort(~inside[cell, which], axis=1, kind="stable")
+        points = np.take_along_axis(simplices[which], order, axis=1)
+        ends = [(points[:, i], points[:, j]) for i, j in corners]
+        between = [_between(field[cell, a], field[cell, b], d[cell, a], d[cell, b]) for a, b in ends]
+        cells.append(cell)
+        parts.append(np.stack(between, axis=1))
+    return np.concatenate(cells), np.concatenate(parts)
 
 
 def _between(a: Array, b: Array, d: Array, e: Array) -> Array:
@@ -118,14 +116,18 @@ def _between(a: Array, b: Array, d: Array, e: Array) -> Array:
     return a + t[:, None] * (b - a)
 
 
+def clip_facets(P: Array, d: Array) -> tuple[Array, Ints]:
+    """Return the parts of facets (m, 4, 3) with d ≤ 0, d (m, 4) linear, and the facet of each part."""
+    inside = d <= 0
+    whole = np.flatnonzero(inside.all(axis=1))
+    mixed = np.flatnonzero(inside.any(axis=1) & ~inside.all(axis=1))
+    owner, parts = _parts(d[mixed], P[mixed], np.array([[0, 1, 2], [0, 2, 3]]), CLIPPED_TRIANGLES)
+    return np.concatenate([P[whole], parts]), np.concatenate([whole, mixed[owner]])
+
+
 def clip_lines(E: Array, d: Array) -> Array:
     """Return the parts of segments (m, 2, 3) with d ≤ 0, d (m, 2) linear."""
-    inside = d <= 0
-    cut = inside[:, 0] != inside[:, 1]
-    ends, e = E[cut], d[cut]
-    at = _between(ends[:, 0], ends[:, 1], e[:, 0], e[:, 1])
-    kept = np.where(inside[cut][:, :1], ends[:, 0], ends[:, 1])
-    return np.concatenate([E[inside.all(axis=1)], np.stack([kept, at], axis=1)])
+    return _parts(d, E, np.array([[0, 1]]), CLIPPED_LINES)[1]
 
 
 # ---- sections --------------------------------------------------------------------------------------
@@ -149,19 +151,8 @@ def _lattice(n: int) -> tuple[Array, Ints, Ints]:
 def cut_cells(block: Block, distance: Array, x: Array, values: Array) -> tuple[Ints, Array, Array, Array]:
     """Return the section through the cells of a block where the distance of its nodes is 0.
 
-    Parameters
-    ----------
-    block : cells with a shape of three dimensions.
-    distance : (n,) m, of nodes from the plane, in the undeformed body.
-    x : (n, 3) m, where the nodes are.
-    values : (n,) of nodes.
-
-    Returns
-    -------
-    cells : (p,) the cell of each polygon.
-    corners : (p, 4, 3) m.
-    values : (p,).
-    edges : (k, 2, 3) m, of the cells in the section.
+    These are the cell (p,), corners (p, 4, 3) m and value (p,) of each polygon, and the edges (k, 2, 3) m of
+    the cells; the nodes have a distance (n,) from the plane in the undeformed body, places (n, 3) and values.
     """
     assert block.shape is not None
     shape, d = block.shape, distance[block.nodes]
@@ -174,48 +165,7 @@ def cut_cells(block: Block, distance: Array, x: Array, values: Array) -> tuple[I
     N = shape.N(xi)
     d = d[crossed] @ N.T
     field = np.concatenate([np.einsum("pa,mad->mpd", N, x[nodes]), (values[nodes] @ N.T)[..., None]], axis=-1)
-    cells, corners = _sections(d, field, tetrahedra)
-    edges = _traces(d, field[..., :3], sides)
+    cells, corners = _parts(d, field, tetrahedra, CUT_TETRAHEDRA)
+    _, edges = _parts(d, field[..., :3], sides, CUT_TRIANGLES)
+    edges = edges[np.abs(edges[:, 0] - edges[:, 1]).max(axis=1, initial=0.0) > 0]
     return crossed[cells], corners[..., :3], corners[..., 3].mean(axis=1), edges
-
-
-def _crossing(d: Array, simplices: Ints) -> tuple[Ints, Ints, Array]:
-    """Return of simplices that d = 0 crosses: cell, points, those inside first, and how many these are."""
-    e = d[:, simplices]
-    inside = e <= 0
-    cell, which = np.nonzero(inside.any(axis=2) & ~inside.all(axis=2))
-    inside = inside[cell, which]
-    order = np.argsort(~inside, axis=1, kind="stable")
-    return cell, np.take_along_axis(simplices[which], order, axis=1), inside.sum(axis=1)
-
-
-def _sections(d: Array, field: Array, tetrahedra: Ints) -> tuple[Ints, Array]:
-    """Return cells and corners (p, 4, *) of the polygons in which d = 0 cuts tetrahedra."""
-    cell, point, count = _crossing(d, tetrahedra)
-    pairs = {
-        1: [(0, 1), (0, 2), (0, 3), (0, 3)],
-        2: [(0, 2), (0, 3), (1, 3), (1, 2)],
-        3: [(0, 3), (1, 3), (2, 3), (2, 3)],
-    }
-    cells, corners = [cell[:0]], [np.zeros((0, 4, field.shape[-1]))]
-    for inside, ends in pairs.items():
-        at = count == inside
-        cells.append(cell[at])
-        corners.append(np.stack([_on_edge(d, field, cell[at], point[at], *end) for end in ends], axis=1))
-    return np.concatenate(cells), np.concatenate(corners)
-
-
-def _traces(d: Array, place: Array, triangles: Ints) -> Array:
-    """Return the segments (k, 2, 3) in which d = 0 cuts triangles."""
-    cell, point, count = _crossing(d, triangles)
-    found = [np.zeros((0, 2, 3))]
-    for inside, ends in {1: [(0, 1), (0, 2)], 2: [(0, 2), (1, 2)]}.items():
-        at = count == inside
-        found.append(np.stack([_on_edge(d, place, cell[at], point[at], *end) for end in ends], axis=1))
-    segments = np.concatenate(found)
-    return segments[np.abs(segments[:, 0] - segments[:, 1]).max(axis=1, initial=0.0) > 0]
-
-
-def _on_edge(d: Array, field: Array, cell: Ints, point: Ints, i: int, j: int) -> Array:
-    a, b = point[:, i], point[:, j]
-    return _between(field[cell, a], field[cell, b], d[cell, a], d[cell, b])

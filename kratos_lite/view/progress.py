@@ -1,6 +1,6 @@
 """Progress: a line in a terminal or a notebook that shows what takes long, and vanishes at the end.
 
-The library calls ``progress(phase, share)``; here that becomes a line, written by a thread of its own, so
+The library calls ``progress(phase, fraction)``; here that becomes a line, written by a thread of its own, so
 that it also moves where nobody calls: while a file is read, a matrix factorized or multigrid set up.
 """
 
@@ -83,26 +83,19 @@ class Terminal:
 
 
 class Line:
-    """The phase of some work, its share that is done and the seconds that it takes, once it takes long.
+    """The phase of some work, its fraction that is done and the seconds that it takes, once it takes long.
 
-    Parameters
-    ----------
-    write : takes the text, or an empty one at the end.
-    phase : at the start.
-    patience, every : seconds before the first text, and between two; without patience each phase is shown.
+    `write` takes each text, and an empty one at the end, after `patience` and then `every` so many seconds;
+    without patience each phase is shown.
     """
 
     def __init__(
-        self,
-        write: Callable[[str], None],
-        phase: str = "",
-        patience: float = PATIENCE,
-        every: float = EVERY,
+        self, write: Callable[[str], None], phase: str = "", patience: float = PATIENCE, every: float = EVERY
     ) -> None:
         from contextvars import copy_context  # rarely needed
         from threading import Event, RLock, Thread
 
-        self._write, self._phase, self._share = write, phase, 0.0
+        self._write, self._phase, self._fraction = write, phase, 0.0
         self._patience, self._every, self._start = patience, every, perf_counter()
         self._over, self._lock, self._shown = Event(), RLock(), False
         # The context says below which cell of a notebook to write.
@@ -112,10 +105,10 @@ class Line:
         if not patience:
             self._show()
 
-    def __call__(self, phase: str, share: float) -> None:
-        """Take a phase and the share of it that is done, 0 … 1."""
+    def __call__(self, phase: str, fraction: float) -> None:
+        """Take a phase and the fraction of it that is done, 0 … 1."""
         is_new = phase != self._phase
-        self._phase, self._share = phase, share
+        self._phase, self._fraction = phase, fraction
         if is_new and not self._patience:
             self._show()
 
@@ -128,9 +121,9 @@ class Line:
     def _show(self) -> None:
         with self._lock, suppress(OSError, ValueError):  # a display that is gone
             if self._phase and not self._over.is_set():
-                share = f"{self._share:5.0%}" if self._share else " " * 5
+                fraction = f"{self._fraction:5.0%}" if self._fraction else " " * 5
                 self._shown = True
-                self._write(f"{self._phase:<10} {share}  {perf_counter() - self._start:6.1f} s")
+                self._write(f"{self._phase:<10} {fraction}  {perf_counter() - self._start:6.1f} s")
 
     @contextmanager
     def hidden(self) -> Iterator[None]:

@@ -10,30 +10,14 @@ from numpy.typing import ArrayLike
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array
 from kratos_lite.validation import finite
+from kratos_lite.view import canvas
 from kratos_lite.view.camera import OBLIQUE
-from kratos_lite.view.canvas import new_figure
 
 
 def element_figure(shape: type[Shape], points: ArrayLike | None = None) -> Any:
-    """Return a figure of a reference cell with its node numbers (from 0), and Gauss points as crosses.
-
-    Parameters
-    ----------
-    shape : the cell.
-    points : (g, d) reference coordinates to mark.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    InputError
-        `points` has the wrong shape.
-    KratosLiteError
-        matplotlib is missing.
-    """
-    figure, axes = new_figure((5, 5))
+    """Return a figure of a reference cell with its node numbers (from 0), and Gauss points (g, d)."""
+    figure = canvas.empty((5, 5))
+    axes = canvas.without_frame(figure.add_subplot())
     d = shape.nodes.shape[1]
     view = OBLIQUE if d == 3 else np.eye(3)
 

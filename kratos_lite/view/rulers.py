@@ -17,16 +17,7 @@ SHORTEST = 0.15
 
 
 def draw_rulers(axes: Any, rows: Array, X: Array, drawn: Array, inch: float) -> None:
-    """Draw the extent of the body along x, y and z at its outer edges, below and left if possible.
-
-    Parameters
-    ----------
-    axes : in which a metre is a metre.
-    rows : of the camera.
-    X : (n, 3) m, nodes of the undeformed body.
-    drawn : (k, 2) m in the picture: all that the rulers must keep clear of.
-    inch : metres of an inch in the picture.
-    """
+    """Draw the extent of nodes X (n, 3) along x, y and z, clear of what is drawn (k, 2) m."""
     low, high = X.min(axis=0), X.max(axis=0)
     corners, texts = box_corners(low, high), []
     factor, unit = _unit(float((high - low).max()))

@@ -23,42 +23,24 @@ DECADES = 4
 
 @dataclass(frozen=True, eq=False)
 class Values:
-    """Numbers that color a body.
+    """Numbers that color a body."""
 
-    Attributes
-    ----------
-    numbers : (n,) of nodes or (m,) of elements.
-    title : what they are.
-    unit : at the color bar.
-    log : whether their powers of ten matter.
-    """
-
-    numbers: Array
-    title: str = ""
-    unit: str = ""
-    log: bool = False
+    numbers: Array  # (n,) of nodes or (m,) of elements
+    title: str = ""  # what they are
+    unit: str = ""  # at the color bar
+    log: bool = False  # whether their powers of ten matter
 
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """What is drawn of a body.
+    """What is drawn of a body."""
 
-    Attributes
-    ----------
-    mesh : the undeformed body.
-    u : (n, 3) m, displacement; None of what has none.
-    values : what colors it.
-    title : above the picture.
-    marks : what holds it.
-    moving : whether it moves through space, so that its first place is none to show.
-    """
-
-    mesh: Mesh
-    u: Array | None = None
-    values: Values | None = None
-    title: str = ""
-    marks: Marks | None = None
-    moving: bool = False
+    mesh: Mesh  # the undeformed body
+    u: Array | None = None  # (n, 3) m, displacement; None of what has none
+    values: Values | None = None  # what colors it
+    title: str = ""  # above the picture
+    marks: Marks | None = None  # what holds it
+    moving: bool = False  # whether it moves through space, so that its first place is none to show
 
 
 @dataclass(eq=False)
@@ -76,26 +58,15 @@ class Options:
 
 @dataclass(eq=False)
 class Scene:
-    """Subjects with what they share.
+    """Subjects with what they share."""
 
-    Attributes
-    ----------
-    subjects : side by side.
-    rows : of the camera.
-    scale : factor on displacements.
-    window : lower left and upper right of what is shown, in m in the picture.
-    colors : scale of colors, or None.
-    plane : that cuts the bodies, or None.
-    zoomed : whether the window cuts them off.
-    """
-
-    subjects: Sequence[Subject]
-    rows: Array
-    scale: float
-    window: tuple[Array, Array]
-    colors: Any
-    plane: Plane | None
-    zoomed: bool = False
+    subjects: Sequence[Subject]  # side by side
+    rows: Array  # of the camera
+    scale: float  # factor on displacements
+    window: tuple[Array, Array]  # lower left and upper right of what is shown, in m in the picture
+    colors: Any  # scale of colors, or None
+    plane: Plane | None  # that cuts the bodies, or None
+    zoomed: bool = False  # whether the window cuts them off
 
     def place(self, subject: Subject) -> Array:
         """Return where the nodes of a subject are drawn, (n, 3) m."""
@@ -185,13 +156,13 @@ def _zoomed(scene: Scene, zoom: Any) -> tuple[Array, Array]:
     if isinstance(zoom, (float, int)):
         middle, half = (low + high) / 2, (high - low) / 2 / zoom
         return middle - half, middle + half
-    found = []
+    chosen_points = []
     for subject in scene.subjects:
         if isinstance(zoom, str):
             chosen = scene.place(subject)[subject.mesh.nodes(zoom)]
         else:
             chosen = box_corners(*np.asarray(zoom, dtype=float))
-        found.append(chosen @ scene.rows[:2].T)
-    low, high = window_of(np.concatenate(found))
+        chosen_points.append(chosen @ scene.rows[:2].T)
+    low, high = window_of(np.concatenate(chosen_points))
     margin = 0.05 * (high - low).max()
     return low - margin, high + margin

@@ -27,76 +27,31 @@ CURVES = (4.0, 1.3)
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """A body along its path.
+    """A body along its path."""
 
-    Attributes
-    ----------
-    mesh : the elements.
-    positions : of the nodes, each (n, 3) in m, in the order of time.
-    marks : what holds the body in each position.
-    centers : (k, 3) m, path of the mass center.
-    times : (k,) s.
-    curves : (k,) numbers against time by name.
-    """
-
-    mesh: Mesh
-    positions: Sequence[Array]
-    marks: Sequence[Marks]
-    centers: Array
-    times: Array
-    curves: Mapping[str, Array]
+    mesh: Mesh  # the elements
+    positions: Sequence[Array]  # of the nodes, each (n, 3) in m, in the order of time
+    marks: Sequence[Marks]  # what holds the body in each position
+    centers: Array  # (k, 3) m, path of the mass center
+    times: Array  # (k,) s
+    curves: Mapping[str, Array]  # (k,) energies in J by name
 
 
-def trajectory_figure(
-    path: Path,
-    *,
-    view: View | None = None,
-    title: str = "",
-    unit: str = "J",
-    size: tuple[float, float] = (8, 8),
-) -> Any:
-    """Return a figure of positions of a body, later ones stronger, and of curves.
-
-    The first and the last position have their times beneath them; a triad of axes shows directions and scale.
-    The curves, against time, are beneath; one time alone has none.
-
-    Parameters
-    ----------
-    path : what is drawn.
-    view : where one looks from, as for `kratos_lite.plot`; isometric if not given.
-    title : above the picture.
-    unit : of the curves.
-    size : largest width and height in inches, at 150 dots per inch.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    InputError
-        There is nothing to draw.
-    KratosLiteError
-        matplotlib is missing.
-    """
+def trajectory_figure(path: Path, view: View | None, title: str, size: tuple[float, float]) -> Any:
+    """Return a figure of positions of a body, later ones stronger, and of its curves against time."""
     if not path.mesh.boundary or not len(path.positions):
         raise InputError("there is nothing to draw: no position, or no element of a known shape")
     everything = np.concatenate([*path.positions, path.centers, *(marks.points() for marks in path.marks)])
     rows = rows_of("iso" if view is None else view, everything)
     window = window_of(everything @ rows[:2].T)
-    scale: list[float] = []
-
-    def lay_out(inch: float) -> Any:
-        scale[:] = [inch]
-        return _laid_out(path, rows, window, inch, title, unit)
-
-    figure = fitted(window[1] - window[0], np.ones(2), size, lay_out)
-    axes = figure.axes[0]
+    figure, (axes,), inch = fitted(
+        window[1] - window[0], np.ones(2), size, lambda inch: _laid_out(path, rows, window, inch, title)
+    )
     for strength, x, marks in zip(_strengths(path), path.positions, path.marks, strict=True):
         facets = facets_of(path.mesh, x, None, rows, most=MANY // len(path.positions))
         ink = (*INK[:3], INK[3] * strength)
         draw_facets(axes, rows, facets, colored(facets, strength=strength), ink).set_clip_on(False)
-        draw_marks(axes, rows, marks, scale[0], strength)
+        draw_marks(axes, rows, marks, inch, strength)
     axes.plot(*(path.centers @ rows[:2].T).T, color=PATH, lw=1.2, zorder=3)
     axes.plot(*(path.centers[[0, -1]] @ rows[:2].T).T, ".", color=PATH, ms=6, zorder=3)
     return figure
@@ -108,8 +63,8 @@ def _strengths(path: Path) -> list[float]:
 
 
 def _laid_out(
-    path: Path, rows: Array, window: tuple[Array, Array], inch: float, title: str, unit: str
-) -> Any:
+    path: Path, rows: Array, window: tuple[Array, Array], inch: float, title: str
+) -> tuple[Any, list[Any]]:
     """Return the figure with all but the body; `inch` is that many m in the picture."""
     figure = canvas.empty((20, 20), layout=None)
     size = (window[1] - window[0]) / inch
@@ -123,18 +78,18 @@ def _laid_out(
         width = max(size[0], CURVES[0])
         place = ((size[0] - width) / 2, low - CURVES[1] - 0.15)
         below = canvas.axes_for_curves(figure, place, (width, CURVES[1]))
-        _draw_curves(below, path.times, path.curves, unit)
+        _draw_curves(below, path.times, path.curves)
     canvas.fit(figure)
-    return figure
+    return figure, [axes]
 
 
-def _draw_curves(below: Any, times: Array, curves: Mapping[str, Array], unit: str) -> None:
+def _draw_curves(below: Any, times: Array, curves: Mapping[str, Array]) -> None:
     """Draw curves against time; a sum is dashed, as it may lie on one of its parts."""
     for name, values in curves.items():
         style = {"ls": (0, (4, 3)), "color": "0.15", "lw": 1.2} if name == "sum" else {"lw": 1.8}
         below.plot(times, values, label=name, **style)
     below.set_xlabel("time in s")
-    below.set_ylabel(unit)
+    below.set_ylabel("energy in J")
     below.legend(fontsize=9, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
@@ -144,17 +99,7 @@ def _label_times(axes: Any, rows: Array, path: Path, near: float) -> None:
     feet, texts = [x[x[:, 1].argmin()] for x in ends], [f"{path.times[i]:.3g} s" for i in (0, -1)]
     if np.abs(ends[0] - ends[1]).max() < near:
         feet, texts = feet[1:], [" and ".join(dict.fromkeys(texts))]
+    style = {"textcoords": "offset points", "ha": "center", "va": "top", "size": 9, "zorder": 6}
     box = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1.0}
     for foot, text in zip(feet, texts, strict=True):
-        axes.annotate(
-            text,
-            foot,
-            (0, -4),
-            textcoords="offset points",
-            ha="center",
-            va="top",
-            size=9,
-            bbox=box,
-            zorder=6,
-            annotation_clip=False,
-        )
+        axes.annotate(text, foot, (0, -4), bbox=box, annotation_clip=False, **style)

@@ -46,7 +46,7 @@ def reference(wheels):
     """Return u at the end, of M u'' + (α M + 2 s S) u' + (K - s² H + (s' + α s) S) u = f by Runge-Kutta."""
     model = shaken_wheel(wheels)
     e = EquationsOfMotion(model)
-    free, points = e.system.reduced.free, e.system.points
+    free, points = e.system.constraint_map.free, e.system.points
     own = wheels.matrices(model.motion, model)
     take = lambda full: np.kron(full, np.eye(3))[np.ix_(free, free)]  # noqa: E731
     M, S, H = (take(full) for full in (own.M, own.S, own.H))
@@ -72,7 +72,7 @@ def reference(wheels):
 )
 def test_order_two_while_the_rate_changes(integrator, wheels, reference):
     transient = shaken_wheel(wheels).transient(integrator=integrator)
-    free, errors = transient.equations.system.reduced.free, []
+    free, errors = transient.equations.system.constraint_map.free, []
     for steps in (300, 600):
         transient = shaken_wheel(wheels).transient(integrator=integrator)
         list(kl.integrate(transient, SPAN / steps, steps, every=steps))
@@ -183,7 +183,7 @@ def lagrangian(model, angle, rate, acceleration, load, h, steps):
     Returns w (n, 3): the displacement in those axes of the material that starts at each node.
     """
     e = EquationsOfMotion(model)
-    free, K = e.system.reduced.free, e.K.scipy().tocsr()
+    free, K = e.system.constraint_map.free, e.K.scipy().tocsr()
     M, scalar = kron(e.mass.scalar, eye_array(3)).tocsr(), e.mass.scalar
     MA, MAA = kron(scalar, A).tocsr(), kron(scalar, A @ A).tocsr()
     X = model.mesh.points
@@ -350,7 +350,7 @@ def test_moving_load_on_a_founded_bar(share, figure, wheels):
     model.add(Translation("x", rate=v, boundaries="fixed"))
     load = 1e5 / 4 * (np.abs(model.mesh.points[:, :1]) < 1e-9) * (1.0, 0, 0)
     e = EquationsOfMotion(model)
-    free = e.system.reduced.free
+    free = e.system.constraint_map.free
     K = (e.matrix(0.0, kv / wheels.steel.density, 0.0, 1.0)).scipy().tocsr()[free][:, free]
     u = spsolve(K.tocsc(), load.ravel()[free])
     D, h = wheels.steel.C[0, 0] * (1 - v * v / c / c), L / n

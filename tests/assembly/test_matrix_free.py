@@ -63,8 +63,8 @@ def test_smoothing_is_that_of_the_matrix(kind, material):
     system = system_of(model)
     product, K, r = both(model)
     free = np.zeros(len(r), dtype=bool)
-    free[system.reduced.free] = True
-    linear = system._equations.linear_level()
+    free[system.constraint_map.free] = True
+    linear = system._equations.p_coarse_level()
     r[~free] = 0.0
     z = [multigrid(A, free, model.mesh.points, linear).precondition(r) for A in (product, K)]
     assert np.abs(z[0] - z[1]).max() < 1e-4 * np.abs(z[1]).max()  # in single precision
@@ -197,7 +197,7 @@ def test_wrong_tables_are_refused():
     module, model = kernels("multigrid"), model_of("8N")
     group = model.element_groups()[0]
     nodes, _, dN, weights = group.tables()
-    C = group.law()[0]
+    C = group.kernel_arguments()[0]
     points = np.ascontiguousarray(model.mesh.points)
     with pytest.raises(ValueError, match="nodes must be rows of points"):
         module.Product(points[:-1].copy(), [(nodes, dN, weights, C, None)])

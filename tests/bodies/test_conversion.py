@@ -119,7 +119,7 @@ def test_settings_go_along_where_the_kind_takes_them(brick, caplog):
     stiff = kl.convert(body, kl.RigidBody)
     assert (stiff.damping, stiff.integrator) == (0.0, "momentum_conserving")
     assert [record.getMessage() for record in caplog.records] == [
-        "a rigid body takes no damping: 0.001 s is left out",
+        "a rigid body takes no damping: 0.001 s is omitted",
         "a rigid body has no integrator linearly_implicit: it takes momentum_conserving",
     ]
 

@@ -5,6 +5,7 @@ import pytest
 
 import kratos_lite as kl
 from kratos_lite.bodies.formulations import base
+from kratos_lite.solvers import plan
 
 RUBBER = kl.Isotropic3D(E=1e6, nu=0.3, density=1000.0)
 
@@ -33,8 +34,8 @@ def spinning(formulation, integrator, damping=0.0):
 def test_large_bodies_iterate_and_move_alike(formulation, integrator, damping, monkeypatch):
     factorized = spinning(formulation, integrator, damping)
     list(kl.integrate(factorized, 5e-3, 10))
-    monkeypatch.setattr(base, "FACTORIZED_MAX", 10)
-    monkeypatch.setattr(base, "FACTORIZED_ONCE_MAX", 10)
+    monkeypatch.setattr(plan, "STEPPED_LIMIT", 10)
+    monkeypatch.setattr(plan, "REPEATED_LIMIT", 10)
     made = []
     iterated = base.Formulation._iterated
     monkeypatch.setattr(base.Formulation, "_iterated", lambda self, A: made.append(A) or iterated(self, A))

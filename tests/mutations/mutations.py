@@ -32,6 +32,7 @@ MASS = "tests/assembly/test_exact_mass.py"
 QUANTITIES = "tests/analysis/test_quantities.py"
 PRESTRESS = "tests/io/kratos/test_initial_state.py -k prestress"
 VOIGT = "tests/test_voigt.py"
+FIELDS = "tests/analysis/test_fields.py"
 LINES = "tests/analysis/test_line_values.py"
 COMPARED = "tests/analysis/test_comparison.py"
 ESTIMATE = "tests/analysis/test_error_estimate.py"
@@ -537,6 +538,12 @@ MUTATIONS = [
     ),
     Mutation("native/stiffness.cpp", "- (i == j) * k / 2;", "- (i == j) * k;", CONDENSED),
     Mutation(
+        "assembly/gauss_point_fields.py",
+        "return forces + element.internal_force(stress, C)",
+        "return forces - element.internal_force(stress, C)",
+        "tests/elements/test_custom_elements.py -k prestress",
+    ),
+    Mutation(
         "elements/custom.py",
         "return frozenset(custom & set(CUSTOM))",
         "return frozenset()",
@@ -578,6 +585,11 @@ MUTATIONS = [
     Mutation("voigt.py", "np.sin(angle + np.pi / 3)", "np.sin(angle + np.pi / 6)", VOIGT),
     Mutation("voigt.py", "r * (yz * zx - dz * xy)", "r * (yz * zx + dz * xy)", VOIGT),
     Mutation("voigt.py", "dy * dy + xy * xy + yz * yz", "dy * dy + xy * xy + zx * zx", VOIGT),
+    Mutation(
+        "analysis/fields.py", "(strain * stress).sum(axis=-1) / 2", "(strain * stress).sum(axis=-1)", FIELDS
+    ),
+    Mutation("analysis/integration_point_values.py", "volume.sum(axis=1, keepdims=True)", "volume", FIELDS),
+    Mutation("analysis/element_fields.py", "self.without_prestress.stress", "self.stress", FIELDS),
     Mutation("analysis/line_values.py", "6 * (0.5 - t)", "3 * (0.5 - t)", LINES),
     Mutation("analysis/line_values.py", "half * weights", "weights / len(half) / 2", LINES),
     Mutation("mesh/crossings.py", "np.diff(t) > SHORT", "np.diff(t) > 1e-3", "tests/mesh/test_crossings.py"),
@@ -608,5 +620,36 @@ MUTATIONS = [
         "w + height * slope, w - height * slope",
         "w - height * slope, w + height * slope",
         PLATE,
+    ),
+    # ---- the plan of solution: both sides of each threshold
+    *(
+        Mutation("solvers/plan.py", old, new, "tests/solvers/test_plan.py")
+        for old, new in (
+            ("DENSE_LIMIT = 600", "DENSE_LIMIT = 601"),
+            ("COMPILED_DENSE_LIMIT = 60 ", "COMPILED_DENSE_LIMIT = 61 "),
+            ("DENSE_MAX = 10_000", "DENSE_MAX = 10_001"),
+            ("DIRECT_LIMIT = 10_000", "DIRECT_LIMIT = 9_999"),
+            ("FALLBACK_LIMIT = 150_000", "FALLBACK_LIMIT = 150_001"),
+            ("SUPERLU_LIMIT = 30_000", "SUPERLU_LIMIT = 29_999"),
+            ("REPEATED_LIMIT = 30_000", "REPEATED_LIMIT = 30_001"),
+            ("MUMPS_LIMIT = 6_000", "MUMPS_LIMIT = 6_001"),
+            ("MUMPS_FALLBACK = 300_000", "MUMPS_FALLBACK = 299_999"),
+            ("LOCKED = 3_000.0", "LOCKED = 2_999.5"),
+            ("QUICK, SLOW = 1_000, ", "QUICK, SLOW = 1_001, "),
+            ("QUICK, SLOW = 1_000, 10_000", "QUICK, SLOW = 1_000, 10_001"),
+            ("QUICK_BAND = 2e9", "QUICK_BAND = 2.01e9"),
+            ("LARGEST_CONTRAST = 1e3", "LARGEST_CONTRAST = 1e4"),
+            ("STRETCHED, EXTREME = 3.0, ", "STRETCHED, EXTREME = 2.5, "),
+            ("EXTREME = 3.0, 30.0", "EXTREME = 3.0, 35.0"),
+            ("PER_STRETCHED, PER_EXTREME = 20, 200", "PER_STRETCHED, PER_EXTREME = 22, 200"),
+            ("FLAT = 0.1 ", "FLAT = 0.12 "),
+            ("BAND_LIMIT = 16.0", "BAND_LIMIT = 16.1"),
+            ("BAND_NUMBERS = 50_000_000", "BAND_NUMBERS = 60_000_000"),
+            ("PATIENCE, PATIENCE_FROM = 400", "PATIENCE, PATIENCE_FROM = 401"),
+            ("return min(tolerance, ROUND_OFF)", "return min(tolerance, tolerance)"),
+            ("plain > LOCKED and is", "plain > LOCKED or is"),
+            ("max(mixed, plain) > NEAR_HALF", "mixed > NEAR_HALF"),
+            ("if mixed > NEAR_HALF:", "if max(mixed, plain) > NEAR_HALF:"),
+        )
     ),
 ]

@@ -40,8 +40,7 @@ def test_a_slender_beam_converges_with_multigrid():
 
 
 def test_multigrid_that_stalls_falls_back_to_a_factorization_and_says_so(monkeypatch):
-    from kratos_lite.solvers import linear_solver as equations
-    from kratos_lite.solvers import multigrid
+    from kratos_lite.solvers import multigrid, plan
 
     class Stalls:
         def solve(self, b, *args):
@@ -53,7 +52,7 @@ def test_multigrid_that_stalls_falls_back_to_a_factorization_and_says_so(monkeyp
     assert result.report.solver == "direct"
     assert result.report.reason == "multigrid stopped after 500 iterations short of 1e-10"
     np.testing.assert_allclose(result.u, model.solve("dense").u, atol=1e-12 * np.abs(result.u).max())
-    monkeypatch.setattr(equations, "FALLBACK_LIMIT", 10)
+    monkeypatch.setattr(plan, "FALLBACK_LIMIT", 10)
     with pytest.raises(kl.SolveError, match="too many to factorize instead"):
         model.solve("amg")
 
@@ -156,9 +155,9 @@ def test_displacements_respect_maxwell_and_betti():
 
 
 def test_a_tolerance_that_is_far_too_loose_is_refused(monkeypatch):
-    from kratos_lite.solvers import linear_solver as equations
+    from kratos_lite.solvers import plan
 
-    monkeypatch.setattr(equations, "DIRECT_LIMIT", 0)  # below it the tolerance is round-off
+    monkeypatch.setattr(plan, "DIRECT_LIMIT", 0)  # below it the tolerance is round-off
     model = kl.Model(kl.box(cells=(6, 6, 6)), STEEL)
     model.fix("z-")
     model.add(kl.Gravity((0, 0, -9.81)))

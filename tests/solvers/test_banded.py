@@ -9,7 +9,7 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import assemble_stiffness
 from kratos_lite.errors import SolveError
-from kratos_lite.solvers import banded
+from kratos_lite.solvers import plan
 from kratos_lite.solvers.banded import Factorizer
 from kratos_lite.solvers.mass import Mass
 
@@ -48,12 +48,12 @@ def system(label, symmetric=True, shuffled=False):
 @pytest.mark.parametrize("method", ["band", "sparse"])
 def test_solutions_are_those_of_a_full_matrix(label, symmetric, method, monkeypatch):
     if method == "sparse":
-        monkeypatch.setattr(banded, "BAND_LIMIT", 0.0)
+        monkeypatch.setattr(plan, "BAND_LIMIT", 0.0)
     pattern, A = system(label, symmetric)
     full = A.scipy().toarray()
     assert (np.abs(full - full.T).max() > 1e-6 * np.abs(full).max()) != symmetric
     solver = Factorizer(pattern, symmetric)
-    assert solver.method == method
+    assert solver.plan.method == method
     rng = np.random.default_rng(7)
     for factor in (1.0, 3.0):  # the second matrix with the same solver
         factors = solver.factorize(BlockMatrix(factor * A.data, A.indices, A.indptr))
@@ -78,7 +78,7 @@ def test_bar_has_a_narrow_band_however_its_nodes_are_numbered(shuffled):
     pattern, _ = system("bar", shuffled=shuffled)
     solver = Factorizer(pattern)
     assert 3 * 13 + 2 <= solver.width <= 3 * 17 + 2
-    assert solver.reason == f"width {solver.width} ≤ 380: a band is fastest"
+    assert solver.plan.reason == f"width {solver.width} ≤ 380: a band is fastest"
 
 
 def test_width_is_the_largest_distance_from_the_diagonal():
@@ -86,14 +86,6 @@ def test_width_is_the_largest_distance_from_the_diagonal():
     solver = Factorizer(pattern)
     rows, columns = A.scipy().tocsr()[solver._dofs][:, solver._dofs].nonzero()
     assert np.abs(rows - columns).max() == solver.width
-
-
-def test_wide_and_large_bands_are_sparse():
-    assert banded.choose(567, 44, 45)[0] == "band"
-    method, reason = banded.choose(10_000, 1601, 1602)
-    assert (method, reason) == ("sparse", "width 1601 > 1600: a sparse factorization takes less work")
-    method, reason = banded.choose(100_000, 500, 501)
-    assert (method, reason) == ("sparse", "50100000 numbers > 50000000: a band takes too much memory")
 
 
 def test_indefinite_matrix_is_an_error():
@@ -110,7 +102,7 @@ def test_indefinite_matrix_is_an_error():
 @pytest.mark.parametrize("method", ["band", "sparse"])
 def test_singular_matrix_is_an_error(method, monkeypatch):
     if method == "sparse":
-        monkeypatch.setattr(banded, "BAND_LIMIT", 0.0)
+        monkeypatch.setattr(plan, "BAND_LIMIT", 0.0)
     pattern, A = system("bar", symmetric=False)
     A.data[:] = 0.0
     with pytest.raises(SolveError, match="singular"):

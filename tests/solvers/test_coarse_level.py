@@ -12,7 +12,7 @@ from kratos_lite.assembly.stiffness import assemble_dense, assemble_stiffness
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.mesh.refinement import refine
 from kratos_lite.shapes.hexahedra import Hexahedron8
-from kratos_lite.solvers.coarse_level import linear_level, tied
+from kratos_lite.solvers.coarse_level import apply_ties, p_coarse_level
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 
 STEEL = kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0)
@@ -33,7 +33,7 @@ def interpolation(level, n):
 @pytest.mark.parametrize("suffix", LINEAR_OF)
 def test_interpolation_reproduces_a_linear_field_on_straight_cells(suffix):
     points, groups = scene(suffix)
-    level = linear_level(points, groups)
+    level = p_coarse_level(points, groups)
     P = interpolation(level, len(points))
     np.testing.assert_allclose(P @ points[level.nodes], points, rtol=0, atol=1e-14)
     np.testing.assert_allclose(P.sum(axis=1), 1.0, rtol=0, atol=1e-15)
@@ -45,7 +45,7 @@ def test_interpolation_reproduces_a_linear_field_on_straight_cells(suffix):
 @pytest.mark.parametrize(("suffix", "linear"), LINEAR_OF.items())
 def test_stiffness_is_that_of_the_linear_mesh(suffix, linear):
     points, groups = scene(suffix)
-    level = linear_level(points, groups)
+    level = p_coarse_level(points, groups)
     coarse_points, coarse = scene(linear)
     K = assemble_stiffness(coarse_points, coarse, Pattern(len(coarse_points), [b.nodes for b in coarse]))
     same = np.array([np.abs(coarse_points - x).max(axis=1).argmin() for x in points[level.nodes]])
@@ -62,7 +62,7 @@ def test_long_cells_are_halved(suffix, axis):
     size, cells = np.ones(3), np.array([2, 2, 2])
     size[axis] = 20.0
     mesh = kl.box(size, cells, f"KinematicLinear{suffix}")
-    level = linear_level(mesh.points, kl.Model(mesh, STEEL).element_groups())
+    level = p_coarse_level(mesh.points, kl.Model(mesh, STEEL).element_groups())
     P = interpolation(level, mesh.n_nodes)
     np.testing.assert_allclose(P @ mesh.points[level.nodes], mesh.points, rtol=0, atol=1e-13)
     cells[axis] *= 2
@@ -80,7 +80,7 @@ def test_long_cells_are_halved_beside_others():
     mesh = kl.box((2.0, 1.0, 1.0), (2, 1, 1), "KinematicLinear3D20N")
     points = mesh.points.copy()
     points[:, 0] = np.where(points[:, 0] > 1.0, 1.0 + 9.0 * (points[:, 0] - 1.0), points[:, 0])
-    level = linear_level(points, kl.Model(kl.Mesh(points, mesh.blocks), STEEL).element_groups())
+    level = p_coarse_level(points, kl.Model(kl.Mesh(points, mesh.blocks), STEEL).element_groups())
     assert len(level.nodes) == 12 + 4
     P = interpolation(level, len(points))
     np.testing.assert_allclose(P @ points[level.nodes], points, rtol=0, atol=1e-13)
@@ -90,14 +90,14 @@ def test_a_few_long_cells_are_left_whole():
     mesh = kl.box((3.0, 1.0, 1.0), (3, 1, 1), "KinematicLinear3D20N")
     points = mesh.points.copy()
     points[:, 0] = np.where(points[:, 0] > 2.0, 2.0 + 9.0 * (points[:, 0] - 2.0), points[:, 0])
-    level = linear_level(points, kl.Model(kl.Mesh(points, mesh.blocks), STEEL).element_groups())
+    level = p_coarse_level(points, kl.Model(kl.Mesh(points, mesh.blocks), STEEL).element_groups())
     assert len(level.nodes) == 16
     assert not level.halved
 
 
 def test_linear_meshes_have_no_level():
     for suffix in LINEAR_OF.values():
-        assert linear_level(*scene(suffix)) is None
+        assert p_coarse_level(*scene(suffix)) is None
 
 
 def test_linear_elements_take_part_as_they_are():
@@ -106,7 +106,7 @@ def test_linear_elements_take_part_as_they_are():
     brick = ELEMENTS["KinematicLinear3D8N"]
     rule = kl.quadrature.hexahedron(degree=1)  # a choice of its own, to be kept
     second = ElementGroup(brick, rule, STEEL, quadratic.nodes[1:, :8], np.array([1]))
-    level = linear_level(points, [first, second])
+    level = p_coarse_level(points, [first, second])
     used = np.unique(np.concatenate([first.nodes.ravel(), second.nodes.ravel()]))
     P = interpolation(level, len(points))
     np.testing.assert_allclose((P @ points[level.nodes])[used], points[used], rtol=0, atol=1e-14)
@@ -135,7 +135,7 @@ def test_shapes_without_corners_have_no_level():
         other = ElementGroup(
             KinematicLinearShifted, KinematicLinearShifted.rule, STEEL, group.nodes, group.rows
         )
-        assert linear_level(points, [other]) is None
+        assert p_coarse_level(points, [other]) is None
 
 
 # ---- ties -------------------------------------------------------------------------------------------
@@ -168,8 +168,8 @@ def test_ties_along_one_axis_leave_the_level_as_it_is():
     model = periodic("y", (2, 2, 2))
     constraints = model.supports.constraint_map
     system = ConstrainedSystem(model.mesh.points, model.element_groups(), constraints, solver="amg")
-    level = linear_level(system.points, system.groups)
-    assert tied(level, system.reduced.T, system.reduced.free) is level
+    level = p_coarse_level(system.points, system.groups)
+    assert apply_ties(level, system.constraint_map.T, system.constraint_map.free) is level
     assert model.solve("amg").report.backward_error < 1e-14
 
 
@@ -181,17 +181,17 @@ def test_hanging_nodes_need_no_ties():
     system = ConstrainedSystem(
         mesh.points, model.element_groups(), model.supports.constraint_map, hanging=mesh.hanging
     )
-    level = linear_level(system.points, system.groups, mesh.hanging)
-    assert system.reduced.T is not None
-    assert tied(level, system.reduced.T, system.reduced.free) is level
+    level = p_coarse_level(system.points, system.groups, mesh.hanging)
+    assert system.constraint_map.T is not None
+    assert apply_ties(level, system.constraint_map.T, system.constraint_map.free) is level
 
 
 def test_a_level_under_ties_moves_rigidly():
     model = periodic(cells=(2, 2, 2))
     constraints = model.supports.constraint_map
     system = ConstrainedSystem(model.mesh.points, model.element_groups(), constraints, solver="amg")
-    level = linear_level(system.points, system.groups)
-    kept = tied(level, system.reduced.T, system.reduced.free)
+    level = p_coarse_level(system.points, system.groups)
+    kept = apply_ties(level, system.constraint_map.T, system.constraint_map.free)
     shape = (model.mesh.n_nodes, len(level.nodes))
     P = csr_array((kept.weights, kept.indices, kept.indptr), shape=shape)
     ones = np.ones(P.shape[1])

@@ -12,6 +12,7 @@ from kratos_lite.assembly.stiffness import assemble_stiffness
 from kratos_lite.errors import SolveError
 from kratos_lite.solvers import direct
 from kratos_lite.solvers.linear_solver import LinearSolver
+from kratos_lite.solvers.plan import Plan
 
 
 def has_pardiso():
@@ -35,7 +36,7 @@ def block(fixed=True):
     groups = model.element_groups()
     points = model.mesh.points
     K = assemble_stiffness(points, groups, Pattern(len(points), [group.nodes for group in groups]))
-    return LinearSolver(K, model.supports.constraint_map(np.arange(len(points))), points, "direct", "")
+    return LinearSolver(K, model.supports.constraint_map(np.arange(len(points))), points, Plan("direct"))
 
 
 def right_side(n, seed=1):
@@ -56,7 +57,7 @@ def skew(n=200):
 @pytest.mark.parametrize("backend", SPARSE)
 def test_backends_solve_a_stiffness_matrix(backend, monkeypatch):
     monkeypatch.setattr(direct, "BACKENDS", (backend,))
-    A = block()._sparse
+    A = block()._matrix
     b = right_side(A.shape[0])
     factors = direct.factorize(A)
     assert factors.method == backend.__name__
@@ -74,7 +75,7 @@ def test_backends_solve_a_matrix_that_is_not_symmetric(backend, monkeypatch):
 
 
 def test_dense_factors_solve_both_kinds():
-    for A in (block()._sparse.toarray(), skew()):
+    for A in (block()._matrix.toarray(), skew()):
         b = right_side(len(A))
         factors = direct.factorize_dense(A)
         assert factors.method == "dense"
@@ -132,12 +133,12 @@ def test_a_second_right_side_does_not_factorize_again(method, monkeypatch):
         monkeypatch.setattr(direct, name, counted(name))
     equations = block()
     if method == "dense":
-        equations.K, equations.method = equations.K.scipy().toarray(), "dense"
+        equations.K, equations.plan = equations.K.scipy().toarray(), Plan("dense")
     K = block().K
     for seed in (1, 2, 3):
         f = right_side(K.shape[0], seed)
         solution = equations.solve(f, 1e-10)
-        free = equations.reduced.free
+        free = equations.constraint_map.free
         np.testing.assert_allclose((K @ solution.x)[free], f[free], rtol=0, atol=1e-10)
     assert count == ["factorize_dense" if method == "dense" else "factorize"]
 

@@ -9,8 +9,7 @@ import kratos_lite as kl
 from kratos_lite.assembly.stiffness import assemble_dense
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.solvers import block_inverse as block_inverse_module
-from kratos_lite.solvers import dilatation, displacement_pressure, multigrid
-from kratos_lite.solvers import linear_solver as equations
+from kratos_lite.solvers import dilatation, displacement_pressure, multigrid, plan
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.dilatation import SplitMatrix
 from kratos_lite.solvers.displacement_pressure import MAX_ITERATIONS
@@ -92,7 +91,7 @@ def check(model, limit, rtol=1e-8):
 @pytest.fixture(autouse=True)
 def to_the_tolerance(monkeypatch):
     """Few unknowns are iterated to round-off otherwise, like a factorization."""
-    monkeypatch.setattr(equations, "ROUND_OFF", 1e-8)
+    monkeypatch.setattr(plan, "ROUND_OFF", 1e-8)
 
 
 # ---- iterations ------------------------------------------------------------------------------------------
@@ -444,7 +443,7 @@ def test_a_factorization_takes_over(monkeypatch):
 
 def test_too_many_unknowns_to_factorize_are_refused(monkeypatch):
     monkeypatch.setattr("kratos_lite.solvers.displacement_pressure.MAX_ITERATIONS", 5)
-    monkeypatch.setattr(equations, "FALLBACK_LIMIT", 100)
+    monkeypatch.setattr(plan, "FALLBACK_LIMIT", 100)
     with pytest.raises(
         kl.SolveError, match=r"too many to factorize instead; look for thin elements, for plain"
     ):

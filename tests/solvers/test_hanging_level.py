@@ -7,7 +7,7 @@ import kratos_lite as kl
 from kratos_lite.assembly.gauss_point_fields import totals
 from kratos_lite.mesh.refinement import refine
 from kratos_lite.model.refined import refined
-from kratos_lite.solvers.coarse_level import linear_level
+from kratos_lite.solvers.coarse_level import p_coarse_level
 from kratos_lite.verification.meshes import warped
 
 
@@ -31,7 +31,7 @@ def test_its_fields_are_linear_continuous_and_have_their_energy(element):
     else:
         model = corner_model(element, 2)
     mesh, groups = model.mesh, model.element_groups()
-    level = linear_level(mesh.points, groups, mesh.hanging)
+    level = p_coarse_level(mesh.points, groups, mesh.hanging)
     P = np.zeros((mesh.n_nodes, len(level.nodes)))
     rows = np.repeat(np.arange(mesh.n_nodes), np.diff(level.indptr))
     np.add.at(P, (rows, level.indices), level.weights)

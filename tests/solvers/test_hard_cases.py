@@ -9,8 +9,7 @@ import kratos_lite as kl
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.mesh import Block
 from kratos_lite.native import kernels
-from kratos_lite.solvers import coarse_level
-from kratos_lite.solvers import linear_solver as equations
+from kratos_lite.solvers import coarse_level, plan
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.constraint_map import rigid_modes
 from kratos_lite.solvers.multigrid import Compiled
@@ -49,7 +48,7 @@ def check(model, rtol=1e-8):
 @pytest.fixture(autouse=True)
 def to_the_tolerance(monkeypatch):
     """Few unknowns are iterated to round-off otherwise, like a factorization."""
-    monkeypatch.setattr(equations, "ROUND_OFF", 1e-10)
+    monkeypatch.setattr(plan, "ROUND_OFF", 1e-10)
 
 
 @pytest.mark.parametrize("element", CELLS)
@@ -168,7 +167,7 @@ def test_lines_of_a_plate_interpolate_constant_curvature(element):
     groups = kl.Model(mesh, STEEL).element_groups()
     lines = np.unique(np.round(mesh.points[:, :2], 9), axis=0, return_inverse=True)[1].ravel()
     axes = plate_axes(points, free)
-    level = plate_level(points, free, axes, lines, coarse_level.linear_level(points, groups))
+    level = plate_level(points, free, axes, lines, coarse_level.p_coarse_level(points, groups))
     nodes = np.repeat(np.arange(len(points)), np.diff(level.indptr))
     found = np.zeros((len(points), 3, 9))
     modes = level.modes.reshape(-1, 6, 12)[level.indices, :, :9]
@@ -216,7 +215,7 @@ def test_modes_of_a_shell_hold_its_rigid_motions():
     points, groups = model.mesh.points, model.element_groups()
     flat = kl.box((1.5, 1.0, 0.01), (12, 12, 1), "KinematicLinear3D20N").points
     lines = np.unique(np.round(flat[:, :2], 9), axis=0, return_inverse=True)[1].ravel()
-    linear = coarse_level.linear_level(points, groups)
+    linear = coarse_level.p_coarse_level(points, groups)
     level = plate_level(points, np.ones(points.size, dtype=bool), None, lines, linear)
     own = level.indptr[linear.nodes]  # each corner belongs to one line
     modes = level.modes.reshape(-1, 6, 12)[level.indices[own], :, :6]
@@ -236,7 +235,7 @@ def test_lines_that_are_no_shell_are_left(case):
         lines = np.arange(len(mesh.points))
     free = np.ones((len(mesh.points), 3), dtype=bool)
     free[:, 2] = case != "plane strain"
-    linear = coarse_level.linear_level(mesh.points, kl.Model(mesh, STEEL).element_groups())
+    linear = coarse_level.p_coarse_level(mesh.points, kl.Model(mesh, STEEL).element_groups())
     assert plate_level(mesh.points, free.ravel(), None, lines, linear) is None
 
 
@@ -300,8 +299,8 @@ def hierarchy(model):
     module = kernels("multigrid")
     system = ConstrainedSystem(model.mesh.points, model.element_groups(), model.supports.constraint_map)
     free = np.zeros(3 * len(system.points), dtype=bool)
-    free[system.reduced.free] = True
-    linear = coarse_level.linear_level(system.points, system.groups)
+    free[system.constraint_map.free] = True
+    linear = coarse_level.p_coarse_level(system.points, system.groups)
     b = np.random.default_rng(1).standard_normal(len(free)) * free
     return Compiled(module, system.K, free, system.points, linear), b
 
@@ -374,7 +373,7 @@ def incompressible():
 
 
 def test_an_iteration_slower_than_a_factorization_stops_early(monkeypatch):
-    monkeypatch.setattr("kratos_lite.solvers.iteration.PATIENCE", 70)
+    monkeypatch.setattr("kratos_lite.solvers.plan.PATIENCE", 70)
     model = incompressible()
     result = model.solve("amg")
     assert result.report.solver == "direct"
@@ -386,21 +385,14 @@ def test_an_iteration_slower_than_a_factorization_stops_early(monkeypatch):
 
 
 def test_a_slow_iteration_goes_on_where_a_factorization_is_slower(monkeypatch):
-    monkeypatch.setattr("kratos_lite.solvers.iteration.PATIENCE", 70)
-    monkeypatch.setattr(equations, "quick_to_factorize", lambda unknowns: False)
+    monkeypatch.setattr("kratos_lite.solvers.plan.PATIENCE", 70)
+    monkeypatch.setattr("kratos_lite.solvers.linear_solver.is_quick_to_factorize", lambda unknowns: False)
     model = incompressible()
     result = model.solve("amg")
     assert result.report.solver == "amg"
     assert result.report.iterations > 70
     exact = model.solve("direct").u
     np.testing.assert_allclose(result.u, exact, rtol=0, atol=1e-7 * np.abs(exact).max())
-
-
-@pytest.mark.parametrize(("installed", "limit"), [(True, 150_000), (False, 30_000)])
-def test_superlu_is_quick_on_fewer_unknowns(monkeypatch, installed, limit):
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: object() if installed else None)
-    assert equations.quick_to_factorize(limit)
-    assert not equations.quick_to_factorize(limit + 1)
 
 
 def bonded(kind, thickness, layers=40):

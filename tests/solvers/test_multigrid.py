@@ -13,7 +13,7 @@ from kratos_lite.elements import ELEMENTS
 from kratos_lite.mesh.blocks import Block
 from kratos_lite.native import kernels
 from kratos_lite.solvers import multigrid
-from kratos_lite.solvers.coarse_level import linear_level
+from kratos_lite.solvers.coarse_level import p_coarse_level
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 
 STEEL = kl.Isotropic3D(E=2e11, nu=0.3, density=7850.0)
@@ -461,7 +461,7 @@ def test_wrong_shapes_are_refused():
 def test_a_linear_level_of_the_wrong_shape_is_refused():
     model = clamped(box(kind="20N", cells=(2, 2, 2)))
     system, _ = equations(model)
-    K, level = matrix_of(system), linear_level(system.points, system.groups)
+    K, level = matrix_of(system), p_coarse_level(system.points, system.groups)
     below = MODULE.Matrix(level.K.indptr, level.K.indices, level.K.data)
     fixed, corners = np.zeros(K.shape[0], np.uint8), np.zeros(level.K.shape[0], np.uint8)
     points, inner = np.zeros((K.shape[0] // 3, 3)), np.zeros((len(corners) // 3, 3))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.solvers.coarse_level import linear_level
+from kratos_lite.solvers.coarse_level import p_coarse_level
 from kratos_lite.solvers.plate_level import _shell_modes, plate_axes, plate_level
 
 
@@ -21,7 +21,7 @@ def test_a_shell_most_of_whose_normal_displacements_are_constrained_does_not_ben
     mesh = kl.annulus(1.0, 1.02, 2.0, (1, 24, 12))
     points = mesh.points
     model = kl.Model(mesh, kl.Isotropic3D(E=1.0, nu=0.3))
-    level = linear_level(points, model.element_groups(), None)
+    level = p_coarse_level(points, model.element_groups(), None)
     angle = np.round(np.arctan2(points[:, 1], points[:, 0]) % (2 * np.pi), 6)
     _, labels = np.unique(np.column_stack([angle, np.round(points[:, 2], 6)]), axis=0, return_inverse=True)
     free = np.ones((len(points), 3), dtype=bool)

@@ -3,8 +3,10 @@
 import pytest
 
 from kratos_lite.verification import page
+from kratos_lite.verification.sources import SOURCES
 from tests.verification.moving import (
     bodies_in_motion,
+    known_values,
     moving_frames,
     moving_material,
     rotors,
@@ -21,3 +23,9 @@ ELEMENTS = ("KinematicLinear3D10N", "KinematicLinear3D20N")
 def test_known_values_are_found(family):
     rows = [problem.row(kind) for problem in family.PROBLEMS for kind in problem.elements(ELEMENTS)]
     assert [page.line(row) for row in rows if row.failed or row.grade in ("D", "F")] == []
+
+
+def test_every_known_value_has_a_source():
+    cited = {problem.cited for family in FAMILIES for problem in family.PROBLEMS}
+    assert cited <= {*SOURCES, *known_values.SOURCES}
+    assert {*known_values.SOURCES} <= cited

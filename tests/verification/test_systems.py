@@ -7,6 +7,7 @@ from meshes import changed_at
 import kratos_lite as kl
 from kratos_lite.analysis import static as statics
 from kratos_lite.solvers import constrained_system as system
+from kratos_lite.solvers import plan
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.constraint_map import MultiPointConstraint
 
@@ -171,7 +172,7 @@ def test_what_was_held_may_be_moved_later():
 
 def test_a_matrix_too_large_is_refused_each_time(monkeypatch):
     """One part fits, both do not: what is refused must not be taken for solved."""
-    monkeypatch.setattr(system, "DENSE_MAX", 100)
+    monkeypatch.setattr(plan, "DENSE_MAX", 100)
     two = kl.box((4, 1, 1), (4, 2, 2))
     two = two.replace(blocks=[two.blocks[0].take(np.r_[0:4, 12:16])])
     model = kl.Model(two, STEEL)
@@ -211,7 +212,7 @@ def test_equations_alone_reduce_expand_and_multiply(solver):
     one = ConstrainedSystem(mesh.points, model.element_groups(), supports.constraint_map, solver=solver)
     assert one.nodes.tolist() == list(range(36))
     rng = np.random.default_rng(4)
-    q = rng.standard_normal(len(one.reduced.free))
+    q = rng.standard_normal(len(one.constraint_map.free))
     u = one.expand(q)
     assert u.shape == (37, 3)
     assert u[35, 1] == pytest.approx(0.5 * u[34, 1] + 1e-4)

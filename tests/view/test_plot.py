@@ -102,9 +102,9 @@ def test_own_values_of_nodes_and_of_elements(result):
 
 @pytest.mark.parametrize("given", ["von_mise", "sxz", "VON_MISES_STRESS"])
 def test_an_unknown_name_of_values_is_refused_with_all_names(result, given):
-    with pytest.raises(kl.InputError, match=r"there are no values .*; there are displacement, ux, .*, error"):
+    with pytest.raises(kl.InputError, match=r"unknown field .*; there are displacement, ux, .*, error"):
         result.plot(values=given)
-    with pytest.raises(kl.InputError, match="a mesh or a model has no values 'sxx'"):
+    with pytest.raises(kl.InputError, match="a mesh or a model has no field 'sxx'"):
         kl.plot(result.mesh, values="sxx")
 
 

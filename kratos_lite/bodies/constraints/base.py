@@ -37,7 +37,7 @@ class Constraint(ABC):
     Attributes
     ----------
     points : (m, 3) m, in the undeformed body.
-    positional : whether it is about positions, so that it also holds a body at rest.
+    positional : whether it is about positions, so that it also constrains a body at rest.
     turning : whether its directions change as the body moves.
     reactions : (m, 3) N, mean force on the points over the last step.
 

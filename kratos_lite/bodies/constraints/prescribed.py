@@ -12,7 +12,7 @@ from kratos_lite.time_series import Factor, function_of, integral_of
 from kratos_lite.typing import Array
 
 SHORT = 1e-3
-"""Share of a step over which the slope of a displacement is taken."""
+"""Fraction of a step over which the slope of a displacement is taken."""
 
 
 class PrescribedDisplacement(AlongDirection):

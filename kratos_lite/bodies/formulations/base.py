@@ -24,16 +24,13 @@ from kratos_lite.bodies.linear_algebra import Solve
 from kratos_lite.elements.formulations import NON_LOCKING
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.registry import Registry
+from kratos_lite.solvers import plan
 from kratos_lite.solvers.banded import Factorizer
 from kratos_lite.solvers.constraint_map import ConstraintMap
 from kratos_lite.solvers.linear_solver import LinearSolver
 from kratos_lite.solvers.mass import Mass
 from kratos_lite.typing import Array
 
-FACTORIZED_MAX = 4000
-"""Up to this many displacements a matrix for each step is factorized."""
-FACTORIZED_ONCE_MAX = 30_000
-"""Up to this many a matrix for all steps is."""
 RESIDUAL = 1e-13
 """Relative residual at which an iteration stops: momentum is as exact."""
 
@@ -84,7 +81,7 @@ class Formulation(ABC):
     @property
     def is_large(self) -> bool:
         """Whether it takes less time to iterate with multigrid than to factorize a matrix for each step."""
-        return self.points.size > FACTORIZED_MAX
+        return self.points.size > plan.STEPPED_LIMIT
 
     def _factorized(self, K: BlockMatrix, c: float, symmetric: bool = True, iterate: bool = False) -> Solve:
         """Return what solves (M + c K) x = b, made ready by a factorization or by multigrid."""
@@ -98,7 +95,7 @@ class Formulation(ABC):
     def _iterated(self, A: BlockMatrix) -> Solve:
         """Return what solves A x = b by conjugate gradients with multigrid."""
         every = ConstraintMap(np.arange(self.points.size), np.zeros(self.points.size))
-        equations = LinearSolver(A, every, self.points, "amg", "a matrix for each step")
+        equations = LinearSolver(A, every, self.points, plan.Plan("amg", "a matrix for each step"))
 
         def solve(b: Array) -> Array:
             columns = b.reshape(len(b), -1).T

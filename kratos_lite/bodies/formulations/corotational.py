@@ -9,10 +9,10 @@ import numpy as np
 from kratos_lite.assembly import finite_strain
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.bodies.formulations import base
 from kratos_lite.bodies.formulations.base import Formulation
 from kratos_lite.bodies.linear_algebra import Solve
 from kratos_lite.bodies.rotations import polar
+from kratos_lite.solvers import plan
 from kratos_lite.solvers.mass import Mass
 from kratos_lite.typing import Array
 
@@ -90,4 +90,4 @@ class Corotational(Formulation):
         return rotated
 
     def _inverse(self, c: float) -> Solve:
-        return self._factorized(self.K0, c, iterate=self.points.size > base.FACTORIZED_ONCE_MAX)
+        return self._factorized(self.K0, c, iterate=self.points.size > plan.REPEATED_LIMIT)

@@ -124,7 +124,7 @@ def _write(path: str | Path, document: Document) -> list[str]:
 
 def _mixed(document: Document) -> list[str]:
     """Note constraints between different directions, which Kratos 10 shifts by one when it reads them."""
-    mixed = [c.id for c in document.constraints if {name for _, name in c.masters} - {c.slave[1]}]
+    mixed = [c.id for c in document.constraints if {name for _, name in c.independents} - {c.dependent[1]}]
     shown = ", ".join(map(str, mixed[:5])) + (" …" if len(mixed) > 5 else "")
     text = f"constraints {shown} mix directions; kratos_lite reads them as meant, Kratos does not"
     return [text] if mixed else []

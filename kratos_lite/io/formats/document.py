@@ -41,14 +41,14 @@ class Data:
 
 @dataclass(frozen=True)
 class Constraint:
-    """One linear multi-point constraint: u[slave] = sum(weights · u[masters]) + constant.
+    """One linear multi-point constraint: u[dependent] = sum(weights · u[independents]) + constant.
 
     Degrees of freedom are (node id, variable name) pairs.
     """
 
     id: int
-    slave: tuple[int, str]
-    masters: tuple[tuple[int, str], ...]
+    dependent: tuple[int, str]
+    independents: tuple[tuple[int, str], ...]
     weights: tuple[float, ...]
     constant: float
     line: int = 0

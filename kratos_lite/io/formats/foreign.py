@@ -32,7 +32,7 @@ class Cells:
 
 @dataclass
 class Found:
-    """What meshio finds in a file; data that are no numbers are None.  `output` is what meshio says."""
+    """What meshio finds in a file; non-numeric data are None.  `output` is what meshio says."""
 
     points: Numbers
     cells: list[Cells]
@@ -63,7 +63,7 @@ def read_foreign(path: Path) -> Found:
     counts = [len(one.data) for one in cells]
     for name, values in sets["cell_data"].items():
         if not isinstance(values, list) or [-1 if v is None else len(v) for v in values] != counts:
-            sets["cell_data"][name] = []  # no numbers: its name is all that is of use
+            sets["cell_data"][name] = []  # not numeric: its name is all that is of use
     return Found(points, cells, **sets, output=output.getvalue())
 
 
@@ -85,7 +85,7 @@ def _rows(data: Any) -> Numbers:
 
 
 def _numbers(value: Any) -> Any:
-    """Return a value with its arrays in the byte order of this machine; None for what is no numbers."""
+    """Return a value with its arrays in the byte order of this machine; None where it is not numeric."""
     if isinstance(value, dict):
         return {str(name): _numbers(one) for name, one in value.items()}
     if isinstance(value, list) and any(one is None or isinstance(one, np.ndarray) for one in value):
@@ -100,7 +100,7 @@ def _numbers(value: Any) -> Any:
 
 
 def check_ending(path: Path, own: str = ".mdpa .elem") -> None:
-    """Refuse an ending that meshio does not know, in words rather than by leaving the program."""
+    """Refuse an ending that meshio does not know, where meshio would end the program."""
     import meshio
 
     endings = sorted(set(meshio.extension_to_filetypes) - OURS)

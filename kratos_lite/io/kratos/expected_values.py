@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from kratos_lite.analysis.fields import listed
 from kratos_lite.analysis.result import Result
 from kratos_lite.errors import InputError
 from kratos_lite.io.kratos.context import RunContext, interval_of
@@ -19,7 +20,8 @@ from kratos_lite.typing import Array, Ints
 
 Comparison: TypeAlias = Callable[[Result], str]
 """Compares a result with what a file expects and says so in one line."""
-FIELDS = ("DISPLACEMENT", "REACTION")
+VECTORS = {field.kratos: name for name, field in listed("node").items() if field.kind == "vector"}
+"""Nodal fields that are compared."""
 NODE_KEYS = (
     "help", "mesh_id", "model_part_name", "variable_name", "interval", "value", "tolerance_rank",
     "reference_conf", "local_axes",
@@ -37,21 +39,21 @@ class NodeComparison:
 
     what: str  # name of the check.
     component: str  # such as ``DISPLACEMENT_X``.
-    rows: Ints  # (m,) int, node rows.
-    # called with the result and rows; returns expected values and allowed differences of these.
+    indices: Ints  # (m,) int, node indices.
+    # called with the result and indices; returns expected values and allowed differences of these.
     expected: Callable[[Result, Ints], tuple[Array, Array]]
 
     def __call__(self, result: Result) -> str:
         """Return ``check … passed`` or ``failed`` with the numbers of the worst node."""
         name, _, axis = self.component.rpartition("_")
-        if name not in FIELDS or axis not in ("X", "Y", "Z"):
+        if name not in VECTORS or axis not in ("X", "Y", "Z"):
             return f"check {self.what} not evaluated: kratos_lite has no nodal {self.component}"
-        values = result.displacement() if name == "DISPLACEMENT" else result.reaction()
-        if not len(self.rows):
+        values = result.field(VECTORS[name], "node")
+        if not len(self.indices):
             return f"check {self.what} not evaluated: its part has no nodes"
-        found = values[self.rows, "XYZ".index(axis)]
+        found = values[self.indices, "XYZ".index(axis)]
         try:
-            worst = _worst(result.mesh.node_ids[self.rows], found, *self.expected(result, self.rows))
+            worst = _worst(result.mesh.node_ids[self.indices], found, *self.expected(result, self.indices))
         except ValueError as error:
             return f"check {self.what} not evaluated: {error}"
         excess, node, number, expected, allowed = worst
@@ -80,7 +82,7 @@ def node_comparisons(settings: Settings, context: RunContext) -> Iterator[Compar
     settings.check_keys(NODE_KEYS)
     refuse_local_axes(settings)
     name, part = settings.text("variable_name"), settings.text("model_part_name")
-    rows, value, time = context.part(settings).nodes, settings.get("value", 0.0), context.times[-1]
+    indices, value, time = context.part(settings).nodes, settings.get("value", 0.0), context.times[-1]
     rank, span = settings.integer("tolerance_rank", 3), interval_of(settings)
     text = f"tolerance_rank is a number of decimals; got {rank}"
     settings.expect(abs(rank) <= 30, "tolerance_rank", text)
@@ -94,16 +96,16 @@ def node_comparisons(settings: Settings, context: RunContext) -> Iterator[Compar
         settings.expect(fits, "value", f"must be a number or an expression; got {shown(one)}")
         if span.begin <= time < span.end:
             expected = partial(_from_expression, str(one), time, moved, 0.5 * 10.0**-rank)
-            yield NodeComparison(what, name + suffix, rows, expected)
+            yield NodeComparison(what, name + suffix, indices, expected)
         else:
             yield _idle(what, f"time {time:g} s is outside its interval")
 
 
 def _from_expression(
-    text: str, time: float, moved: bool, allowed: float, result: Result, rows: Ints
+    text: str, time: float, moved: bool, allowed: float, result: Result, indices: Ints
 ) -> tuple[Array, Array]:
     """Return the values of an expression in x, y, z, t, as Python reads it, and the allowed differences."""
-    points = result.mesh.points[rows] + (result.displacement()[rows] if moved else 0.0)
+    points = result.mesh.points[indices] + (result.displacement()[indices] if moved else 0.0)
     x, y, z = points.T
     value = evaluate(text, {"x": x, "y": y, "z": z, "t": time}, python=True)
     # A difference that rounds to zero is at most half a unit of the last decimal.
@@ -124,12 +126,12 @@ def file_comparisons(settings: Settings, context: RunContext) -> Iterator[Compar
         return
     key = "sub_model_part_name" if settings.text("sub_model_part_name", "") else "model_part_name"
     context.part(settings)
-    rows, data = context.part(settings, key).nodes, read_settings(path)
+    indices, data = context.part(settings, key).nodes, read_settings(path)
     tolerances = settings.number("tolerance", 1e-3), settings.number("relative_tolerance", 1e-6)
     for variable in settings.texts("check_variables"):
-        for component in [f"{variable}_{axis}" for axis in "XYZ"] if variable in FIELDS else [variable]:
+        for component in [f"{variable}_{axis}" for axis in "XYZ"] if variable in VECTORS else [variable]:
             expected = partial(_from_table, data, component, context.times[-1], tolerances)
-            yield NodeComparison(f"{component} {what}", component, rows, expected)
+            yield NodeComparison(f"{component} {what}", component, indices, expected)
     for variable in settings.texts("gauss_points_check_variables"):
         yield _idle(f"{variable} {what}", "values at Gauss points are not compared")
 
@@ -140,13 +142,13 @@ def _from_table(
     time: float,
     tolerances: tuple[float, float],
     result: Result,
-    rows: Ints,
+    indices: Ints,
 ) -> tuple[Array, Array]:
     """Return the values at a time in a file of json_output_process, and the allowed differences."""
     times = data.numbers("TIME")
     if not times or not times[0] - 1e-9 <= time <= times[-1] + 1e-9:
         raise ValueError(f"the file has no values at time {time:g} s")
-    nodes = [data.section(f"NODE_{i}", required=True) for i in result.mesh.node_ids[rows]]
+    nodes = [data.section(f"NODE_{i}", required=True) for i in result.mesh.node_ids[indices]]
     series = [node.numbers(component) for node in nodes]
     if any(len(values) != len(times) for values in series):
         raise ValueError(f"{component} must be a list with one number for each TIME")

@@ -33,14 +33,14 @@ def materials_of(
 
 def _assign(entry: Settings, context: RunContext, document: Document, number: int) -> None:
     """Give the elements of the part their properties id."""
-    rows, parts = context.part(entry).elements, context.mesh.parts
-    filled = [len(rows) > 0, *(len(part.elements) > 0 for part in parts.values())]
+    elements, parts = context.part(entry).elements, context.mesh.parts
+    filled = [len(elements) > 0, *(len(part.elements) > 0 for part in parts.values())]
     is_there, *filled = filled
     have = [f"{context.root} (all)", *(name for name, some in zip(parts, filled, strict=True) if some)]
     text = f"part {entry.text('model_part_name')!r} has no elements to carry a material; parts with elements"
     entry.expect(is_there, "model_part_name", f"{text} are {', '.join(have)}")
     mask = np.zeros(context.mesh.n_elements, dtype=bool)
-    mask[rows] = True
+    mask[elements] = True
     blocks = [
         replace(block, properties=np.where(mask[at], number, block.properties))
         for block, at in with_rows(document.mesh.blocks)

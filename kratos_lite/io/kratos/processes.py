@@ -38,7 +38,7 @@ class Action:
     """One component that a process sets, fixes or both."""
 
     settings: Settings  # its parameters, for messages.
-    rows: Ints  # node or condition rows.
+    indices: Ints  # node or condition indices.
     component: str  # scalar variable, such as ``DISPLACEMENT_X``.
     # the value is their product, each a number or an expression; empty to leave it as it is.
     factors: tuple[Value, ...]
@@ -70,9 +70,9 @@ class Action:
 
     def put(self, values: Variables, places: tuple[Array, Array], time: float) -> None:
         """Set the values that they are at a time in s; places are those of nodes and conditions."""
-        value = self.value(places[self.on_conditions][self.rows], time)
+        value = self.value(places[self.on_conditions][self.indices], time)
         fields = values.conditional if self.on_conditions else values.nodal
-        fields.put(self.component, self.rows, value)
+        fields.put(self.component, self.indices, value)
 
 
 def _value(settings: Settings, value: Any, key: str) -> Value:
@@ -146,7 +146,7 @@ def actions_of(entry: Settings, module: str, context: RunContext) -> list[Action
     refuse_local_axes(settings)
     settings.check_keys([*COMMON, *process.keys, "entities" if process.on_conditions else "constrained"])
     name, part = _variable(settings, process), context.part(settings)
-    rows, interval = part.conditions if process.on_conditions else part.nodes, interval_of(settings)
+    indices, interval = part.conditions if process.on_conditions else part.nodes, interval_of(settings)
     names = [f"{name}_{axis}" for axis in "XYZ"] if process.is_vector else [name]
     components = zip(names, process.factors(settings), _fixed(settings, process), strict=False)
     steps = [step for step, time in enumerate(context.times) if time in interval]
@@ -156,7 +156,7 @@ def actions_of(entry: Settings, module: str, context: RunContext) -> list[Action
         if factors or (fix and factors is not None):
             acting = steps if factors and not process.on_conditions else later
             conditions = process.on_conditions
-            actions.append(Action(settings, rows, component, factors, interval, acting, conditions, fix))
+            actions.append(Action(settings, indices, component, factors, interval, acting, conditions, fix))
     return actions
 
 
@@ -200,7 +200,7 @@ def notes_of(actions: Sequence[Action], context: RunContext) -> list[str]:
     notes = []
     for action in actions:
         where = action.settings.path.removesuffix(".Parameters")
-        if not action.steps or (context.mesh.whole and not len(action.rows)):
+        if not action.steps or (context.mesh.whole and not len(action.indices)):
             why = "its part has none to act on" if action.steps else "its interval holds no step"
             notes.append(f"{where}: {action.component} is never set: {why}")
         elif context.moved and action.steps[-1] > 1 and action.mentions("xyz"):
@@ -234,12 +234,12 @@ def _hold(actions: Sequence[Action], last: int, values: Variables) -> None:
     supports = [action for action in actions if action.fixed and action.steps]
     for action in supports:
         if action.steps[0] < last:
-            values.fix(action.component, action.rows, False)
+            values.fix(action.component, action.indices, False)
     for action in supports:
         # What is fixed at the start, before the first step, stays so through that step.
         if action.steps[-1] == last or (action.steps == [0] and last == 1):
             _check_history(action, last)
-            values.fix(action.component, action.rows)
+            values.fix(action.component, action.indices)
 
 
 def _check_history(action: Action, last: int) -> None:

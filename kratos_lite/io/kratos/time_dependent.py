@@ -31,7 +31,7 @@ class ProcessesInTime:
     def __init__(self, actions: Sequence[Action], context: RunContext) -> None:
         self.context = context
         self.notes = notes_of(actions, context)
-        self.actions = [action for action in actions if action.steps and len(action.rows)]
+        self.actions = [action for action in actions if action.steps and len(action.indices)]
         self.displacement: Array | None = None
         self.velocity: Array | None = None
         self._later: list[Load] = []
@@ -45,7 +45,7 @@ class ProcessesInTime:
         set_values(self.actions, self.context.times, values)
         for action in self.actions:
             if action.fixed:
-                values.fix(action.component, action.rows)
+                values.fix(action.component, action.indices)
         for i, action in enumerate(self.actions):
             if action.component.startswith("DISPLACEMENT") and action.factors:
                 self._move(i, action, values)
@@ -62,8 +62,8 @@ class ProcessesInTime:
         """Give a model the loads and supports that change, and let all loads begin with the first step."""
         loads: list[Load] = [ScaledLoad(load, _begun) for load in model.loads]
         model.loads[:] = [*loads, *self._later]
-        for rows, axis, motion in self._moving:
-            model.fix(rows, axis, motion, override=True)
+        for indices, axis, motion in self._moving:
+            model.fix(indices, axis, motion, override=True)
         if model.loads:
             model.notes.append("as in Kratos, the acceleration at the start is 0: loads act after t = 0")
         if self._moving:
@@ -106,13 +106,13 @@ class ProcessesInTime:
         for action in self.actions:
             name = action.component
             if action.steps[0] == 0 and action.factors:
-                value = action.value(points[action.rows], self.context.times[0])
-                start.nodal.put(name, action.rows, value)
+                value = action.value(points[action.indices], self.context.times[0])
+                start.nodal.put(name, action.indices, value)
                 is_still = not name.startswith("ACCELERATION") or not np.any(value)
                 text = f"{name} cannot be given; the acceleration at the start is 0"
                 action.settings.expect(is_still, "variable_name", text)
             if action.fixed and name.startswith("DISPLACEMENT"):
-                start.fix(name, action.rows)
+                start.fix(name, action.indices)
         u, v = start.nodal.vector("DISPLACEMENT"), start.nodal.vector("VELOCITY")
         fixed = [start.fixed.get(f"DISPLACEMENT_{axis}", np.zeros(len(v), bool)) for axis in "XYZ"]
         if v[np.transpose(fixed)].any():
@@ -123,8 +123,8 @@ class ProcessesInTime:
         """Keep the motion of the supports that an action gives; refuse one of a part of the run."""
         name, expect = action.component, action.settings.expect
         fixed = values.fixed.get(name, np.zeros(values.mesh.n_nodes, dtype=bool))
-        rows = action.rows[fixed[action.rows]]
-        if not len(rows) or self._acts(action) == 0:
+        indices = action.indices[fixed[action.indices]]
+        if not len(indices) or self._acts(action) == 0:
             return
         text = (
             f"{name} of a support changes in a part of the run only; give it as one function of t with the "
@@ -132,13 +132,13 @@ class ProcessesInTime:
         expect(self._acts_always(action), "interval", text + 'interval [0.0, "End"]')
         for later in self.actions[i + 1 :]:
             if later.component == name and later.factors and self._acts_always(later):
-                rows = np.setdiff1d(rows, later.rows)
-        if not action.mentions("t") or not len(rows):
+                indices = np.setdiff1d(indices, later.indices)
+        if not action.mentions("t") or not len(indices):
             return
         text = f"{name}: a support may move with x, y, z or with t, not with both; "
         expect(not action.mentions("xyzXYZ"), "value", text + "give each part a process of its own")
         point = np.zeros((1, 3))
-        self._moving.append((rows, name[-1].lower(), lambda t: float(action.value(point, t))))
+        self._moving.append((indices, name[-1].lower(), lambda t: float(action.value(point, t))))
 
     def _acts(self, action: Action) -> int:
         """Return the number of steps, without the start, in which an action acts."""

@@ -38,7 +38,7 @@ def document_from(model: Model) -> Document:
     }
     for what, is_present in unwritten.items():
         if is_present:
-            raise InputError(f"{what} cannot be written to a file of a model; leave it to the run file")
+            raise InputError(f"{what} cannot be written to a file of a model; leave it to a script")
     mesh, start = model.mesh, _initial_displacement(model)
     gravity, others = _split_loads(model)
     numbers, properties = _properties(model, gravity)
@@ -63,12 +63,12 @@ def _blocks(model: Model, numbers: Ints) -> list[Block]:
         for group in groups:
             names[group.rows] = group.element.__name__
     blocks = []
-    for block, rows in with_rows(mesh.blocks):
-        block_names = names[rows]
+    for block, indices in with_rows(mesh.blocks):
+        block_names = names[indices]
         ends = [0, *(np.flatnonzero(block_names[1:] != block_names[:-1]) + 1).tolist(), len(block_names)]
         for first, last in pairwise(ends):
             if last > first:
-                part = replace(block, properties=numbers[rows], lines=None).take(np.arange(first, last))
+                part = replace(block, properties=numbers[indices], lines=None).take(np.arange(first, last))
                 blocks.append(replace(part, name=str(block_names[first])))
     return blocks
 
@@ -125,29 +125,29 @@ def _initial_displacement(model: Model) -> list[Data]:
         raise InputError(f"{what} cannot be written: their DISPLACEMENT in a file is what is prescribed")
     data = []
     for axis, letter in enumerate("XYZ"):
-        if len(rows := np.flatnonzero(u0[:, axis])):
-            free, ids = np.zeros(len(rows), dtype=bool), model.mesh.node_ids[rows]
-            data.append(Data(f"DISPLACEMENT_{letter}", ids, free, u0[rows, axis]))
+        if len(indices := np.flatnonzero(u0[:, axis])):
+            free, ids = np.zeros(len(indices), dtype=bool), model.mesh.node_ids[indices]
+            data.append(Data(f"DISPLACEMENT_{letter}", ids, free, u0[indices, axis]))
     return data
 
 
 def _fixed(model: Model) -> list[Data]:
     data, supports = [], model.supports
     for axis, letter in enumerate("XYZ"):
-        if len(rows := np.flatnonzero(supports.fixed[:, axis])):
-            fixed, ids = np.ones(len(rows), dtype=bool), model.mesh.node_ids[rows]
-            data.append(Data(f"DISPLACEMENT_{letter}", ids, fixed, supports.values[rows, axis]))
+        if len(indices := np.flatnonzero(supports.fixed[:, axis])):
+            fixed, ids = np.ones(len(indices), dtype=bool), model.mesh.node_ids[indices]
+            data.append(Data(f"DISPLACEMENT_{letter}", ids, fixed, supports.values[indices, axis]))
     return data
 
 
 def _point_loads(mesh: Mesh, forces: Array, properties: int) -> tuple[list[Block], list[Data]]:
-    rows = np.flatnonzero((forces != 0).any(axis=1))
-    if not len(rows):
+    indices = np.flatnonzero((forces != 0).any(axis=1))
+    if not len(indices):
         return [], []
-    block = Block("PointLoadCondition3D1N", rows[:, None], properties=properties, shape=Point1)
-    free = np.zeros(len(rows), dtype=bool)
+    block = Block("PointLoadCondition3D1N", indices[:, None], properties=properties, shape=Point1)
+    free = np.zeros(len(indices), dtype=bool)
     names = [f"POINT_LOAD_{axis}" for axis in "XYZ"]
-    return [block], [Data(n, mesh.node_ids[rows], free, forces[rows, i]) for i, n in enumerate(names)]
+    return [block], [Data(n, mesh.node_ids[indices], free, forces[indices, i]) for i, n in enumerate(names)]
 
 
 def _parts(mesh: Mesh) -> dict[str, Part]:

@@ -105,17 +105,17 @@ def _fill(values: Variables, document: Document, model: Model) -> None:
     for data in document.nodal_data:
         if not _fits(data, model, problems, mesh.source):
             continue
-        rows = mesh.node_rows(data.ids)
-        known = rows >= 0
+        indices = mesh.node_rows(data.ids)
+        known = indices >= 0
         if data.values.size:
-            _note_overridden(values, data, rows, model)
-            values.nodal.put(data.variable, rows[known], data.values[known])
+            _note_overridden(values, data, indices, model)
+            values.nodal.put(data.variable, indices[known], data.values[known])
         if data.fixed.any():
-            values.fix(data.variable, rows[known & data.fixed])
+            values.fix(data.variable, indices[known & data.fixed])
     for data in document.condition_data:
-        rows = rows_of_ids(ids_of(mesh.conditions), data.ids)
+        indices = rows_of_ids(ids_of(mesh.conditions), data.ids)
         if data.values.size and _fits(data, model, problems, mesh.source):
-            values.conditional.put(data.variable, rows[rows >= 0], data.values[rows >= 0])
+            values.conditional.put(data.variable, indices[indices >= 0], data.values[indices >= 0])
     for data in document.element_data:
         _note(model, data, f"ElementalData {data.variable} is not used")
     problems.raise_if_any()
@@ -158,13 +158,13 @@ def _fits(data: Data, model: Model, problems: Problems, source: str) -> bool:
     return False
 
 
-def _note_overridden(values: Variables, data: Data, rows: Ints, model: Model) -> None:
+def _note_overridden(values: Variables, data: Data, indices: Ints, model: Model) -> None:
     """Note fixed values that an earlier block gave otherwise."""
-    here = rows >= 0
-    rows, ids = rows[here], data.ids[here]
+    here = indices >= 0
+    indices, ids = indices[here], data.ids[here]
     for name, new in components(data.variable, data.values).items():
         if name in values.fixed:
-            changed = values.fixed[name][rows] & (values.nodal[name][rows] != new[here])
+            changed = values.fixed[name][indices] & (values.nodal[name][indices] != new[here])
             if count := int(changed.sum()):
                 more = f" (and {count - 1} more)" if count > 1 else ""
                 fixed = f"{name} of node {ids[changed].min()}{more}"
@@ -173,15 +173,15 @@ def _note_overridden(values: Variables, data: Data, rows: Ints, model: Model) ->
 
 def _constrain(model: Model, document: Document) -> None:
     """Add the multi-point constraints of a document."""
-    rows = document.mesh.node_rows
+    index_of = document.mesh.node_rows
     for constraint in document.constraints:
-        dofs = [constraint.slave, *constraint.masters]
+        dofs = [constraint.dependent, *constraint.independents]
         if not all(name in ("DISPLACEMENT_X", "DISPLACEMENT_Y", "DISPLACEMENT_Z") for _, name in dofs):
             text = f"constraint {constraint.id} is not on displacements; ignored"
             model.notes.append(str(Note(constraint.line, text)))
             continue
-        slave, *masters = [(int(rows([node])[0]), name[-1].lower()) for node, name in dofs]
+        dependent, *independents = [(int(index_of([node])[0]), name[-1].lower()) for node, name in dofs]
         weights: dict[tuple[int, str], float] = {}
-        for master, weight in zip(masters, constraint.weights, strict=True):
-            weights[master] = weights.get(master, 0.0) + weight
-        model.constrain(slave, weights, constraint.constant)
+        for dof, weight in zip(independents, constraint.weights, strict=True):
+            weights[dof] = weights.get(dof, 0.0) + weight
+        model.constrain(dependent, weights, constraint.constant)

@@ -11,6 +11,7 @@ from collections.abc import Container, Iterable
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kratos_lite.analysis.fields import FIELDS
 from kratos_lite.analysis.model import Model
 from kratos_lite.mesh import Mesh, ids_of, with_rows
 from kratos_lite.model.loads.body import Gravity
@@ -26,11 +27,12 @@ LOADS = {
 }
 """Variable that loads a condition, by its cell."""
 PRESSURES = ("POSITIVE_FACE_PRESSURE", "NEGATIVE_FACE_PRESSURE")
-VECTORS = ("DISPLACEMENT", "VOLUME_ACCELERATION", "POINT_LOAD", "LINE_LOAD", "SURFACE_LOAD")
+DISPLACEMENT, VELOCITY = (FIELDS[name].kratos for name in ("displacement", "velocity"))
+VECTORS = (DISPLACEMENT, "VOLUME_ACCELERATION", "POINT_LOAD", "LINE_LOAD", "SURFACE_LOAD")
 LOADING = {*(f"{v}_{a}" for v in VECTORS for a in "XYZ"), *PRESSURES}
 """Components and scalars that a static linear solution uses."""
 NO_CONDITION = ", and none has these nodes"
-SPLIT = (*VECTORS, "VELOCITY")
+SPLIT = (*VECTORS, VELOCITY)
 """Vector variables that are kept by component; velocities are those at the start of a transient."""
 
 
@@ -53,10 +55,10 @@ class Fields(dict[str, Array]):
         super().__init__()
         self.count = count
 
-    def put(self, variable: str, rows: ArrayLike, values: ArrayLike) -> None:
-        """Set a scalar, component or vector variable on rows."""
+    def put(self, variable: str, indices: ArrayLike, values: ArrayLike) -> None:
+        """Set a scalar, component or vector variable at indices."""
         for name, value in components(variable, values).items():
-            self.setdefault(name, np.zeros(self.count))[np.asarray(rows, dtype=np.int64)] = value
+            self.setdefault(name, np.zeros(self.count))[np.asarray(indices, dtype=np.int64)] = value
 
     def scalar(self, name: str) -> Array:
         """Return the values of a scalar or component, 0 where none were set."""
@@ -87,10 +89,10 @@ class Variables:
         self.nodal, self.conditional = Fields(mesh.n_nodes), Fields(mesh.n_conditions)
         self.fixed: dict[str, Mask] = {}
 
-    def fix(self, component: str, rows: ArrayLike, fixed: ArrayLike = True) -> None:
-        """Fix (or free) a component on node rows."""
+    def fix(self, component: str, indices: ArrayLike, fixed: ArrayLike = True) -> None:
+        """Fix (or free) a component on nodes of these indices."""
         mask = self.fixed.setdefault(component, np.zeros(self.mesh.n_nodes, dtype=bool))
-        mask[np.asarray(rows, dtype=np.int64)] = fixed
+        mask[np.asarray(indices, dtype=np.int64)] = fixed
 
     def copy(self) -> Variables:
         """Return a copy that can be changed without changing this."""
@@ -128,11 +130,11 @@ class Variables:
 
     def _apply_supports(self, model: Model) -> None:
         for axis in "XYZ":
-            name = f"DISPLACEMENT_{axis}"
-            rows = np.flatnonzero(self.fixed.get(name, np.zeros(0, dtype=bool)))
-            if len(rows):
-                model.fix(rows, axis.lower(), self.nodal.scalar(name)[rows, None], override=True)
-        others = [name for name in sorted(self.fixed) if not name.startswith("DISPLACEMENT_")]
+            name = f"{DISPLACEMENT}_{axis}"
+            indices = np.flatnonzero(self.fixed.get(name, np.zeros(0, dtype=bool)))
+            if len(indices):
+                model.fix(indices, axis.lower(), self.nodal.scalar(name)[indices, None], override=True)
+        others = [name for name in sorted(self.fixed) if not name.startswith(f"{DISPLACEMENT}_")]
         others = [name for name in others if self.fixed[name].any()]
         if others:
             model.notes.append(f"fixed {', '.join(others)} ignored: solids have displacements only")
@@ -142,12 +144,12 @@ class Variables:
         force = np.zeros((self.mesh.n_conditions, 3))
         nodal_force = {cell: self.nodal.vector(name) for cell, name in LOADS.items()}
         carriers = [
-            (block.shape.cell, rows)
-            for block, rows in with_rows(self.mesh.conditions)
+            (block.shape.cell, indices)
+            for block, indices in with_rows(self.mesh.conditions)
             if block.shape is not None and len(block)
         ]
-        for cell, rows in carriers:
-            force[rows] = self.conditional.vector(LOADS[cell])[rows]
+        for cell, indices in carriers:
+            force[indices] = self.conditional.vector(LOADS[cell])[indices]
         positive, negative = PRESSURES
         pressure, nodal_pressure = (
             fields.scalar(positive) - fields.scalar(negative) for fields in (self.conditional, self.nodal)

@@ -1,4 +1,4 @@
-"""Bodies in time, and what they are in words."""
+"""Bodies in time, and their description."""
 
 from __future__ import annotations
 
@@ -76,9 +76,9 @@ class _Summary:
         start, end = self.start, _Totals(self.body)
         steps = end.step - start.step
         gained = end.kinetic - start.kinetic + end.internal - start.internal - (end.work - start.work)
-        share = gained / self.largest if self.largest else 0.0
+        drift = gained / self.largest if self.largest else 0.0
         what = "of the largest energy: kinetic + internal less external work"
-        balance = ("energy drift", f"{share:+.1e} {what}")
+        balance = ("energy drift", f"{drift:+.1e} {what}")
         if self.body.damping > 0:
             balance = ("dissipated", f"{-gained:.7g} J, by damping and the integrator")
         rows = [

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kratos_lite.analysis.fields import FIELDS
 from kratos_lite.errors import InputError
 from kratos_lite.io.formats.vtu import write_pvd, write_vtu
 from kratos_lite.io.writers.endings import check_modes
@@ -51,7 +52,7 @@ def write_modes(
     check_modes(path)
     instance(mesh, "the mesh of modes", Mesh, "model.mesh")
     forms = _numbers(shapes, "shapes of modes", ("k", mesh.n_nodes, 3))
-    found = _numbers(values, "values of modes, one for each shape,", (len(forms),))
+    numbers = _numbers(values, "values of modes, one for each shape,", (len(forms),))
     if not len(forms):
         raise InputError(f"{path}: not written: there are no modes")
     if path.suffix.lower() == ".pvd":
@@ -59,7 +60,7 @@ def write_modes(
         return
     from kratos_lite.io.writers.page.write import write_modes_page  # rarely needed
 
-    write_modes_page(path, mesh, names_of_modes(found.tolist()), forms)
+    write_modes_page(path, mesh, names_of_modes(numbers.tolist()), forms)
 
 
 def _numbers(value: ArrayLike, what: str, shape: tuple[int | str, ...]) -> Array | Complexes:
@@ -76,9 +77,10 @@ def _write_frames(path: Path, mesh: Mesh, shapes: Array | Complexes, mode: str) 
     frames = []
     for i, shape in enumerate(shapes, 1):
         scaled = shape / (np.linalg.norm(shape, axis=1).max() or 1.0)
-        points = {"DISPLACEMENT": scaled.real, "NODE_ID": mesh.node_ids}
+        variable = FIELDS["displacement"].kratos
+        points = {variable: scaled.real, "NODE_ID": mesh.node_ids}
         if np.iscomplexobj(shape):
-            points["DISPLACEMENT_IMAGINARY"] = scaled.imag
+            points[f"{variable}_IMAGINARY"] = scaled.imag
         name = f"{path.stem}_{i:05d}.vtu"
         write_vtu(path.with_name(name), mesh, points, {}, mode=mode)
         frames.append((float(i), name))

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from kratos_lite.analysis.fields import fields
+from kratos_lite.analysis.fields import FIELDS, fields, listed
 from kratos_lite.analysis.state import State, at, check_state_of_body
 from kratos_lite.analysis.transient import TransientAnalysis
 from kratos_lite.bodies import Body
@@ -97,7 +97,8 @@ class RecordedBody:
         X = self.mesh().points
         with at(self.body, state):
             moved = self.body.position(X) - X
-            return {"DISPLACEMENT": moved, "VELOCITY": self.body.velocity(X)}, {}
+            values = {"displacement": moved, "velocity": self.body.velocity(X)}
+            return {FIELDS[name].kratos: value for name, value in values.items()}, {}
 
     def row(self, state: State) -> Array:
         """Return time, energies, work, mass center and momenta."""
@@ -140,7 +141,7 @@ class RecordedModel:
     def fields(self, state: Any) -> tuple[dict[str, Array], dict[str, Array]]:
         """Return DISPLACEMENT, VELOCITY, ACCELERATION, REACTION and stresses."""
         points, cells = fields(self.transient.result(state))
-        return {**points, "VELOCITY": state.v, "ACCELERATION": state.a}, cells
+        return points | {field.kratos: field.at(state) for field in listed("state").values()}, cells
 
     def row(self, state: Any) -> Array:
         """Return time, energy, largest displacement and total reaction."""
@@ -173,5 +174,5 @@ def check_single(body: Body, path: str | Path) -> None:
 
 def arrays_of(subject: Recorded, states: Sequence[Any]) -> dict[str, Array]:
     """Return the numbers of states as arrays, one row for each state."""
-    found = {name: np.array([getattr(state, name) for state in states]) for name in subject.names}
-    return {**subject.extra(), **found}
+    arrays = {name: np.array([getattr(state, name) for state in states]) for name in subject.names}
+    return {**subject.extra(), **arrays}

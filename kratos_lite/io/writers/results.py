@@ -112,8 +112,10 @@ def write_json(path: str | Path, result: Result) -> None:
 def _by_node(result: Result) -> dict[str, Any]:
     """Return displacements, and reactions where there are any, by node id."""
     ids = list(map(str, result.mesh.node_ids.tolist()))
-    held = np.flatnonzero((result.reactions != 0).any(axis=1))
+    supported = np.flatnonzero((result.reactions != 0).any(axis=1))
     return {
         "displacement": dict(zip(ids, result.u.tolist(), strict=True)),
-        "reaction": dict(zip([ids[row] for row in held], result.reactions[held].tolist(), strict=True)),
+        "reaction": dict(
+            zip([ids[row] for row in supported], result.reactions[supported].tolist(), strict=True)
+        ),
     }

@@ -419,8 +419,8 @@ def test_constraint_variables_follow_the_header(read, header, masters):
     text = f"Begin Constraints {header}\n4 0.5 [0.5, 0.25] 1 2 3\nEnd Constraints\n"
     (constraint,) = read(NODES + text).constraints
     assert (constraint.id, constraint.constant, constraint.weights) == (4, 0.5, (0.5, 0.25))
-    assert constraint.slave == (1, "DISPLACEMENT_X")
-    assert constraint.masters == tuple((i + 2, f"DISPLACEMENT_{axis}") for i, axis in enumerate(masters))
+    assert constraint.dependent == (1, "DISPLACEMENT_X")
+    assert constraint.independents == tuple((i + 2, f"DISPLACEMENT_{axis}") for i, axis in enumerate(masters))
 
 
 @pytest.mark.parametrize(
@@ -428,7 +428,7 @@ def test_constraint_variables_follow_the_header(read, header, masters):
     [
         ("1 0.0 [2,1.0,-0.5]", r"has 3 weights, but 0 nodes"),
         ("1 0.0 [1] 1 9", r"there is no node 9"),
-        ("1 0.0 1 2", r"expected 'id constant \[w1, w2, …\] slave"),
+        ("1 0.0 1 2", r"expected 'id constant \[w1, w2, …\] dependent"),
         ("1 0.0 [1] 1 2\n1 0.0 [1] 3 4", r"9: constraint 1 is already defined at line 8"),
     ],
 )

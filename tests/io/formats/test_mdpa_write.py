@@ -144,9 +144,9 @@ def assert_same(first, second, rename=str):
             assert a.variable == b.variable
             for column in ("ids", "fixed", "values"):
                 assert np.array_equal(getattr(a, column), getattr(b, column)), (field, a.variable, column)
-    assert [(c.id, c.slave, c.masters, c.weights, c.constant, c.name) for c in first.constraints] == [
-        (c.id, c.slave, c.masters, c.weights, c.constant, c.name) for c in second.constraints
-    ]
+    assert [
+        (c.id, c.dependent, c.independents, c.weights, c.constant, c.name) for c in first.constraints
+    ] == [(c.id, c.dependent, c.independents, c.weights, c.constant, c.name) for c in second.constraints]
 
 
 def test_everything_survives_bit_by_bit(tmp_path):

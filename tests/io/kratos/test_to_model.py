@@ -160,13 +160,13 @@ def test_constraints_are_written_in_blocks_of_one_number_of_masters(tmp_path):
     text = (tmp_path / "a.mdpa").read_text()
     assert text.count("Begin Constraints LinearMasterSlaveConstraint DISPLACEMENT_X\n") == 2
     again = read_mdpa(tmp_path / "a.mdpa")
-    assert [c.masters for c in again.constraints] == [c.masters for c in constraints]
+    assert [c.independents for c in again.constraints] == [c.independents for c in constraints]
     assert not again.notes
     (tmp_path / "a.mdpa").write_text(text.replace(
         "End Constraints\n\nBegin Constraints LinearMasterSlaveConstraint DISPLACEMENT_X\n", ""
     ))  # fmt: skip
     (note,) = read_mdpa(tmp_path / "a.mdpa").notes
-    assert "Kratos misreads a block of Constraints with different numbers of masters" in note.text
+    assert "Kratos misreads a block of Constraints with different numbers of independent nodes" in note.text
 
 
 def test_names_of_2008_become_those_of_kratos(tmp_path):

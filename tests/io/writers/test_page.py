@@ -125,11 +125,12 @@ def test_a_page_holds_mesh_and_fields(result, tmp_path):
     assert content["element_ids"].ravel().tolist() == mesh.element_ids.tolist()
     assert content["cells"][0]["nodes"].tolist() == mesh.blocks[0].nodes.tolist()
     assert content["faces"][0]["element"].ravel().tolist() == mesh.boundary[0].ids.tolist()
-    u, stress, reaction, error = content["frames"][0]["values"]
+    u, reaction, stress, density, error = content["frames"][0]["values"]
     for found, wanted in (
         (u, result.u),
         (stress, result.stress("node")),
         (reaction, result.reaction()),
+        (density[:, 0], result.field("strain_energy_density", "node")),
         (error[:, 0], result.error().per_element),
     ):
         assert abs(found - wanted).max() <= 1e-7 * abs(wanted).max()
@@ -166,7 +167,7 @@ def test_numbers_beyond_single_precision_are_refused(result, tmp_path):
     stiff.fix("x-")
     stiff.fix("x+", value=(1e-3, 0, 0))
     with pytest.raises(
-        SolveError, match=r"not written: stress reaches \S+ and a page holds numbers up to 1e\+38"
+        SolveError, match=r"not written: reaction reaches \S+ and a page holds numbers up to 1e\+38"
     ):
         kl.write(tmp_path / "a.html", stiff.solve())
     assert not list(tmp_path.iterdir())

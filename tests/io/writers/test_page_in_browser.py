@@ -159,16 +159,17 @@ def test_every_component_is_that_of_the_result(page, result):
     wanted = {
         "0:magnitude": np.linalg.norm(result.u, axis=1),
         "0:z": result.u[:, 2],
-        "1:von Mises": result.von_mises("node"),
-        "1:Tresca": sigma[:, 0] - sigma[:, 2],
-        **{f"1:principal {i + 1}": sigma[:, i] for i in range(3)},
-        **{f"1:{name}": stress[:, i] for i, name in enumerate(("xx", "yy", "zz", "xy", "yz", "zx"))},
-        "2:x": result.reaction()[:, 0],
-        "3:": result.error().per_element,
+        "2:von Mises": result.von_mises("node"),
+        "2:Tresca": sigma[:, 0] - sigma[:, 2],
+        **{f"2:principal {i + 1}": sigma[:, i] for i in range(3)},
+        **{f"2:{name}": stress[:, i] for i, name in enumerate(("xx", "yy", "zz", "xy", "yz", "zx"))},
+        "1:x": result.reaction()[:, 0],
+        "3:": result.field("strain_energy_density", "node"),
+        "4:": result.error().per_element,
     }
     choices = page("return [...field.options].map((option) => option.value)")
     assert set(wanted) <= set(choices)
-    assert len(choices) == 4 + 11 + 4 + 1
+    assert len(choices) == 4 + 4 + 11 + 1 + 1
     for choice, values in wanted.items():
         page.set("field", choice)
         assert (
@@ -182,7 +183,7 @@ def test_every_component_is_that_of_the_result(page, result):
 
 
 def test_the_legend_has_unit_and_range(page, result):
-    page.set("field", "1:xx")
+    page.set("field", "2:xx")
     assert page("return [quantity.textContent, unit.textContent]") == ["stress, xx", "MPa"]
     ticks = [float(text) for text in page("return [...ticks.children].map((tick) => tick.textContent)")]
     xx = result.stress("node")[:, 0] / 1e6

@@ -23,7 +23,8 @@ from kratos_lite.mesh.generators import box
 from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.mass_properties import MassProperties
 from kratos_lite.verification.meshes import element
-from kratos_lite.verification.problem import Problem, bounded
+from kratos_lite.verification.problem import Problem
+from tests.verification.moving.known_values import bounded
 
 RUBBER = Isotropic3D(E=1e6, nu=0.3, density=1000.0)
 SIDES, SPIN = (0.4, 0.6, 1.0), (0.05, 10.0, 0.05)

@@ -14,7 +14,8 @@ from kratos_lite.analysis.transient import TransientAnalysis
 from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.mesh.generators import box
 from kratos_lite.typing import Array
-from kratos_lite.verification.problem import Problem, bounded
+from kratos_lite.verification.problem import Problem
+from tests.verification.moving.known_values import bounded
 
 SOLID = Isotropic3D(E=1e6, nu=0.0, density=1000.0)
 INTEGRATORS: dict[str, tuple[ModelIntegrator, str]] = {

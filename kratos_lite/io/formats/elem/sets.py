@@ -124,7 +124,7 @@ def _cell_lines(mesh: Mesh, blocks: Sequence[Block], word: str) -> list[str]:
 
 
 def _property_lines(document: Document, problems: Problems, notes: list[Note]) -> Iterator[str]:
-    """Yield the statements; what is no number is left out, with a note."""
+    """Yield the statements; values without a number are left out, with a note."""
     written = set()
     for number, properties in document.properties.items():
         for name, value in properties.values.items():

@@ -12,29 +12,29 @@ from kratos_lite.typing import Ints
 CONSTRAINT = re.compile(rb"\s*([^\s\[\]]+)\s+([^\s\[\]]+)\s*\[([^\[\]]*)\]")
 
 
-def read_constraints(source: Source, frame: Frame, nodes: Ints | None) -> list[Constraint]:
-    """Return the rows ``id constant [w1, w2] slave master1 master2`` of a block.
+def read_constraints(source: Source, frame: Frame, nodes: Ints) -> list[Constraint]:
+    """Return the rows ``id constant [w1, w2] dependent independent …`` of a block.
 
-    The variables in the header are the slave's and then one for each master, or one for all.  Nodes must be
-    among those given, if any are.
+    The variables in the header are those of the dependent and of each independent node, or one for all.
+    The nodes must be among `nodes`.
     """
     if len(frame.arguments) < 2:
-        source.problem("expected 'Begin Constraints NAME SLAVE_VARIABLE [MASTER_VARIABLE …]'", frame.offset)
+        source.problem("expected 'Begin Constraints NAME VARIABLE [VARIABLE …]'", frame.offset)
         return []
-    node_ids = None if nodes is None else set(nodes.tolist())
+    node_ids = set(nodes.tolist())
 
     def read(at: int, end: int) -> tuple[Constraint, int]:
         constraint, after = _constraint(source, frame, (at, end))
-        named = [node for node, _ in (constraint.slave, *constraint.masters)]
-        missing = [] if node_ids is None else [node for node in named if node not in node_ids]
+        named = [node for node, _ in (constraint.dependent, *constraint.independents)]
+        missing = [node for node in named if node not in node_ids]
         if missing:
             raise ValueError(f"there is no node {missing[0]}")
         return constraint, after
 
     constraints = list(source.each(frame.spans[0], "constraint", read))
-    if len({len(c.masters) for c in constraints}) > 1:
+    if len({len(c.independents) for c in constraints}) > 1:
         text = (
-            "Kratos misreads a block of Constraints with different numbers of masters; "
+            "Kratos misreads a block of Constraints with different numbers of independent nodes; "
             "kratos_lite reads it as written; give each number a block of its own"
         )
         source.note(text, frame.offset)
@@ -44,7 +44,7 @@ def read_constraints(source: Source, frame: Frame, nodes: Ints | None) -> list[C
 def _constraint(source: Source, frame: Frame, span: tuple[int, int]) -> tuple[Constraint, int]:
     match = CONSTRAINT.match(source.data, *span)
     if match is None:
-        raise ValueError("expected 'id constant [w1, w2, …] slave master1 master2 …'")
+        raise ValueError("expected 'id constant [w1, w2, …] dependent independent …'")
     number, constant = integer(match.group(1)), real(match.group(2))
     weights = tuple(real(part.strip()) for part in match.group(3).split(b","))
     at = match.end()
@@ -52,14 +52,16 @@ def _constraint(source: Source, frame: Frame, span: tuple[int, int]) -> tuple[Co
     for _ in range(len(weights) + 1):
         word = WORD.search(source.data, at, span[1])
         if word is None:
-            raise ValueError(f"has {len(weights)} weights, but {len(ids)} nodes; expected slave and masters")
+            raise ValueError(f"has {len(weights)} weights, but {len(ids)} nodes; expected {len(weights) + 1}")
         ids.append(integer(word.group()))
         at = word.end()
-    name, slave, *masters = frame.arguments
-    if len(masters) != len(weights):
-        if len(masters) > 1:
-            raise ValueError(f"has {len(weights)} masters, but the header names {len(masters)} variables")
-        masters = (masters or [slave]) * len(weights)
-    pairs = tuple(zip(ids[1:], masters, strict=True))
+    name, dependent, *independents = frame.arguments
+    if len(independents) != len(weights):
+        if len(independents) > 1:
+            raise ValueError(
+                f"has {len(weights)} independent nodes, but the header names {len(independents)} variables"
+            )
+        independents = (independents or [dependent]) * len(weights)
+    pairs = tuple(zip(ids[1:], independents, strict=True))
     line = source.line(span[0])
-    return Constraint(number, (ids[0], slave), pairs, weights, constant, line, name), at
+    return Constraint(number, (ids[0], dependent), pairs, weights, constant, line, name), at

@@ -7,7 +7,7 @@ import re
 import numpy as np
 
 from kratos_lite.io.formats.document import Data
-from kratos_lite.io.formats.mdpa.rows import TRUTH, Layout, Rows, read_rows, width_of_first_line
+from kratos_lite.io.formats.mdpa.rows import TRUTH, Layout, Rows, first_line, read_rows
 from kratos_lite.io.formats.mdpa.scan import WORD, Frame, Source
 from kratos_lite.io.formats.mdpa.values import kind_of, note_unknown, value_at
 from kratos_lite.io.text import integer
@@ -18,19 +18,16 @@ WORDS = {"NodalData": "node", "ElementalData": "element", "ConditionalData": "co
 IS_FIXED = rb"\s*([^\s\[(]+)"
 
 
-def read_data(source: Source, frame: Frame, known: Ints | None) -> Data:
-    """Return one block of nodal, elemental or conditional data; its ids must be among `known`, if given."""
+def read_data(source: Source, frame: Frame, known: Ints) -> Data:
+    """Return one block of nodal, elemental or conditional data; its ids should be among the known ones."""
     variable, word = frame.arguments[0], WORDS[frame.name]
     kind, span = kind_of(variable), frame.spans[0]
     if kind is None:
         note_unknown(source, variable, frame.offset)
-    width = width_of_first_line(source, span)
-    first = next(source.words(span), None)
-    line_end = source.data.find(b"\n", first.start(), span[1]) if first else span[0]
-    has_bracket = b"(" in source.data[first.start() if first else 0 : line_end if line_end >= 0 else span[1]]
-    if kind in ("vector", "matrix") or (kind is None and has_bracket):
+    line = first_line(source, span)
+    if kind in ("vector", "matrix") or (kind is None and b"(" in line):
         data = _read_arrays(source, frame, word == "node", kind)
-    elif kind == "flag" or (kind is None and width == 1):
+    elif kind == "flag" or (kind is None and len(line.split()) == 1):
         rows = read_rows(source, span, Layout(word, "i", needs=f"{variable} is a flag: write ids only"))
         data = _data(source, frame, rows, rows.reals[:, :0].ravel())
     else:
@@ -41,8 +38,7 @@ def read_data(source: Source, frame: Frame, known: Ints | None) -> Data:
         data = _data(source, frame, rows, values)
         if word == "node":
             data.fixed = rows.ints[:, 1] == 1
-    if known is not None:
-        _note_missing(source, data, word, known)
+    _note_missing(source, data, word, known)
     return data
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from kratos_lite.errors import InputError
 from kratos_lite.io.formats.cells import already, repeated, repeated_nodes, wrong_nodes
-from kratos_lite.io.formats.mdpa.rows import Layout, read_rows, width_of_first_line
+from kratos_lite.io.formats.mdpa.rows import Layout, first_line, read_rows
 from kratos_lite.io.formats.mdpa.scan import Frame, Source
 from kratos_lite.io.names import LINES, SOLIDS, condition_shape, count, element_shape
 from kratos_lite.mesh import Block, Mesh, distinct, ids_of
@@ -65,10 +65,10 @@ def read_blocks(source: Source, frames: list[Frame], mesh: Mesh) -> list[Block]:
 def _read_block(source: Source, frame: Frame, mesh: Mesh) -> Block:
     name, word = frame.arguments[0], WORDS[frame.name]
     head = 1 if word == "geometry" else 2
-    width = width_of(frame.name, name)
+    width = _width_of(frame.name, name)
     known = width is not None
     if width is None:
-        width = max(width_of_first_line(source, frame.spans[0]) - head, 0)
+        width = max(len(first_line(source, frame.spans[0]).split()) - head, 0)
     needs = f"{name} needs {width}" if known else f"the first {word} of the block has {width}"
     layout = Layout(word, "ip"[:head] + "i" * width, "nodes", head, needs, alone=not known)
     rows = read_rows(source, frame.spans[0], layout)
@@ -81,7 +81,7 @@ def _read_block(source: Source, frame: Frame, mesh: Mesh) -> Block:
     return Block(name, np.maximum(nodes, 0), ids, properties, shape, rows.lines)
 
 
-def width_of(kind: str, name: str) -> int | None:
+def _width_of(kind: str, name: str) -> int | None:
     """Return the number of nodes that a name promises, or None if only the rows can tell."""
     if kind == "Geometries":
         match = re.search(r"\dD(\d{1,3})N?$", name)

@@ -10,7 +10,7 @@ import numpy as np
 
 from kratos_lite.errors import nearest
 from kratos_lite.io.formats.cells import already, repeated
-from kratos_lite.io.formats.document import Document, Note, Properties
+from kratos_lite.io.formats.document import Document, Properties
 from kratos_lite.io.formats.mdpa.data import read_data
 from kratos_lite.io.formats.mdpa.mesh import read_blocks, read_mesh
 from kratos_lite.io.formats.mdpa.parts import PartReader
@@ -40,19 +40,14 @@ def read_mdpa(path: str | Path, *, strict: bool = True) -> Document:
             source.note(f"block {frame.name} is skipped.{hint}", frame.offset)
     document = _read(source, frames)
     source.problems.raise_if_any()
-    document.notes = sorted_notes(source)
+    document.notes = sorted(dict.fromkeys(source.notes), key=lambda note: note.line)
     return document
-
-
-def sorted_notes(source: Source) -> list[Note]:
-    """Return the notes of a source, each once, by line."""
-    return sorted(dict.fromkeys(source.notes), key=lambda note: note.line)
 
 
 def _read(source: Source, frames: dict[str, list[Frame]]) -> Document:
     """Return the document; first what others refer to, whatever the order in the file."""
-    properties = read_properties(source, frames["Properties"])
-    tables = read_tables(source, frames["Table"])
+    properties = _properties(source, frames["Properties"])
+    tables = _tables(source, frames["Table"])
     mesh = read_mesh(source, frames, list(properties))
     # References to what is broken already would only be reported as missing.
     source.problems.raise_if_any()
@@ -85,7 +80,7 @@ def _numbers(numbers: Iterable[int]) -> Ints:
     return np.array(list(numbers), dtype=np.int64)
 
 
-def read_properties(source: Source, frames: list[Frame]) -> dict[int, Properties]:
+def _properties(source: Source, frames: list[Frame]) -> dict[int, Properties]:
     """Return the Properties of some frames by their ids."""
     properties: dict[int, Properties] = {}
     for frame in frames:
@@ -100,7 +95,7 @@ def read_properties(source: Source, frames: list[Frame]) -> dict[int, Properties
     return properties
 
 
-def read_tables(source: Source, frames: list[Frame]) -> dict[int, Any]:
+def _tables(source: Source, frames: list[Frame]) -> dict[int, Any]:
     """Return the tables of some frames by their ids."""
     tables: dict[int, Table] = {}
     for frame in frames:

@@ -49,13 +49,10 @@ def read_rows(source: Source, span: Span, layout: Layout) -> Rows:
     return (None if is_small else _compiled(source, span, layout)) or _exact(source, span, layout)
 
 
-def width_of_first_line(source: Source, span: Span) -> int:
-    """Return the number of words on the first line that has any, or 0."""
+def first_line(source: Source, span: Span) -> bytes:
+    """Return the first line that has words; nothing where there is none."""
     first = next(source.words(span), None)
-    if first is None:
-        return 0
-    end = source.data.find(b"\n", first.start(), span[1])
-    return len(source.data[first.start() : end if end >= 0 else span[1]].split())
+    return source.data[first.start() : source.line_end(first.start(), span[1])] if first else b""
 
 
 def _compiled(source: Source, span: Span, layout: Layout) -> Rows | None:

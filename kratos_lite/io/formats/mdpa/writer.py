@@ -194,24 +194,24 @@ def _cells(kind: str, block: Block, mesh: Mesh, name: str) -> Lines:
 
 def _constraints(constraints: list[Constraint]) -> Lines:
     """Give the constraints, those of the same variables in one block."""
-    # Kratos misreads a block whose constraints have different numbers of masters.
+    # Kratos misreads a block whose constraints have different numbers of independent nodes.
     for (_, *words), group in groupby(constraints, key=_header):
         rows = []
         for c in group:
             constant, *weights = (_array(f"constraint {c.id}", np.array(x)) for x in (c.constant, *c.weights))
-            nodes = " ".join(str(node) for node, _ in (c.slave, *c.masters))
+            nodes = " ".join(str(node) for node, _ in (c.dependent, *c.independents))
             rows.append(f"{c.id} {constant} [{','.join(weights)}] {nodes}")
         yield from _block(" ".join(["Constraints", *map(_name, map(str, words))]), rows)
 
 
 def _header(constraint: Constraint) -> tuple[int | str, ...]:
-    """Return the number of masters, the name and the variables of the header.
+    """Return the number of independent nodes, the name and the variables of the header.
 
-    Kratos misreads a header with more than the slave's variable where one is enough.
+    Kratos misreads a header with more than the dependent node's variable where one is enough.
     """
-    variables = [constraint.slave[1], *(variable for _, variable in constraint.masters)]
+    variables = [constraint.dependent[1], *(variable for _, variable in constraint.independents)]
     shown = variables[:1] if len(set(variables)) == 1 else variables
-    return (len(constraint.masters), constraint.name, *shown)
+    return (len(constraint.independents), constraint.name, *shown)
 
 
 def _data(data: Data, is_nodal: bool) -> Lines:

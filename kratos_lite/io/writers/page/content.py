@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kratos_lite.analysis.fields import Field
 from kratos_lite.io.writers.page.lattices import fineness, lattice_of_cell, lattice_of_face
 from kratos_lite.mesh.blocks import with_rows
 from kratos_lite.typing import Array, Ints
@@ -31,60 +32,26 @@ QUANTUM = 30_000
 """Whole numbers for the largest value of a series: 16 bits, an error below 2e-5 of it."""
 
 
-@dataclass(frozen=True)
-class Field:
-    """A field of a page.
-
-    Attributes
-    ----------
-    name : as people say it.
-    unit : in SI.
-    kind : ``scalar``, ``vector``, or ``stress`` in Voigt order.
-    at : ``node`` or ``element``.
-    """
-
-    name: str
-    unit: str
-    kind: str
-    at: str = "node"
-
-
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """One state or mode of a page.
+    """One state or mode of a page."""
 
-    Attributes
-    ----------
-    name : such as ``t = 0.1 s``.
-    values : of each field, displacements first: (n,), (n, 3), (n, 6), or those of elements.
-    """
-
-    name: str
-    values: Sequence[Array]
+    name: str  # such as ``t = 0.1 s``
+    values: Sequence[Array]  # of each field, displacements first: (n,), (n, 3), (n, 6), or those of elements
 
 
 @dataclass(frozen=True, eq=False)
 class Content:
-    """All that a page shows.
+    """All that a page shows."""
 
-    Attributes
-    ----------
-    title : heading.
-    kind : ``result``, ``modes`` or ``states``; animated are the deformation, its oscillation, the states.
-    mesh : with a surface.
-    fields : the first is the displacement.
-    frames : states or modes; one of a result.
-    shown : number of the field and component at the start, as ``1:von Mises``.
-    about : labels and texts of the summary.
-    """
-
-    title: str
+    title: str  # heading
+    # ``result``, ``modes`` or ``states``; animated are the deformation, its oscillation, the states
     kind: str
-    mesh: Mesh
-    fields: Sequence[Field]
-    frames: Sequence[Frame]
-    shown: str = "0:magnitude"
-    about: Sequence[tuple[str, str]] = ()
+    mesh: Mesh  # with a surface
+    fields: Sequence[Field]  # the first is the displacement
+    frames: Sequence[Frame]  # states or modes; one of a result
+    shown: str = "0:magnitude"  # number of the field and component at the start, as ``1:von Mises``
+    about: Sequence[tuple[str, str]] = ()  # labels and texts of the summary
 
     def packed(self) -> str:
         """Return all of it as one text."""
@@ -95,7 +62,7 @@ class Content:
             "kind": self.kind,
             "shown": self.shown,
             "about": [("size", " × ".join(f"{side:.5g}" for side in self._size()) + " m"), *self.about],
-            "fields": [vars(field) for field in self.fields],
+            "fields": [_described(field) for field in self.fields],
             **self._frame(),
             **_mesh(data, self.mesh, kept, self._center()),
             "frames": [self._packed_frame(data, frame, kept) for frame in self.frames],
@@ -110,7 +77,7 @@ class Content:
 
     def _packed_frame(self, data: _Packer, frame: Frame, kept: Ints) -> dict[str, Any]:
         both = zip(self.fields, frame.values, strict=True)
-        values = [data.field(v[kept] if field.at == "node" else v) for field, v in both]
+        values = [data.field(v if field.nodal_place == "element" else v[kept]) for field, v in both]
         return {"name": frame.name, "values": values}
 
     def scale(self) -> float:
@@ -143,6 +110,10 @@ class Content:
             "reach": ((high - low) / 2).tolist(),
             "scale": self.scale(),
         }
+
+
+def _described(field: Field) -> dict[str, str]:
+    return {"name": field.name, "unit": field.unit, "kind": field.kind, "at": field.nodal_place}
 
 
 def _mesh(data: _Packer, mesh: Mesh, kept: Ints, center: Array) -> dict[str, Any]:

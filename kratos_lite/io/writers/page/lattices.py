@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from kratos_lite.mesh import Block
 from kratos_lite.mesh.subdivision import Piece, pieces, unchanged
 from kratos_lite.shapes import LINEAR, Shape
 from kratos_lite.typing import Array, Mask
+from kratos_lite.view.facets import grid, rim
 
 TETRAHEDRA = {
     "tetrahedron": ((0, 1, 2, 3),),
@@ -33,22 +33,12 @@ def fineness(faces: list[Block]) -> int:
 
 def lattice_of_face(shape: type[Shape], n: int) -> dict[str, Any]:
     """Return N at the points of a lattice on a face, its triangles, and the pieces of the edges."""
-    steps = np.linspace(0, 1, n + 1)
-    places = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
-    a = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
-    lower = np.stack([a[:-1, :-1], a[1:, :-1], a[:-1, 1:]], axis=-1).reshape(-1, 3)
-    upper = np.stack([a[1:, :-1], a[1:, 1:], a[:-1, 1:]], axis=-1).reshape(-1, 3)
-    triangles = np.vstack([lower, upper])
-    if shape.cell == "quadrilateral":
-        places = 2 * places - 1
-    else:
-        inside = places.sum(axis=1) < 1 + 1e-9
-        triangles = (np.cumsum(inside) - 1)[triangles[inside[triangles].all(axis=1)]]
-        places = places[inside]
-    X = shape.nodes
-    rims = [[(1 - t) * X[a] + t * X[b] for t in steps] for a, b in shape.edges]
-    edges = [pair for rim in rims for pair in pairwise(_nearest(places, point) for point in rim)]
-    return {"N": _rounded(shape.N(places)), "triangles": triangles.tolist(), "edges": edges}
+    places, quadrilaterals = grid(shape.cell, n)
+    triangles = quadrilaterals[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
+    triangles = triangles[triangles[:, 1] != triangles[:, 2]]
+    used, rows = np.unique(triangles, return_inverse=True)
+    edges = [[_nearest(places[used], point) for point in pair] for pair in rim(shape, n)]
+    return {"N": _rounded(shape.N(places[used])), "triangles": rows.reshape(-1, 3).tolist(), "edges": edges}
 
 
 def _nearest(places: Array, point: Array) -> int:

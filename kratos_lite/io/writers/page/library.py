@@ -20,10 +20,10 @@ def library() -> str:
     KratosLiteError
         trimesh is missing, or does not hold it.
     """
-    found = find_spec("trimesh")
-    if found is None or found.origin is None:
+    spec = find_spec("trimesh")
+    if spec is None or spec.origin is None:
         raise KratosLiteError("pages for the browser need three.js: pip install kratos-lite[page]")
-    template = Path(found.origin).parent / "resources" / "templates" / "viewer.zip"
+    template = Path(spec.origin).parent / "resources" / "templates" / "viewer.zip"
     try:
         with ZipFile(template) as file:
             text = file.read("viewer.html.template").decode()

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from kratos_lite.io.writers.page.content import Content, Field, Frame
+from kratos_lite.analysis.fields import FIELDS, Field
+from kratos_lite.analysis.subjects import evenly
+from kratos_lite.io.writers.page.content import Content, Frame
 from kratos_lite.io.writers.page.write import write_page
 from kratos_lite.io.writers.recorded import Recorded
 
@@ -15,29 +15,19 @@ MOST_FRAMES = 120
 """States in a page."""
 MOST_VALUES = 1_000_000
 """Nodes of all states together, about 10 MB."""
-OF_STATES = {
-    "DISPLACEMENT": Field("displacement", "m", "vector"),
-    "VON_MISES_STRESS": Field("von Mises stress", "Pa", "scalar"),
-    "VELOCITY": Field("velocity", "m/s", "vector"),
-}
+OF_STATES = [FIELDS[name] for name in ("displacement", "von_mises", "velocity")]
 """Fields of states, those that there are."""
 
 
 def write_states_page(path: str | Path, subject: Recorded, states: list[Any]) -> None:
     """Write the page of states of a body or a transient: displacements, von Mises stresses, velocities."""
     mesh, all_of_them = subject.mesh(), len(states)
-    states = _thinned(states, max(2, min(MOST_FRAMES, MOST_VALUES // mesh.n_nodes)))
-    kept, frames = list[str](), []
+    most = max(2, min(MOST_FRAMES, MOST_VALUES // mesh.n_nodes))
+    states = [states[row] for row in evenly(len(states), most)]
+    kept, frames = list[Field](), []
     for state in states:
         points, _ = subject.fields(state)
-        kept = [name for name in OF_STATES if name in points]
-        frames.append(Frame(f"t = {state.time:.5g} s", [points[name] for name in kept]))
+        kept = [field for field in OF_STATES if field.kratos in points]
+        frames.append(Frame(f"t = {state.time:.5g} s", [points[field.kratos] for field in kept]))
     about = [("states", f"{len(states)} of {all_of_them}")]
-    fields = [OF_STATES[name] for name in kept]
-    write_page(path, Content(Path(path).stem, "states", mesh, fields, frames, about=about))
-
-
-def _thinned(states: list[Any], most: int) -> list[Any]:
-    """Return so many of the states at most, evenly spread, the first and last among them."""
-    rows = np.unique(np.linspace(0, len(states) - 1, most).round().astype(int))
-    return [states[row] for row in rows]
+    write_page(path, Content(Path(path).stem, "states", mesh, kept, frames, about=about))

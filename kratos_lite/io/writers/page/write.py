@@ -5,14 +5,16 @@ from __future__ import annotations
 import html
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kratos_lite.analysis.fields import FIELDS, listed
 from kratos_lite.atomic import refuse_nan, write_whole
 from kratos_lite.errors import InputError, SolveError
-from kratos_lite.io.writers.page.content import Content, Field, Frame
+from kratos_lite.io.writers.page.content import Content, Frame
 from kratos_lite.io.writers.page.library import library
 from kratos_lite.typing import Array, Complexes
 
@@ -55,16 +57,15 @@ def _refuse_large(path: str | Path, name: str, values: Array) -> None:
 
 
 def write_result_page(path: str | Path, result: Result) -> None:
-    """Write the page of a result: displacements, nodal stresses, reactions and estimated errors."""
-    fields = (
-        Field("displacement", "m", "vector"),
-        Field("stress", "Pa", "stress"),
-        Field("reaction", "N", "vector"),
-        Field("estimated error", "√J", "scalar", "element"),
+    """Write the page of a result: its fields but for invariants, which the page makes of their tensors."""
+    shown = {name: field for place in ("node", "element") for name, field in listed(place).items()}
+    fields = {name: field for name, field in shown.items() if not field.of}
+    values = [result.field(name, field.nodal_place) for name, field in fields.items()]
+    frame, start = Frame("", values), f"{list(fields).index('stress')}:von Mises"
+    write_page(
+        path,
+        Content(Path(path).stem, "result", result.mesh, [*fields.values()], [frame], start, result.table()),
     )
-    values = (result.displacement(), result.stress("node"), result.reaction(), result.error().per_element)
-    frame, title = Frame("", values), Path(path).stem
-    write_page(path, Content(title, "result", result.mesh, fields, [frame], "1:von Mises", result.table()))
 
 
 def write_modes_page(path: str | Path, mesh: Mesh, names: Sequence[str], shapes: Array | Complexes) -> None:
@@ -72,6 +73,7 @@ def write_modes_page(path: str | Path, mesh: Mesh, names: Sequence[str], shapes:
     largest = np.linalg.norm(shapes, axis=2).max(axis=1)
     scaled = shapes / np.where(largest > 0, largest, 1.0)[:, None, None]
     parts = [scaled.real] if not scaled.imag.any() else [scaled.real, -scaled.imag]
-    fields = [Field(name, "", "vector") for name in ("displacement", "displacement a quarter period later")]
+    shape = replace(FIELDS["displacement"], unit="")
+    fields = [shape, replace(shape, name=f"{shape.name} a quarter period later")]
     frames = [Frame(name, values) for name, *values in zip(names, *parts, strict=True)]
     write_page(path, Content(Path(path).stem, "modes", mesh, fields[: len(parts)], frames))

@@ -7,7 +7,7 @@ const COMPONENTS = {
   vector: {
     magnitude: (v) => Math.hypot(v[0], v[1], v[2]), x: (v) => v[0], y: (v) => v[1], z: (v) => v[2],
   },
-  stress: {
+  tensor: {
     "von Mises": vonMises, Tresca: (s) => principal(s)[0] - principal(s)[2],
     "principal 1": (s) => principal(s)[0], "principal 2": (s) => principal(s)[1],
     "principal 3": (s) => principal(s)[2],
@@ -33,7 +33,7 @@ function principal([xx, yy, zz, xy, yz, zx]) {
 
 // Return one number for each node or element: a component of values with so many numbers each.
 function component(values, kind, name) {
-  const width = { scalar: 1, vector: 3, stress: 6 }[kind], of = COMPONENTS[kind][name];
+  const width = { scalar: 1, vector: 3, tensor: 6 }[kind], of = COMPONENTS[kind][name];
   const found = new Float32Array(values.length / width);
   for (let i = 0; i < found.length; i++) found[i] = of(values.subarray(i * width, (i + 1) * width));
   return found;
