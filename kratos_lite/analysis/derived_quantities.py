@@ -121,7 +121,7 @@ def result_of(
     """Return a state as a result; `left` is what its balance misses, where that is known."""
     model, loads = e.model, e.system.scatter(e.load(at.time)).copy()
     report = Report(
-        unknowns=len(e.system.reduced.free),
+        unknowns=len(e.system.constraint_map.free),
         total_load=loads.sum(axis=0),
         total_reaction=at.reactions.sum(axis=0),
         solver=integrator,

@@ -116,7 +116,7 @@ class EquationsOfMotion:
     def held(self) -> NDArray[np.bool_]:
         """Which degrees of freedom (3a,) supports or constraints hold."""
         held = np.ones(self.size, dtype=bool)
-        held[self.system.reduced.free] = False
+        held[self.system.constraint_map.free] = False
         return held
 
     def load(self, time: float) -> Array:
@@ -185,7 +185,7 @@ class EquationsOfMotion:
         system, load = self.system, self.system.scatter(self.terms.centrifugal.ravel())
         cure = "let it turn about a principal axis through its center of mass"
         self.free_motions.check([load], moving=True, cure=cure)
-        held = system.reduced.holding(self.free_motions.held[system.nodes])
+        held = system.constraint_map.holding(self.free_motions.held[system.nodes])
         equations = LinearSolver(self.K, held, system.points, Plan("direct"))
         u0 = equations.solve(system.gather(load), 1e-12, system.progress, np.zeros_like(held.c)).x
         return self.terms.stiffening(u0.reshape(-1, 3))
@@ -274,9 +274,9 @@ class EquationsOfMotion:
         return not (acceleration or (rate and (c or damped)))
 
     def _solver(self, A: BlockMatrix, symmetric: bool) -> Solve:
-        reduced = self.system.reduced
-        plan = repeated("auto", len(reduced.free), symmetric)
-        equations = LinearSolver(A, reduced, self.system.points, plan, symmetric=symmetric)
+        constraints = self.system.constraint_map
+        plan = repeated("auto", len(constraints.free), symmetric)
+        equations = LinearSolver(A, constraints, self.system.points, plan, symmetric=symmetric)
         return lambda f, prescribed: equations.solve(f, 1e-13, self.system.progress, prescribed).x
 
 

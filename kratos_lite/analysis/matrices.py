@@ -57,7 +57,7 @@ def matrices_of(
     t, n = number(time, "the time"), model.mesh.n_nodes
     e = EquationsOfMotion(model, lumped=flag(lumped, "lumped"), rayleigh=rayleigh, massless=True)
     dofs = (3 * e.system.nodes[:, None] + np.arange(3)).ravel()
-    free, used = dofs[e.system.reduced.free], len(dofs)
+    free, used = dofs[e.system.constraint_map.free], len(dofs)
     spread = csr_array((np.ones(used), (dofs, np.arange(used))), shape=(3 * n, used))
 
     def whole(A: Any) -> csr_array[Any, Any]:
@@ -72,7 +72,7 @@ def matrices_of(
         M=whole(e.mass.matrix()),
         C=whole(e.matrix(t, 0.0, 1.0, 0.0).scipy()),
         f=np.asarray(spread @ e.load(t)),
-        T=csr_array(spread @ e.system.reduced.transform_matrix()),
+        T=csr_array(spread @ e.system.constraint_map.transform_matrix()),
         c=np.asarray(spread @ e.prescribed(t)),
         free=free,
     )

@@ -54,7 +54,7 @@ def complex_modes(
 
 def _rigid_motions(e: EquationsOfMotion) -> Array:
     """Return the rigid motions (q, k) that supports and constraints leave to the model as a whole."""
-    constraints = e.system.reduced
+    constraints = e.system.constraint_map
     rigid = rigid_modes(e.system.points)
     rigid = rigid / np.linalg.norm(rigid, axis=0)
     missed = constraints.transform(rigid[constraints.free]) - rigid
@@ -159,12 +159,12 @@ def _dense(K: Any, H: Any) -> Array:
 
 def reduced(equations: EquationsOfMotion, A: BlockMatrix) -> Any:
     """Return T^T A T on the free degrees of freedom as CSR."""
-    return equations.system.reduced.reduce_matrix(A.scipy().tocsr())
+    return equations.system.constraint_map.reduce_matrix(A.scipy().tocsr())
 
 
 def expanded(equations: EquationsOfMotion, shapes: Any) -> Any:
     """Return shapes on the free degrees of freedom (q, k) as nodal ones (k, n, 3), 0 where held."""
     system, count = equations.system, shapes.shape[1]
     out = np.zeros((count, system.n_nodes, 3), dtype=shapes.dtype)
-    out[:, system.nodes] = system.reduced.transform(shapes).T.reshape(count, -1, 3)
+    out[:, system.nodes] = system.constraint_map.transform(shapes).T.reshape(count, -1, 3)
     return out

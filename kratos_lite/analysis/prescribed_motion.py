@@ -20,14 +20,14 @@ Kinematics: TypeAlias = tuple[Array, Array, Array]
 
 def prescribed_part(e: EquationsOfMotion, x: Array) -> Array:
     """Return what vectors (3a,) have beyond their free components and what constraints make of those."""
-    reduced = e.system.reduced
-    return np.asarray(x - reduced.transform(x[reduced.free]))
+    constraints = e.system.constraint_map
+    return np.asarray(x - constraints.transform(x[constraints.free]))
 
 
 def with_prescribed(e: EquationsOfMotion, x: Array, prescribed: Array) -> Array:
     """Return vectors (3a,) with the free components of x; the others follow from supports and constraints."""
-    reduced = e.system.reduced
-    return np.asarray(reduced.transform(x[reduced.free]) + prescribed)
+    constraints = e.system.constraint_map
+    return np.asarray(constraints.transform(x[constraints.free]) + prescribed)
 
 
 def at_start(e: EquationsOfMotion, h: float = np.inf) -> Kinematics:

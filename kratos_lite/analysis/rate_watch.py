@@ -30,7 +30,7 @@ class RateWatch:
     def __init__(self, e: EquationsOfMotion) -> None:
         self.equations, self.critical = e, np.inf
         self.of_mesh: float | None = None
-        free = len(e.system.reduced.free)
+        free = len(e.system.constraint_map.free)
         self._done = e.terms is None or not free or (e.terms.motion.steady and not e.rates(0.0)[0])
         if e.terms is None or self._done:
             return

@@ -43,8 +43,8 @@ def solve_steady(
     with phase("assemble"):
         A, symmetric = e.matrix(0.0, 0.0, 0.0, 1.0), e.is_symmetric(0.0, 0.0)
     with phase("solve"):
-        plan = repeated(solver, len(e.system.reduced.free), symmetric)
-        equations = LinearSolver(A, e.system.reduced, e.system.points, plan, symmetric=symmetric)
+        plan = repeated(solver, len(e.system.constraint_map.free), symmetric)
+        equations = LinearSolver(A, e.system.constraint_map, e.system.points, plan, symmetric=symmetric)
         solution = equations.solve(forces, tolerance, progress)
     with phase("verify"):
         u = solution.x
@@ -64,7 +64,7 @@ def solve_steady(
             limit = critical_rate_estimate(e.terms) if critical is None else critical
             warnings += near_critical(e.terms.motion, 0.0, limit, critical is not None)
     report = Report(
-        unknowns=len(e.system.reduced.free),
+        unknowns=len(e.system.constraint_map.free),
         total_load=nodal.sum(axis=0),
         total_reaction=reactions.sum(axis=0),
         **quality(solution, balance),

@@ -303,7 +303,7 @@ class TransientAnalysis:
 
     def _free_part(self, forces: Array) -> float:
         """Return the largest free component of forces (3a,)."""
-        return float(np.abs(self.equations.system.reduced.reduce(forces)).max(initial=0.0))
+        return float(np.abs(self.equations.system.constraint_map.reduce(forces)).max(initial=0.0))
 
     def result(self, state: State | None = None) -> Result:
         """Return a state as a result with strains and stresses.

@@ -69,7 +69,7 @@ class PetscSystem(ConstrainedSystem):
 
     def _planned(self, solver: str) -> Plan:
         ratios = [bulk_over_shear(group.material.C) for group in self.groups]
-        return plan_of(solver, len(self.reduced.free), max(ratios, default=0.0), self._options)
+        return plan_of(solver, len(self.constraint_map.free), max(ratios, default=0.0), self._options)
 
     @cached_property
     def K(self) -> ElementProduct:
@@ -78,7 +78,7 @@ class PetscSystem(ConstrainedSystem):
 
     @cached_property
     def _equations(self) -> PetscSolver:  # type: ignore[override]
-        cut = Cut(self.points, self.K.groups, self.reduced, self._ranks.size)
+        cut = Cut(self.points, self.K.groups, self.constraint_map, self._ranks.size)
         return PetscSolver(self, cut, self._ranks, self._options)
 
     def destroy(self) -> None:
@@ -105,7 +105,7 @@ class PetscSolver:
     ) -> None:
         self._system, self._cut, self._ranks, self._options = system, cut, ranks, options
         self._plan, self._key, self._norm = system.plan, -1, 0.0
-        self._unknowns = len(system.reduced.free)
+        self._unknowns = len(system.constraint_map.free)
         self._progress = Postponed(system.progress) if system.progress else None
 
     @property
@@ -143,7 +143,7 @@ class PetscSolver:
         near: Array | None = None,
     ) -> Solution:
         """Return the displacements (3a,) under forces (3a,), and how they were found."""
-        constraints = self._system.reduced
+        constraints = self._system.constraint_map
         c = constraints.c if prescribed is None else prescribed
         load = forces - self._system.K @ c if c.any() else forces
         b, start = np.zeros(len(c)), None

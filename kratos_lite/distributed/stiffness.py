@@ -21,7 +21,7 @@ from kratos_lite.distributed.communicator import Alone
 from kratos_lite.distributed.ghosts import Ghosts
 from kratos_lite.distributed.multigrid import Level, Multigrid
 from kratos_lite.native import kernels
-from kratos_lite.solvers.coarse_level import has_corners, has_middle_nodes, is_stretched, linear_level
+from kratos_lite.solvers.coarse_level import has_corners, has_middle_nodes, is_stretched, p_coarse_level
 from kratos_lite.solvers.constraint_map import rigid_modes
 from kratos_lite.solvers.multigrid import multigrid
 from kratos_lite.solvers.plan import Facts, needs_no_matrix
@@ -48,7 +48,7 @@ class OneProcess:
         groups: Sequence[ElementGroup],
         own: int,
     ) -> None:
-        self._multigrid = multigrid(K, free.ravel(), points, linear_level(points, groups))
+        self._multigrid = multigrid(K, free.ravel(), points, p_coarse_level(points, groups))
         self._all, self._own = 3 * len(points), own
 
     @property
@@ -170,7 +170,7 @@ class SharedStiffness:
         """Return the level of linear elements, the way to it, and places and freedom of its own nodes."""
         n, own = len(self.points), self.ghosts.own
         if self.groups:
-            linear = linear_level(self.points, self.groups, whole=False)
+            linear = p_coarse_level(self.points, self.groups, whole=False)
             assert linear is not None
             nodes, weights = linear.nodes, (linear.indptr, linear.indices, linear.weights)
             K = linear.K

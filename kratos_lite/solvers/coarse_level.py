@@ -98,9 +98,6 @@ def p_coarse_level(
     return level if hanging is None else _continuous(level, groups, number, hanging)
 
 
-linear_level = p_coarse_level  # the name by which `distributed` asks for it
-
-
 def has_middle_nodes(groups: Sequence[ElementGroup]) -> bool:
     """Return whether some elements have nodes beside their corners."""
     return not all(_is_linear(group.element.shape) for group in groups)

@@ -51,7 +51,7 @@ class ConstrainedSystem:
         self.n_nodes = len(points)
         self.nodes, self.groups = renumber(self.n_nodes, groups)
         self.points = points[self.nodes]
-        self.reduced = constraints(self.nodes)
+        self.constraint_map = constraints(self.nodes)
         self.tolerance, self.progress = tolerance, progress
         self._hanging = hanging if hanging is None else hanging.among(self.nodes, self.n_nodes)
         self.skipped: list[str] = []
@@ -64,7 +64,7 @@ class ConstrainedSystem:
 
     def _facts(self) -> Facts:
         return Facts(
-            len(self.reduced.free),
+            len(self.constraint_map.free),
             3 * len(self.nodes),
             bulk_over_shear=lambda: largest_bulk_over_shear(self.groups),
             bandwidth=self._bandwidth,
@@ -78,12 +78,12 @@ class ConstrainedSystem:
         from kratos_lite.solvers.banded import cuthill_mckee, nodal_width  # rarely needed
 
         width = nodal_width(self.pattern, self.pattern.rows(), cuthill_mckee(self.pattern)[1])
-        return width * len(self.reduced.free) / len(self.nodes)
+        return width * len(self.constraint_map.free) / len(self.nodes)
 
     def _has_product(self) -> bool:
         from kratos_lite.assembly.matrix_free import MatrixFree  # a quick start for small models
 
-        tied = self.reduced.T is not None or self._hanging is not None
+        tied = self.constraint_map.T is not None or self._hanging is not None
         return not tied and all(map(MatrixFree.takes, self.groups))
 
     def _is_stretched(self) -> bool:
@@ -95,7 +95,7 @@ class ConstrainedSystem:
         from kratos_lite.solvers.plate_level import plate_axes  # a quick start for small models
 
         free = np.zeros(3 * len(self.points), dtype=bool)
-        free[self.reduced.free] = True
+        free[self.constraint_map.free] = True
         return plate_axes(self.points, free) is not None
 
     @cached_property
@@ -135,7 +135,7 @@ class ConstrainedSystem:
 
     @cached_property
     def _equations(self) -> LinearSolver:
-        return LinearSolver(self.K, self.reduced, self.points, self.plan, self._p_coarse_level)
+        return LinearSolver(self.K, self.constraint_map, self.points, self.plan, self._p_coarse_level)
 
     def _p_coarse_level(self) -> PCoarseLevel | None:
         from kratos_lite.solvers.coarse_level import p_coarse_level  # a quick start for small models
@@ -171,11 +171,11 @@ class ConstrainedSystem:
 
     def reduce(self, forces: Array) -> Array:
         """Return what nodal forces (n, 3) do on the free degrees of freedom, (q,)."""
-        return self.reduced.reduce(self.gather(forces))
+        return self.constraint_map.reduce(self.gather(forces))
 
     def expand(self, q: Array) -> Array:
         """Return the displacements (n, 3) of the free degrees of freedom (q,)."""
-        return self.scatter(self.reduced.expand(q))
+        return self.scatter(self.constraint_map.expand(q))
 
     def gather(self, values: Array) -> Array:
         """Return nodal values (n, 3) as those of the equations, (3a,)."""

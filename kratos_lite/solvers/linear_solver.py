@@ -12,7 +12,6 @@ import numpy as np
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.solvers import direct
 from kratos_lite.solvers.constraint_map import ConstraintMap
-from kratos_lite.solvers.plan import METHODS as METHODS  # noqa: PLC0414
 from kratos_lite.solvers.plan import Plan, after, is_quick_to_factorize, tolerance_of
 from kratos_lite.typing import Array, Ints, Mask, Progress
 
@@ -40,7 +39,7 @@ class LinearSolver:
     """
 
     K: Any  # full for ``dense``, split for ``displacement-pressure``, else blocks or a product; (3n, 3n) N/m
-    reduced: ConstraintMap  # the supports
+    constraint_map: ConstraintMap  # the supports
     points: Array  # (n, 3) m, from which multigrid knows the rigid modes
     plan: Plan  # how it is solved
     p_coarse_level: Callable[[], PCoarseLevel | None] | None = None
@@ -59,16 +58,16 @@ class LinearSolver:
         `prescribed` displacements (3n,) take the place of c of the constraint map.  An iteration begins at
         `start` (3n,), of which the free components count, if that is nearer than 0.
         """
-        c = self.reduced.c if prescribed is None else prescribed
-        b = self.reduced.reduce(f - self.K @ c)
+        c = self.constraint_map.c if prescribed is None else prescribed
+        b = self.constraint_map.reduce(f - self.K @ c)
         tolerance *= self._fraction(f, c, b)
         if start is not None and self.plan.iterates:
-            start = self.reduced.expand((start - c)[self.reduced.free], c)
-            residual, size = self.reduced.reduce(f - self.K @ start), float(np.linalg.norm(b))
+            start = self.constraint_map.expand((start - c)[self.constraint_map.free], c)
+            residual, size = self.constraint_map.reduce(f - self.K @ start), float(np.linalg.norm(b))
             if np.linalg.norm(residual) <= size:
                 return self._continue(f, start, residual, size, tolerance, progress)
         solution = self._solve(b, tolerance, progress) if len(b) else self._solution(b, 0, 0.0)
-        return replace(solution, x=self.reduced.expand(solution.x, c))
+        return replace(solution, x=self.constraint_map.expand(solution.x, c))
 
     def _solution(self, x: Array, iterations: int, error: float, plan: Plan | None = None) -> Solution:
         plan = self.plan if plan is None else plan
@@ -83,7 +82,7 @@ class LinearSolver:
         soft = getattr(self.K, "A", None)
         if soft is None or not c.any():
             return 1.0
-        size = float(np.linalg.norm(self.reduced.reduce(f - soft @ c)))
+        size = float(np.linalg.norm(self.constraint_map.reduce(f - soft @ c)))
         return min(1.0, size / (float(np.linalg.norm(b)) or 1.0))
 
     def _continue(
@@ -102,8 +101,8 @@ class LinearSolver:
             change = self._solve(residual, aim / norm, progress, continued=True)
         else:
             change = self._solution(np.zeros(len(residual)), 0, 0.0)
-        u = self.reduced.expand(change.x, start)
-        error = backward_error(self.reduced.reduce(f - self.K @ u), self.norm, u, f)
+        u = self.constraint_map.expand(change.x, start)
+        error = backward_error(self.constraint_map.reduce(f - self.K @ u), self.norm, u, f)
         return replace(change, x=u, backward_error=error)
 
     def _solve(
@@ -129,9 +128,9 @@ class LinearSolver:
     @cached_property
     def _matrix(self) -> Any:
         """The reduced matrix: a full array for the method ``dense``, else CSR."""
-        T, free = self.reduced.T, self.reduced.free
+        T, free = self.constraint_map.T, self.constraint_map.free
         if self.plan.method != "dense":
-            return self.reduced.reduce_matrix(self.K.scipy().tocsr())
+            return self.constraint_map.reduce_matrix(self.K.scipy().tocsr())
         return self.K[np.ix_(free, free)] if T is None else T.T @ self.K @ T
 
     @cached_property
@@ -147,7 +146,7 @@ class LinearSolver:
 
         It is a BlockMatrix, a MatrixFree or a SplitMatrix, as K is.
         """
-        T, free = self.reduced.T, self.reduced.free
+        T, free = self.constraint_map.T, self.constraint_map.free
         if T is None:
             return self.K
         if isinstance(self.K, BlockMatrix):
@@ -157,17 +156,17 @@ class LinearSolver:
 
     @cached_property
     def _free(self) -> Mask:
-        free = np.zeros(len(self.reduced.c), dtype=bool)
-        free[self.reduced.free] = True
+        free = np.zeros(len(self.constraint_map.c), dtype=bool)
+        free[self.constraint_map.free] = True
         return free
 
     @cached_property
     def _multigrid(self) -> Solver:
         linear, matrix = self.p_coarse_level() if self.p_coarse_level else None, self._blocks
-        if linear is not None and self.reduced.T is not None:
+        if linear is not None and self.constraint_map.T is not None:
             from kratos_lite.solvers.coarse_level import apply_ties  # rarely needed
 
-            linear = apply_ties(linear, self.reduced.T, self.reduced.free)
+            linear = apply_ties(linear, self.constraint_map.T, self.constraint_map.free)
         if self.plan.method == "amg":
             from kratos_lite.solvers.multigrid import multigrid  # a quick start for small models
 
@@ -191,7 +190,7 @@ class LinearSolver:
         """Solve by multigrid; return also how it is solved, in another way if that did not converge."""
         from kratos_lite.solvers.iteration import ConvergenceForecast  # as for multigrid
 
-        free, rhs = self.reduced.free, np.zeros(len(self._free))
+        free, rhs = self.constraint_map.free, np.zeros(len(self._free))
         rhs[free] = b
         aim = tolerance if continued else tolerance_of(tolerance, len(b))
         forecast = ConvergenceForecast(tolerance) if is_quick_to_factorize(len(b)) else None

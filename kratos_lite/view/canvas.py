@@ -68,11 +68,19 @@ def axes_for_curves(figure: Any, place: Any, size: Any) -> Any:
     return axes
 
 
-def new_plot(size: tuple[float, float], scale: str = "linear") -> tuple[Any, Any]:
-    """Return a figure with axes for curves alone."""
+def new_plot(size: tuple[float, float], *units: str, log: bool = False) -> tuple[Any, Any]:
+    """Return a figure with axes for curves alone, numbers with prefixes of their units, if any."""
     figure = empty(size)
+    from matplotlib.ticker import EngFormatter, LogLocator
+
+    scale = "log" if log else "linear"
     axes = figure.add_subplot(xscale=scale, yscale=scale)
     axes.spines[["top", "right"]].set_visible(False)
+    for axis, unit in zip((axes.xaxis, axes.yaxis), units, strict=True):
+        axis.set_major_formatter(EngFormatter(unit) if unit else "{x:g}")
+        if log:
+            axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+            axis.set_minor_formatter("")
     return figure, axes
 
 

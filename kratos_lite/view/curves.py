@@ -17,11 +17,7 @@ def line_figure(
     x: Array, curves: Mapping[str, Array], unit: str, title: str, size: tuple[float, float]
 ) -> Any:
     """Return a figure of up to three curves (k,) by their labels, against a distance x (k,) in m."""
-    figure, axes = new_plot(size)
-    from matplotlib.ticker import EngFormatter
-
-    axes.xaxis.set_major_formatter(EngFormatter("m"))
-    axes.yaxis.set_major_formatter(EngFormatter(unit) if unit else "{x:g}")
+    figure, axes = new_plot(size, "m", unit)
     for (name, values), (dashes, color, width) in zip(curves.items(), STYLES, strict=False):
         axes.plot(x, values, ls=dashes, color=color, lw=width, label=name)
     axes.margins(x=0)
@@ -33,13 +29,7 @@ def convergence_figure(
     unknowns: Array, errors: Array, goal: float | None, of: str, title: str, size: tuple[float, float]
 ) -> Any:
     """Return a figure of relative errors (k,) of a quantity against unknowns (k,), and of its goal."""
-    figure, axes = new_plot(size, "log")
-    from matplotlib.ticker import LogLocator
-
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-        axis.set_major_formatter("{x:g}")
-        axis.set_minor_formatter("")
+    figure, axes = new_plot(size, "", "", log=True)
     unknowns, percent = unknowns[errors > 0], 100 * errors[errors > 0]
     axes.plot(unknowns, percent, "o-", color=BLUE, lw=1.8, ms=5, label="reported")
     if goal is not None:

@@ -197,6 +197,11 @@ def test_ties_along_the_flow_are_glue():
         assert all(
             text.startswith(f"{glued} constraints hold moving material along its flow") for text in said
         )
+    for along in (0.02, 0.3):  # a force mostly across the flow, which is along x there
+        model, upper, lower = wheel_on_rail("")
+        model.constrain((int(lower[0]), "y"), {(int(upper[0]), "y"): 1.0, (int(upper[0]), "x"): along})
+        model.add(Rotation("z", 1.0, part="wheel"))
+        assert any(text.startswith("1 constraints hold") for text in model.transient().equations.warnings)
     whole = kl.Model(wheel_mesh(), STEEL)
     whole.fix("inner")
     whole.constrain((40, "x"), {(41, "x"): 1.0})

@@ -252,6 +252,18 @@ def _over_half(model, result):
     return body_force(result.mesh.points, half, np.array([2.0, 0.0, 0.0]))
 
 
+def test_the_mean_around_a_point_takes_all_elements_that_share_a_corner():
+    """A point in the cell at one corner of 27: the 8 cells around that cell's inner corner."""
+    mesh = kl.box((3, 3, 3), (3, 3, 3))
+    model = kl.Model(mesh, kl.Isotropic3D(E=1.0, nu=0.3))
+    model.fix("z-")
+    for cell, around in (((0, 0, 0), 8), ((0, 0, 1), 12), ((1, 1, 1), 27), ((2, 2, 2), 8), ((2, 0, 1), 12)):
+        group = kl.StressAt(np.add(cell, (0.4, 0.3, 0.6)), "xx")._around(model.solve())
+        centers = mesh.points[group.nodes].mean(axis=1) - 0.5
+        assert len(group) == around
+        assert (np.abs(centers - cell).max(axis=1) < 1.5).all()
+
+
 def test_a_part_that_nothing_moves_has_no_error():
     mesh = scenes.joined([kl.box(cells=(2, 2, 2), origin=(2.0 * i, 0, 0)) for i in range(2)])
     model = kl.Model(mesh, kl.Isotropic3D(E=1e3, nu=0.3))

@@ -27,7 +27,7 @@ def model():
 def system(transient):
     """Return M, C, K on the free degrees of freedom as full matrices, and these."""
     e = transient.equations
-    free = e.system.reduced.free
+    free = e.system.constraint_map.free
     shares = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
     return *(e.matrix(0.0, *s).scipy().toarray()[np.ix_(free, free)] for s in shares), free
 

@@ -63,7 +63,7 @@ def test_smoothing_is_that_of_the_matrix(kind, material):
     system = system_of(model)
     product, K, r = both(model)
     free = np.zeros(len(r), dtype=bool)
-    free[system.reduced.free] = True
+    free[system.constraint_map.free] = True
     linear = system._equations.p_coarse_level()
     r[~free] = 0.0
     z = [multigrid(A, free, model.mesh.points, linear).precondition(r) for A in (product, K)]

@@ -1,5 +1,7 @@
 """Recovered stresses: polynomials are exact, materials apart, hanging nodes harmless, kernels as NumPy."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from computing import compiled, same_on_all_threads
@@ -123,6 +125,24 @@ def test_meshes_of_few_layers_recover_constant_and_linear_stress(kind, cells):
     values = field(region.groups[0].at(mesh.points).gauss_points())
     found = region.at_nodes(mesh.points, [values])
     assert np.abs(found - field(mesh.points)).max() < 1e-9
+
+
+@pytest.mark.parametrize(("kind", "share"), [("10N", 0.5), ("15N", 1.0), ("20N", 1.0)])
+def test_nodes_have_their_share_of_what_polynomials_leave_of_the_samples(kind, share, monkeypatch):
+    """Recovered = polynomial + share · (mean of the extrapolated - mean of the polynomials at the node)."""
+    mesh = warped(kind, 3)
+    region = region_of(mesh)
+    (group,) = region.groups
+    values = np.random.default_rng(4).normal(size=(len(group), len(group.rule), 6))
+    found, plain = region.at_nodes(mesh.points, [values]), sampling(group.element, group.rule)
+
+    def recovered(factor):
+        way = replace(plain, to_nodes=factor * plain.to_nodes / plain.to_nodes.sum(axis=1).mean())
+        monkeypatch.setattr(recovery, "sampling", lambda *_: way)
+        return region.at_nodes(mesh.points, [values])
+
+    polynomials, whole = recovered(0.0), recovered(1.0)
+    np.testing.assert_allclose(found, polynomials + share * (whole - polynomials), atol=1e-12)
 
 
 # ---- materials --------------------------------------------------------------------------------------

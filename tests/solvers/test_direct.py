@@ -138,7 +138,7 @@ def test_a_second_right_side_does_not_factorize_again(method, monkeypatch):
     for seed in (1, 2, 3):
         f = right_side(K.shape[0], seed)
         solution = equations.solve(f, 1e-10)
-        free = equations.reduced.free
+        free = equations.constraint_map.free
         np.testing.assert_allclose((K @ solution.x)[free], f[free], rtol=0, atol=1e-10)
     assert count == ["factorize_dense" if method == "dense" else "factorize"]
 

@@ -312,7 +312,7 @@ def hierarchy(model):
     module = kernels("multigrid")
     system = ConstrainedSystem(model.mesh.points, model.element_groups(), model.supports.constraint_map)
     free = np.zeros(3 * len(system.points), dtype=bool)
-    free[system.reduced.free] = True
+    free[system.constraint_map.free] = True
     linear = coarse_level.p_coarse_level(system.points, system.groups)
     b = np.random.default_rng(1).standard_normal(len(free)) * free
     return Compiled(module, system.K, free, system.points, linear), b

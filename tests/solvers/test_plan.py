@@ -184,7 +184,7 @@ def test_few_unknowns_are_iterated_to_round_off_whatever_the_tolerance(monkeypat
     few, solution = system.solve(forces, tolerance=1e-3)
     size = np.abs(few).max()
     np.testing.assert_allclose(system.solve(forces, tolerance=1e-14)[0], few, rtol=0, atol=1e-12 * size)
-    monkeypatch.setattr(plan, "DIRECT_LIMIT", len(system.reduced.free) - 1)
+    monkeypatch.setattr(plan, "DIRECT_LIMIT", len(system.constraint_map.free) - 1)
     many, sooner = system.solve(forces, tolerance=1e-3)
     assert sooner.iterations < solution.iterations
     assert 1e-9 * size < np.abs(many - few).max() < 1e-2 * size

@@ -103,7 +103,7 @@ class _Summary:
         rows = [
             ("nodes", str(mesh.n_nodes)),
             ("elements", kinds),
-            ("unknowns", str(len(e.system.reduced.free))),
+            ("unknowns", str(len(e.system.constraint_map.free))),
             ("integrator", str(self.transient.integrator) + (", lumped mass" if e.mass.lumped else "")),
             ("time", span),
             ("largest displacement", f"{self.largest:.6e} m {where}"),

@@ -39,7 +39,7 @@ def moving_load(share: float) -> Callable[[str], float]:
         K = reduced(e, e.matrix(0.0, BED / SOIL.density, 0.0, 1.0)).toarray()
         force = np.zeros(e.size)
         force[3 * middle] = FORCE / len(middle)
-        constraints = e.system.reduced
+        constraints = e.system.constraint_map
         u = constraints.expand(np.linalg.solve(K, constraints.reduce(force)))
         return float(u[3 * middle[0]] / exact)
 
