@@ -29,7 +29,6 @@ MATRICES = "tests/ale/test_matrices.py"
 PRODUCTS = "tests/assembly/test_matrix_free.py"
 MATERIALS = "tests/materials/test_orthotropic.py"
 MASS = "tests/assembly/test_exact_mass.py"
-RECOVERY = "tests/assembly/test_recovery.py"
 QUANTITIES = "tests/analysis/test_quantities.py"
 PRESTRESS = "tests/io/kratos/test_initial_state.py -k prestress"
 VOIGT = "tests/test_voigt.py"
@@ -581,32 +580,6 @@ MUTATIONS = [
     # ---- errors of quantities
     Mutation("analysis/quantities.py", "self.axis)] = -1.0", "self.axis)] = 1.0", QUANTITIES),
     Mutation("analysis/quantities.py", "(off * volume).sum()", "2 * (off * volume).sum()", QUANTITIES),
-    Mutation("analysis/quantities.py", "[:, : group.element.shape.corners]", "[:, :2]", QUANTITIES),
-    Mutation(
-        "analysis/adjoint.py",
-        "held[block.nodes, axis].all(axis=1)",
-        "(held[block.nodes, axis].sum(axis=1) >= 2)",
-        QUANTITIES,
-    ),
-    *(
-        Mutation("analysis/error_estimate.py", old, new, RECOVERY)
-        for old, new in (
-            ("size = energy + sums", "size = energy - sums"),
-            ("lambda name: SAFETY[name] ** 2 *", "lambda name: SAFETY[name] *"),
-            ("> COARSE**2 *", "> COARSE *"),
-        )
-    ),
-    Mutation("assembly/recovery.py", "else 0.5 if shape.cell", "else 0.4 if shape.cell", RECOVERY),
-    # ---- ties, lines across thin bodies
-    Mutation("ale/moving_part.py", "ALONG = 1e-6", "ALONG = 0.5", "tests/ale/test_parts.py"),
-    *(
-        Mutation("solvers/plate_level.py", old, new, "tests/solvers/test_hard_cases.py -k plate")
-        for old, new in (
-            ("constrained > 0.5 else", "constrained > 0.9 else"),
-            ("along <= 0.5", "along <= 0.9"),
-            ("w + height * slope, w - height * slope", "w - height * slope, w + height * slope"),
-        )
-    ),
     # ---- principal stresses, lines, comparisons
     Mutation("voigt.py", "np.sqrt(2 / 3) * radius", "np.sqrt(1 / 3) * radius", VOIGT),
     Mutation("voigt.py", "np.sin(angle + np.pi / 3)", "np.sin(angle + np.pi / 6)", VOIGT),
@@ -639,8 +612,20 @@ MUTATIONS = [
         "tests/assembly/test_recovery.py -k nodes_have_their_share",
     ),
     Mutation("analysis/quantities.py", "nodes[:, : group.element.shape.corners]", "nodes[:, :2]", QUANTITIES),
+    Mutation(
+        "analysis/adjoint.py",
+        "held[block.nodes, axis].all(axis=1)",
+        "(held[block.nodes, axis].sum(axis=1) >= 2)",
+        QUANTITIES,
+    ),
+    Mutation(
+        "solvers/plate_level.py",
+        "np.round(squares / (squares.max() or 1.0), 6)",
+        "squares",
+        "tests/solvers/test_hard_cases.py -k constant_curvature",
+    ),
     Mutation("ale/moving_part.py", "ALONG = 1e-6", "ALONG = 0.5", "tests/ale/test_parts.py -k glue"),
-    Mutation("solvers/plate_level.py", "or held > 0.5", "or held > 0.9", PLATE),
+    Mutation("solvers/plate_level.py", "constrained > 0.5", "constrained > 0.9", PLATE),
     Mutation("solvers/plate_level.py", "along <= 0.5", "along <= 0.9", PLATE),
     Mutation(
         "solvers/plate_level.py",
