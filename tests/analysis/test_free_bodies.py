@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from meshes import joined
 
 import kratos_lite as kl
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
@@ -135,11 +136,7 @@ def test_a_rotor_out_of_balance_is_refused(axis, center, what):
 def bars():
     """Return two bars beside each other, and the nodes of the second."""
     one, other = kl.box((3, 1, 1), (3, 2, 2)), kl.box((3, 1, 1), (3, 2, 2), origin=(4, 0, 2))
-    n, block = one.n_nodes, one.blocks[0]
-    nodes = np.vstack([block.nodes, block.nodes + np.int32(n)])
-    ids = np.arange(len(nodes)) + 1
-    blocks = [kl.Block(block.name, nodes, ids, 0 * ids, block.shape)]
-    return kl.Model(kl.Mesh(np.vstack([one.points, other.points]), blocks), STEEL), n
+    return kl.Model(joined(one, other), STEEL), one.n_nodes
 
 
 def ends(*places):

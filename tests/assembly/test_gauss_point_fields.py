@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 from computing import compiled, printed, same_on_all_threads
-from meshes import changed_at, with_block
+from meshes import changed_at, joined, with_block
 from rounding import all_close
 
 import kratos_lite as kl
@@ -42,19 +42,6 @@ def distorted(name, cells=(3, 2, 2)):
     shift = np.random.default_rng(len(name)).uniform(-0.05, 0.05, mesh.points.shape)
     mesh = mesh.replace(points=mesh.points + shift * (3.0 / cells[0]))
     return mesh
-
-
-def joined(*meshes):
-    """Return one mesh of several, with their nodes kept apart."""
-    points, blocks, rows, ids = [], [], 0, 1
-    for mesh in meshes:
-        points.append(mesh.points)
-        for b in mesh.blocks:
-            at = np.arange(ids, ids + len(b))
-            blocks.append(Block(b.name, b.nodes + np.int32(rows), at, b.properties, b.shape))
-            ids += len(b)
-        rows += len(mesh.points)
-    return Mesh(np.vstack(points), blocks)
 
 
 def strained(mesh, seed=3):

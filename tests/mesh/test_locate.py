@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from meshes import joined
 
 import kratos_lite as kl
 from kratos_lite.bodies.rotations import exp
@@ -240,8 +241,7 @@ def test_a_thin_gap_belongs_to_nobody():
         kl.box((1.0, 1.0, 1.0), (2, 2, 2)),
         kl.box((1.0, 1.0, 1.0), (2, 2, 2), origin=(1 + gap, 0, 0)),
     )
-    nodes = np.vstack([left.blocks[0].nodes, right.blocks[0].nodes + left.n_nodes])
-    mesh = Mesh(np.vstack([left.points, right.points]), [block("KinematicLinear3D8N", nodes)])
+    mesh = joined(left, right)
     x = np.array([1 - gap / 4, 1 + gap / 4, 1 + gap / 2, 1 + 3 * gap / 4, 1 + 5 * gap / 4])
     found = mesh.locate(np.column_stack([x, 0 * x + 0.3, 0 * x + 0.8]))
     assert found.inside.tolist() == [True, False, False, False, True]

@@ -5,6 +5,7 @@ import pickle
 
 import numpy as np
 import pytest
+from meshes import joined
 
 import kratos_lite as kl
 
@@ -69,13 +70,7 @@ def test_boundary_of_a_box_has_its_area_outward(element):
 
 def test_faces_between_different_cells_are_inside():
     wedges, bricks = kl.box(element="KinematicLinear3D6N"), kl.box(origin=(1, 0, 0))
-    points = np.vstack([wedges.points, bricks.points])
-    unique, rows = np.unique(points.round(9), axis=0, return_inverse=True)
-    blocks = [
-        kl.Block(b.name, rows.ravel()[b.nodes + shift].astype(np.int32), b.ids, b.properties, b.shape)
-        for b, shift in ((wedges.blocks[0], 0), (bricks.blocks[0], wedges.n_nodes))
-    ]
-    mesh = kl.Mesh(unique, blocks)
+    mesh = joined(wedges, bricks, welded=True)
     assert sorted((block.name, len(block)) for block in mesh.boundary) == [
         ("Quadrilateral4", 8),
         ("Triangle3", 4),

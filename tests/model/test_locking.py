@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from meshes import joined
 
 import kratos_lite as kl
 
@@ -98,10 +99,7 @@ def test_sound_elements_near_incompressibility_are_not_warned_of(element):
 
 
 def test_bodies_far_apart_are_looked_at_one_by_one():
-    one = kl.box(element=PLAIN)
-    points = np.vstack([one.points, one.points + np.array([20.0, 0.0, 0.0])])
-    nodes = one.blocks[0].nodes
-    model = kl.Model(kl.Mesh(points, {PLAIN: np.vstack([nodes, nodes + 8])}), STEEL)
+    model = kl.Model(joined(kl.box(element=PLAIN), kl.box(element=PLAIN, origin=(20, 0, 0))), STEEL)
     model.fix("z-")
     assert model.check() == []
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from meshes import changed_at, with_block
+from meshes import changed_at, joined, with_block
 
 import kratos_lite as kl
 
@@ -107,9 +107,7 @@ def test_a_line_of_supports_leaves_the_rotation_about_it():
 
 def test_half_of_a_body_that_floats_is_named_and_coincident_nodes_are_counted():
     low, high = kl.box(), kl.box(origin=(0, 0, 1))
-    nodes = np.vstack([low.blocks[0].nodes, high.blocks[0].nodes + 8])
-    mesh = kl.Mesh(np.vstack([low.points, high.points]), [block(nodes)])
-    model = kl.Model(mesh, STEEL)
+    model = kl.Model(joined(low, high), STEEL)
     model.fix("z-")
     with pytest.raises(
         kl.ModelError, match=r"the part of node 9 \(8 nodes\) can still move: translation x, y, z"
@@ -126,11 +124,7 @@ def test_half_of_a_body_that_floats_is_named_and_coincident_nodes_are_counted():
     ids=["edge", "corner"],
 )
 def test_bodies_that_hang_together_by_an_edge_or_a_corner_can_turn_there(solver, shift, words):
-    one = kl.box()
-    points = np.vstack([one.points, one.points + shift])
-    unique, merged = np.unique(points, axis=0, return_inverse=True)
-    nodes = np.vstack([one.blocks[0].nodes, one.blocks[0].nodes + 8])
-    model = kl.Model(kl.Mesh(unique, [block(merged.ravel()[nodes])]), STEEL)
+    model = kl.Model(joined(kl.box(), kl.box(origin=shift), welded=True), STEEL)
     model.fix("z-")
     with pytest.raises(
         kl.ModelError, match=rf"can still move: {words} \(it hangs on a node or an edge only\)"
@@ -190,14 +184,18 @@ def test_impossible_material_constants_are_refused(constants, text):
         kl.Isotropic3D(**{"E": 1.0, "nu": 0.3, **constants})
 
 
-def test_impossible_orthotropic_constants_are_refused():
-    good = {"E_x": 1, "E_y": 1, "E_z": 1, "nu_xy": 0, "nu_yz": 0, "nu_xz": 0, "G_xy": 1, "G_yz": 1, "G_xz": 1}
-    with pytest.raises(kl.MaterialError, match=r"nu_xy² = 1.21 must be < E_x / E_y = 1"):
-        kl.Orthotropic3D(**{**good, "nu_xy": 1.1})
-    with pytest.raises(kl.MaterialError, match="the three Poisson ratios together are too large"):
-        kl.Orthotropic3D(**{**good, "nu_xy": 0.9, "nu_yz": 0.9, "nu_xz": 0.9})
-    with pytest.raises(kl.MaterialError, match=r"G_yz \(SHEAR_MODULUS_YZ\) 0 must be > 0 Pa"):
-        kl.Orthotropic3D(**{**good, "G_yz": 0})
+@pytest.mark.parametrize(
+    ("constants", "text"),
+    [
+        ({"nu_xy": 1.1}, r"nu_xy² = 1.21 must be < E_x / E_y = 1"),
+        ({"nu_xy": 0.9, "nu_yz": 0.9, "nu_xz": 0.9}, "the three Poisson ratios together are too large"),
+        ({"G_yz": 0}, r"G_yz \(SHEAR_MODULUS_YZ\) 0 must be > 0 Pa"),
+    ],
+)
+def test_impossible_orthotropic_constants_are_refused(constants, text):
+    good = dict.fromkeys(("E_x", "E_y", "E_z", "G_xy", "G_yz", "G_xz"), 1)
+    with pytest.raises(kl.MaterialError, match=text):
+        kl.Orthotropic3D(**{**good, **dict.fromkeys(("nu_xy", "nu_yz", "nu_xz"), 0), **constants})
 
 
 def test_nearly_incompressible_bricks_warn_that_they_lock():
@@ -271,11 +269,7 @@ def test_elements_that_cover_each_other_are_reported():
 
 def test_a_face_between_linear_and_quadratic_bricks_is_reported():
     low, high = kl.box(), kl.box(element=kind(20), origin=(0, 0, 1))
-    points = np.vstack([low.points, high.points])
-    unique, merged = np.unique(points, axis=0, return_inverse=True)
-    merged = merged.ravel()
-    blocks = [block(merged[low.blocks[0].nodes]), block(merged[high.blocks[0].nodes + 8], 20)]
-    warnings = model_of(kl.Mesh(unique, blocks)).solve().report.warnings
+    warnings = model_of(joined(low, high, welded=True)).solve().report.warnings
     assert any("share the corners of a face but not its further nodes" in text for text in warnings)
 
 
@@ -315,11 +309,7 @@ def test_one_gauss_point_still_gives_a_constant_stress_at_the_nodes(nodes):
 
 def test_a_square_that_meets_two_triangles_is_reported():
     low, high = kl.box(), kl.box(element=kind(4), origin=(0, 0, 1))
-    points = np.vstack([low.points, high.points])
-    unique, merged = np.unique(points, axis=0, return_inverse=True)
-    merged = merged.ravel()
-    blocks = [block(merged[low.blocks[0].nodes]), block(merged[high.blocks[0].nodes + 8], 4)]
-    warnings = model_of(kl.Mesh(unique, blocks)).solve().report.warnings
+    warnings = model_of(joined(low, high, welded=True)).solve().report.warnings
     assert any("1 four-sided faces (the first of element 1) meet triangles" in text for text in warnings)
 
 

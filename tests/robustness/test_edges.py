@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from meshes import joined
 from rounding import round_off
 
 import kratos_lite as kl
@@ -185,16 +186,9 @@ def test_model_without_load_says_so():
 
 @pytest.mark.parametrize("n", [2, 61, 62, 200, 310])
 def test_chain_of_cells_that_share_single_edges_is_a_mechanism(n):
-    corner = kl.KinematicLinear3D8N.nodes / 2 + 0.5
-    every = np.vstack([corner + np.array([i, i, 0]) for i in range(n)])
-    points, rows = np.unique(every, axis=0, return_inverse=True)
-    ids = np.arange(1, n + 1)
-    nodes = rows.reshape(n, 8).astype(np.int32)
-    mesh = kl.Mesh(
-        points, [kl.Block("KinematicLinear3D8N", nodes, ids, ids * 0, kl.KinematicLinear3D8N.shape)]
-    )
+    mesh = joined(*(kl.box(origin=(i, i, 0)) for i in range(n)), welded=True)
     model = kl.Model(mesh, STEEL)
-    model.fix(nodes[0])
+    model.fix(mesh.blocks[0].nodes[0])
     model.add(kl.Gravity((1.0, -2.0, 0.0)))
     with pytest.raises((kl.ModelError, kl.SolveError), match=r"can still move|hardly resists|backward error"):
         model.solve()

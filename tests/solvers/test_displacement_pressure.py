@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from computing import compiled, most, same_on_all_threads
+from meshes import joined
 from rounding import close, round_off
 
 import kratos_lite as kl
@@ -44,9 +45,7 @@ def body(element, material=None, cells=None, size=(1.0, 0.9, 1.1), face="z-"):
 def two_meshes():
     """Return a mesh of two parts: elements with one pressure and with four."""
     parts = [body("EnhancedStrain3D8N", cells=4).mesh, body("BBar3D27N", cells=2).mesh]
-    points = np.vstack([parts[0].points, parts[1].points + np.array([2.0, 0.0, 0.0])])
-    (block,) = parts[1].blocks
-    return kl.Mesh(points, [*parts[0].blocks, kl.Block(block.name, block.nodes + len(parts[0].points))])
+    return joined(parts[0], parts[1].replace(points=parts[1].points + np.array([2.0, 0.0, 0.0])))
 
 
 def system_of(model):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from meshes import with_block
+from meshes import joined, with_block
 
 import kratos_lite as kl
 
@@ -170,14 +170,7 @@ def test_a_point_load_acts_on_each_node_once_and_loads_add_up():
 def test_faces_of_mixed_cells_carry_the_whole_load():
     """Two wedges and a brick share a square; the traction covers the squares and triangles of a side."""
     brick, wedge = kl.box(), kl.box(element=kind(6), origin=(0, 1, 0))
-    points = np.vstack([brick.points, wedge.points])
-    unique, inverse = np.unique(points, axis=0, return_inverse=True)
-    inverse = inverse.ravel().astype(np.int32)
-    blocks = []
-    for mesh, start in ((brick, 0), (wedge, 8)):
-        old = mesh.blocks[0]
-        blocks.append(kl.Block(old.name, inverse[old.nodes + start], old.ids, old.properties, old.shape))
-    forces = nodal(kl.Mesh(unique, blocks), kl.Pressure("z+", 1.0), kl.Traction("x+", (1, 0, 0)))
+    forces = nodal(joined(brick, wedge, welded=True), kl.Pressure("z+", 1.0), kl.Traction("x+", (1, 0, 0)))
     np.testing.assert_allclose(forces.sum(axis=0), (2, 0, -2), atol=1e-14)
 
 

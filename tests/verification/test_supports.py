@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from meshes import with_block
+from meshes import joined, with_block
 from rounding import round_off
 
 import kratos_lite as kl
@@ -180,13 +180,7 @@ def test_constraints_that_contradict_are_errors():
 
 def test_tied_coincident_nodes_join_two_bodies():
     low, high = kl.box((1, 1, 1)), kl.box((1, 1, 1), origin=(0, 0, 1))
-    blocks = []
-    for mesh, start in ((low, 0), (high, 8)):
-        old = mesh.blocks[0]
-        blocks.append(
-            kl.Block(old.name, old.nodes + np.int32(start), old.ids + start, old.properties, old.shape)
-        )
-    model = kl.Model(kl.Mesh(np.vstack([low.points, high.points]), blocks), STEEL)
+    model = kl.Model(joined(low, high), STEEL)
     whole = kl.Model(kl.box((1, 1, 2), (1, 1, 2)), STEEL)
     for one in (model, whole):
         one.fix("z-")
