@@ -2,29 +2,54 @@
 
 import json
 import re
-import subprocess
+import runpy
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from pages import run_scripts
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 README = (EXAMPLES.parent / "README.md").read_text()
 
 
-def run(*words, **options):
-    return subprocess.run(words, capture_output=True, text=True, check=True, **options).stdout
+@pytest.fixture
+def script(capsys, monkeypatch, tmp_path):
+    """Run an example in the folder of the test and return what it prints: ``script(path, …)``."""
+
+    def call(path, *words):
+        monkeypatch.setattr(sys, "argv", [str(path), *map(str, words)])
+        runpy.run_path(str(path), run_name="__main__")
+        return capsys.readouterr().out
+
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    monkeypatch.chdir(tmp_path)
+    return call
 
 
-def test_gravity_cube_sinks_by_the_exact_amount():
-    out = run(sys.executable, EXAMPLES / "gravity_cube.py")
+@pytest.fixture
+def command(run, monkeypatch, tmp_path):
+    """Run a command in the folder of the test and return what it prints: ``command("solve", path, …)``."""
+
+    def call(*words):
+        done = run(*words)
+        assert done.code == 0, done.err
+        return done.out
+
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    monkeypatch.chdir(tmp_path)
+    return call
+
+
+def test_gravity_cube_sinks_by_the_exact_amount(script):
+    out = script(EXAMPLES / "gravity_cube.py")
     top = float(re.search(r"top: (\S+) mm", out).group(1))
     assert abs(top / -0.13221477551020406 - 1) < 1e-9
 
 
-def test_stiffness_by_hand_equals_the_library():
-    out = run(sys.executable, EXAMPLES / "stiffness_by_hand.py")
+def test_stiffness_by_hand_equals_the_library(script):
+    out = script(EXAMPLES / "stiffness_by_hand.py")
     largest = float(re.search(r"entry of K: (\S+) N/m", out).group(1))
     # K_11 of a unit cube in closed form: (λ + 2μ + 2μ) / 9 with λ + 2μ = M
     modulus, mu = 210e6 * 0.7 / (1.3 * 0.4), 210e6 / 2.6
@@ -34,13 +59,6 @@ def test_stiffness_by_hand_equals_the_library():
 
 def python_blocks(text):
     return re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
-
-
-@pytest.mark.parametrize("number", range(len(python_blocks(README))))
-def test_python_of_the_readme_runs(number, tmp_path):
-    out = run(sys.executable, "-c", python_blocks(README)[number], cwd=tmp_path)
-    if "0.1322" in python_blocks(README)[number]:
-        assert abs(float(out) / -0.13221477551020406 - 1) < 1e-12
 
 
 DOCS = EXAMPLES.parent / "docs"
@@ -56,45 +74,45 @@ def test_pages_with_python_are_found():
     assert len(PAGES) >= 20
 
 
-@pytest.mark.parametrize("page", PAGES)
-def test_python_of_each_page_runs_from_top_to_bottom(page, tmp_path):
-    blocks = python_blocks((DOCS / page).read_text())
-    script = tmp_path / "page.py"
-    script.write_text("\n".join(blocks))
-    run(sys.executable, "-W", "error", script, cwd=tmp_path)
-    if page == "howto/moving-material.md":
-        lines = re.findall(r"^kratos-lite (.*)$", (DOCS / page).read_text(), re.M)
-        assert len(lines) == 6
-        for line in lines:
-            run(sys.executable, "-m", "kratos_lite", *line.split(), cwd=tmp_path)
+def test_python_of_the_readme_and_of_each_page_runs(tmp_path):
+    readme = {f"README {number}": block for number, block in enumerate(python_blocks(README))}
+    pages = {page: "\n".join(python_blocks((DOCS / page).read_text())) for page in PAGES}
+    del pages["howto/moving-material.md"]  # runs before its commands
+    printed = run_scripts(tmp_path, readme | pages)
+    (sunk,) = (printed[name] for name, block in readme.items() if "0.1322" in block)
+    assert abs(float(sunk) / -0.13221477551020406 - 1) < 1e-12
 
 
-@pytest.mark.parametrize("page", ["run-bodies.md", "models-in-time.md", "modes.md"])
-def test_command_lines_of_each_page_run(page, tmp_path):
+@pytest.mark.parametrize("page", ["moving-material.md", "run-bodies.md", "models-in-time.md", "modes.md"])
+def test_command_lines_of_each_page_run(page, script, command, tmp_path):
     pytest.importorskip("matplotlib")
     text = (DOCS / "howto" / page).read_text().replace("\\\n", "")
     lines = re.findall(r"^kratos-lite ([^#\n]*)", text, re.M)
     assert lines
     (tmp_path / "examples").symlink_to(EXAMPLES)
+    if page == "moving-material.md":
+        assert len(lines) == 6
+        (tmp_path / "page.py").write_text("\n".join(python_blocks(text)))
+        script(tmp_path / "page.py")  # it writes the mesh of the commands
     for line in lines:
-        run(sys.executable, "-m", "kratos_lite", *line.split(), cwd=tmp_path)
+        command(*line.split())
 
 
-def test_elements_of_the_guide_conform(tmp_path):
+def test_elements_of_the_guide_conform(tmp_path, command):
     script = tmp_path / "guide.py"
     pages = [(DOCS / "howto" / f"own-{what}.md").read_text() for what in ("element", "material")]
     script.write_text("\n".join(python_blocks("".join(pages))))
-    out = run(sys.executable, "-m", "kratos_lite", "check", script)
+    out = command("check", script)
     assert "MyWedge3D6N conforms: 32 checks passed" in out
     assert "MeanDilatation3D8N conforms: 32 checks passed" in out
     assert "Blended3D8N conforms: 32 checks passed" in out
     assert "slate (TransverseIsotropic3D) conforms: 6 checks passed" in out
 
 
-def test_cantilever_folder_of_kratos_bends_as_a_beam(tmp_path):
+def test_cantilever_folder_of_kratos_bends_as_a_beam(tmp_path, command):
     out = tmp_path / "r.json"
     folder = EXAMPLES / "cantilever"
-    run(sys.executable, "-m", "kratos_lite", "solve", folder / "ProjectParameters.json", "--json", out)
+    command("solve", folder / "ProjectParameters.json", "--json", out)
     result = json.loads(out.read_text())
     F, L, b, E, nu = 1e5 * 0.1**2, 1.0, 0.1, 210e9, 0.3
     beam = F * L**3 / (3 * E * b**4 / 12) + F * L / (5 / 6 * E / (2 * (1 + nu)) * b**2)
@@ -103,9 +121,9 @@ def test_cantilever_folder_of_kratos_bends_as_a_beam(tmp_path):
     assert result["total_reaction"][2] == pytest.approx(F, rel=1e-9)
 
 
-def test_the_gust_bends_the_tower_twice_as_far_as_the_steady_wind(tmp_path):
+def test_the_gust_bends_the_tower_twice_as_far_as_the_steady_wind(tmp_path, command):
     gust, table = EXAMPLES / "tower" / "gust.py", tmp_path / "swing.csv"
-    out = run(sys.executable, "-m", "kratos_lite", "solve", gust, "-o", table)
+    out = command("solve", gust, "-o", table)
     rows = np.array([line.split(",") for line in table.read_text().splitlines()[1:]], dtype=float)
     assert len(rows) == 201
     largest, time = rows[:, 2].max(), rows[rows[:, 2].argmax(), 0]
@@ -119,8 +137,8 @@ def test_the_gust_bends_the_tower_twice_as_far_as_the_steady_wind(tmp_path):
     assert gust.read_text().partition("\n\n")[2] in (DOCS / "howto" / "models-in-time.md").read_text()
 
 
-def test_own_element_passes_its_conformance_kit():
-    out = run(sys.executable, "-m", "kratos_lite", "check", EXAMPLES / "my_wedge.py")
+def test_own_element_passes_its_conformance_kit(command):
+    out = command("check", EXAMPLES / "my_wedge.py")
     assert "MyWedge3D6N conforms: " in out
 
 
@@ -132,9 +150,9 @@ def number(pattern, text):
 
 
 @pytest.mark.parametrize("kind", ["rigid", "pseudo-rigid", "finite-element"])
-def test_a_thrown_box_falls_and_tumbles_the_same_whatever_its_kind(kind, tmp_path):
+def test_a_thrown_box_falls_and_tumbles_the_same_whatever_its_kind(kind, tmp_path, script):
     pytest.importorskip("matplotlib")
-    out = run(sys.executable, BODIES / "tumbling_box.py", kind, tmp_path / "box.png")
+    out = script(BODIES / "tumbling_box.py", kind, tmp_path / "box.png")
     moved = [float(x) for x in re.search(r"moved by \[(.*?)\]", out).group(1).split()]
     assert moved == pytest.approx([1.5, 1.5, 0.0], abs=1e-9)
     momentum = [float(x) for x in re.search(r"angular momentum \[(.*?)\]", out).group(1).split()]
@@ -143,26 +161,24 @@ def test_a_thrown_box_falls_and_tumbles_the_same_whatever_its_kind(kind, tmp_pat
     assert (tmp_path / "box.png").stat().st_size > 10_000
 
 
-def test_the_top_nutates_as_elliptic_integrals_say():
-    out = run(sys.executable, BODIES / "heavy_top.py")
+def test_the_top_nutates_as_elliptic_integrals_say(script):
+    out = script(BODIES / "heavy_top.py")
     assert number(r"tilt from (\S+)", out) == pytest.approx(0.5, abs=1e-5)
     assert number(r"to (\S+) rad", out) == pytest.approx(0.7576379147, abs=2e-5)
     assert number(r"period (\S+) s", out) == pytest.approx(1.7588577458, abs=2e-3)
     assert number(r"momentum (\S+),", out) == pytest.approx(number(r"at first (\S+) kg", out), abs=1e-9)
 
 
-def test_the_pendulum_is_back_after_its_period(tmp_path):
-    solve = (sys.executable, "-m", "kratos_lite", "solve", BODIES / "pendulum.py", "-o", "p.csv")
-    out = run(*solve, cwd=tmp_path)
+def test_the_pendulum_is_back_after_its_period(tmp_path, command):
+    out = command("solve", BODIES / "pendulum.py", "-o", "p.csv")
     rows = [list(map(float, row.split(","))) for row in (tmp_path / "p.csv").read_text().splitlines()[1:]]
     assert rows[-1][6:9] == pytest.approx([1.0, 0.0, 0.0], abs=1e-8)
     assert all(abs(x * x + z * z - 1) < 1e-12 for *_, x, _, z in (row[:9] for row in rows))
     assert abs(number(r"energy drift +(\S+)", out)) < 1e-12
 
 
-def test_a_scene_in_python_is_integrated(tmp_path):
-    solve = (sys.executable, "-m", "kratos_lite", "solve", BODIES / "thrown_box.py", "-o", "out/box.csv")
-    out = run(*solve, cwd=tmp_path)
+def test_a_scene_in_python_is_integrated(tmp_path, command):
+    out = command("solve", BODIES / "thrown_box.py", "-o", "out/box.csv")
     rows = [
         list(map(float, row.split(","))) for row in (tmp_path / "out/box.csv").read_text().splitlines()[1:]
     ]
@@ -182,8 +198,8 @@ def test_a_scene_in_python_is_integrated(tmp_path):
     assert "examples/bodies/thrown_box.py" in (DOCS / "howto" / "run-bodies.md").read_text()
 
 
-def test_both_forms_of_the_spinning_bar_stretch_alike():
-    out = run(sys.executable, BODIES / "rotating_bar.py")
+def test_both_forms_of_the_spinning_bar_stretch_alike(script):
+    out = script(BODIES / "rotating_bar.py")
     # Solfec-1.0: 7.038e-4 m and 7.035e-4 m
     assert number(r"total_lagrangian: elongation (\S+) m", out) == pytest.approx(7.038e-4, abs=1e-7)
     assert number(r"corotational: elongation (\S+) m", out) == pytest.approx(7.035e-4, abs=1e-7)
@@ -191,16 +207,15 @@ def test_both_forms_of_the_spinning_bar_stretch_alike():
         assert number(rf"{formulation}: energy (\S+) J", out) == pytest.approx(3.315, abs=1e-3)
 
 
-def test_a_stiff_box_keeps_its_energy_by_energy_momentum_alone():
-    out = run(sys.executable, BODIES / "stiff_box.py")
+def test_a_stiff_box_keeps_its_energy_by_energy_momentum_alone(script):
+    out = script(BODIES / "stiff_box.py")
     assert number(r"DEF_LIM: energy drift (\S+),", out) > 1e6
     assert number(r"ENERGY_MOMENTUM: energy drift (\S+),", out) < 1e-12
     assert number(r"ENERGY_MOMENTUM: .* momentum drift (\S+)", out) < 1e-12
 
 
-def test_soft_box_is_pulled_wide_by_its_spin(tmp_path):
-    solve = (sys.executable, "-m", "kratos_lite", "solve", BODIES / "soft_box.py", "-o", "s.npz", "-q")
-    subprocess.run(solve, cwd=tmp_path, check=True)
+def test_soft_box_is_pulled_wide_by_its_spin(tmp_path, command):
+    command("solve", BODIES / "soft_box.py", "-o", "s.npz", "-q")
     with np.load(tmp_path / "s.npz") as file:
         F = file["q"][:, :9].reshape(-1, 3, 3)
     stretch = np.linalg.svd(F, compute_uv=False)
@@ -210,18 +225,17 @@ def test_soft_box_is_pulled_wide_by_its_spin(tmp_path):
     assert stretch.min() > 0.8
 
 
-def test_turntable_moves_as_it_is_told(tmp_path):
-    solve = (sys.executable, "-m", "kratos_lite", "solve", BODIES / "turntable.py", "-o", "t.npz", "-q")
-    subprocess.run(solve, cwd=tmp_path, check=True)
+def test_turntable_moves_as_it_is_told(tmp_path, command):
+    command("solve", BODIES / "turntable.py", "-o", "t.npz", "-q")
     with np.load(tmp_path / "t.npz") as file:
         end = file["q"][-1]
     np.testing.assert_allclose(end[:9], [0, 1, 0, -1, 0, 0, 0, 0, 1], atol=1e-12)
     assert end[11] == pytest.approx(0.15)
 
 
-def test_the_wheel_gives_way_to_its_contact_as_a_spectral_solution_says(tmp_path):
+def test_the_wheel_gives_way_to_its_contact_as_a_spectral_solution_says(tmp_path, script):
     pytest.importorskip("matplotlib")
-    out = run(sys.executable, EXAMPLES / "rotating_wheel.py", tmp_path / "wheel.png")
+    out = script(EXAMPLES / "rotating_wheel.py", tmp_path / "wheel.png")
     for rate, dent in ((0, 2.068909634465), (30, 2.120223003867), (60, 2.314713545843)):
         assert number(rf"{rate} rad/s: .* by (\S+) mm", out) == pytest.approx(dent, rel=6e-3)
     sides = [number(rf"{word} (\S+) ", out) for word in ("side:", "and")]
@@ -233,9 +247,9 @@ def test_the_wheel_gives_way_to_its_contact_as_a_spectral_solution_says(tmp_path
     assert (tmp_path / "wheel.png").stat().st_size > 10_000
 
 
-def test_the_pulse_leaves_the_window(tmp_path):
+def test_the_pulse_leaves_the_window(tmp_path, script):
     pytest.importorskip("matplotlib")
-    out = run(sys.executable, EXAMPLES / "translated_bar.py", tmp_path / "pulse.png")
+    out = script(EXAMPLES / "translated_bar.py", tmp_path / "pulse.png")
     assert number(r"of the material (\S+) mm/s", out) < 1e-3 * number(r"at first (\S+) mm/s", out)
     wrong = dict(re.findall(r"t = (\S+) s: .* wrong by (\S+)", out))
     # Hexahedra of 8 nodes, 0.2 m and 0.4 ms, against d'Alembert's solution

@@ -1,14 +1,11 @@
 """Every tutorial and every solution of an exercise runs without Jupyter, and ends by asserting its number."""
 
-import os
 import re
-import shutil
-import subprocess
-import sys
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from pages import run_scripts
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 SOLUTIONS = DOCS / "exercises" / "solutions"
@@ -20,24 +17,13 @@ def cells(page):
     return re.findall(r"(?ms)^```\{code-cell\}[^\n]*\n(.*?)^```$", page.read_text())
 
 
-@pytest.mark.parametrize("page", NOTEBOOKS, ids=lambda page: page.stem)
-def test_notebook_runs_and_reaches_its_number(page, tmp_path):
+@pytest.mark.parametrize("folder", [DOCS / "tutorials", SOLUTIONS], ids=lambda folder: folder.name)
+def test_notebooks_run_and_reach_their_numbers(folder, tmp_path):
     pytest.importorskip("matplotlib")
-    code = cells(page)
-    assert "assert " in code[-1]
-    for data in page.parent.iterdir():
-        if data.suffix in (".msh", ".mdpa"):
-            shutil.copy(data, tmp_path)
-    (tmp_path / "page.py").write_text("\n".join(code))
-    run = subprocess.run(
-        (sys.executable, "-W", "error", "page.py"),
-        cwd=tmp_path,
-        env={**os.environ, "MPLBACKEND": "agg"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert run.returncode == 0, run.stderr
+    pages = {page.name: cells(page) for page in NOTEBOOKS if page.parent == folder}
+    assert all("assert " in code[-1] for code in pages.values())
+    data = [file for file in folder.iterdir() if file.suffix in (".msh", ".mdpa")]
+    run_scripts(tmp_path, {name: "\n".join(code) for name, code in pages.items()}, dict.fromkeys(pages, data))
 
 
 def test_there_are_ten_tutorials_and_each_leads_to_the_next():

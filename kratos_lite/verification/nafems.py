@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
 from kratos_lite.analysis.model import Model
 from kratos_lite.analysis.result import Result
+from kratos_lite.elements import KinematicLinear
 from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.mesh.generators import box
 from kratos_lite.model.loads.nodal import NodalForces
+from kratos_lite.registry import remembered
 from kratos_lite.typing import Array
-from kratos_lite.verification.meshes import element, face_forces, is_quadratic, nearest, on_plane, shaped
+from kratos_lite.verification.meshes import (
+    element,
+    face_forces,
+    is_quadratic,
+    kind_of,
+    nearest,
+    on_plane,
+    shaped,
+)
 from kratos_lite.verification.problem import Problem, StaticProblem
 
 STEEL = Isotropic3D(E=210e9, nu=0.3)
@@ -58,15 +66,15 @@ def fv52(kind: str) -> Model:
     return model
 
 
-@lru_cache(maxsize=16)
-def _modes(kind: str) -> Array:
+@remembered
+def _modes(element_type: type[KinematicLinear]) -> Array:
     """Return ten frequencies of FV52 in Hz; several rows share them."""
-    return fv52(kind).modes(10)[0] / (2 * np.pi)
+    return fv52(element_type.__name__).modes(10)[0] / (2 * np.pi)
 
 
 def _frequency(number: int, shape: str) -> Problem:
     def of(kind: str) -> float:
-        return float(_modes(kind)[number - 1])
+        return float(_modes(kind_of(kind))[number - 1])
 
     return Problem(
         name=f"nafems/fv52_mode_{number}",

@@ -24,7 +24,7 @@ def error_of(field: fields.Field, norm: int = DISPLACEMENT) -> Callable[[Result]
     return lambda result: _norms(field, result)[norm]
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=2)
 def _norms(field: fields.Field, result: Result) -> tuple[float, float]:
     """Return both norms: rows of the two share them."""
     return norms(field, result.mesh.points, result.groups, result.u)

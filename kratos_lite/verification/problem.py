@@ -44,6 +44,11 @@ class Problem:
     takes: Of = every  # elements that it is for
 
     @property
+    def question(self) -> object:
+        """What is solved: rows of the same question share it."""
+        return self.name
+
+    @property
     def cited(self) -> str:
         """The word of the source in `SOURCES`."""
         return self.source.replace(":", ",").partition(",")[0]
@@ -91,11 +96,16 @@ class StaticProblem(Problem):
     def __post_init__(self) -> None:
         object.__setattr__(self, "of", self._solved)
 
+    @property
+    def question(self) -> object:
+        """The models: rows of the same ones share their results."""
+        return self.models
+
     def _solved(self, element: str) -> float:
         return self.measure(*solved(self.models, element))
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=1)
 def solved(models: Callable[[str], tuple[Model, ...]], element: str) -> tuple[Result, ...]:
     """Return the results of the models of a problem; others that have the same models share them."""
     return tuple(model.solve("direct") for model in models(element))

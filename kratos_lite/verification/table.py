@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from fnmatch import fnmatchcase
+from itertools import groupby
 
 from kratos_lite.errors import InputError, nearest
 from kratos_lite.verification import (
@@ -60,8 +61,13 @@ def verify(
     problems = chosen(names)
     solved.cache_clear()  # an element of this name may have been another one
     wanted = tuple(kind_of(name).__name__ for name in elements) or ELEMENTS
-    for number, problem in enumerate(problems):
+    kinds = {problem.name: problem.elements(tuple(map(element, wanted))) for problem in problems}
+    done = 0
+    for _, group in groupby(problems, key=lambda problem: problem.question):
+        same = list(group)  # of these an element solves its models once
         if progress is not None:
-            progress(problem.name, number / len(problems))
-        for kind in problem.elements(tuple(map(element, wanted))):
-            yield problem.row(kind)
+            progress(same[0].name, done / len(problems))
+        done += len(same)
+        every = dict.fromkeys(kind for problem in same for kind in kinds[problem.name])
+        rows = {(p.name, kind): p.row(kind) for kind in every for p in same if kind in kinds[p.name]}
+        yield from (rows[p.name, kind] for p in same for kind in kinds[p.name])

@@ -197,11 +197,26 @@ def test_ties_along_the_flow_are_glue():
         assert all(
             text.startswith(f"{glued} constraints hold moving material along its flow") for text in said
         )
+    for along in (0.02, 0.3):  # a force mostly across the flow, which is along x there
+        model, upper, lower = wheel_on_rail("")
+        model.constrain((int(lower[0]), "y"), {(int(upper[0]), "y"): 1.0, (int(upper[0]), "x"): along})
+        model.add(Rotation("z", 1.0, part="wheel"))
+        assert any(text.startswith("1 constraints hold") for text in model.transient().equations.warnings)
     whole = kl.Model(wheel_mesh(), STEEL)
     whole.fix("inner")
     whole.constrain((40, "x"), {(41, "x"): 1.0})
     whole.add(Rotation("z", 1.0))
     assert not any("glue" in text for text in whole.transient().equations.warnings)
+
+
+@pytest.mark.parametrize("slope", [0.0, 1e-9, 1e-4, 0.2, -1.0])
+def test_oblique_ties_are_glue_and_those_with_the_slope_of_round_off_are_not(slope):
+    model, (upper, _), (lower, _) = wheel_on_rail("")
+    weights = {(int(upper), "y"): 1.0} | ({(int(upper), "x"): slope} if slope else {})
+    model.constrain((int(lower), "y"), weights)
+    model.add(Rotation("z", 1.0, part="wheel"))
+    warnings = model.transient().equations.warnings
+    assert any("1 constraints hold moving material" in text for text in warnings) == (abs(slope) > 1e-6)
 
 
 def test_a_rotor_that_travels_is_not_tied_to_what_rests():

@@ -216,7 +216,7 @@ def lagrangian(model, angle, rate, acceleration, load, h, steps):
 
 CASES = {
     "constant": (30.0, 0.0, np.pi / 60, {"8N": 1.7e-3, "20N": 6.6e-4}),
-    "spin-up": (0.0, 872.664626, 0.06, {"8N": 6e-4, "20N": 3.7e-6}),
+    "spin-up": (0.0, 872.664626, 0.03, {"8N": 6e-5, "20N": 1e-6}),
 }
 
 
@@ -225,7 +225,7 @@ CASES = {
 def test_the_same_in_axes_that_turn_with_the_material(case, element, wheels):
     """u(T, X) in space is R w(T, R^T X) of the material: M, G, H, acceleration and loads with all signs."""
     start, spin, T, tolerance = CASES[case]
-    steps, cells = 200, {"8N": (4, 32), "20N": (4, 32)}[element]
+    steps, cells = (200, (4, 32)) if case == "constant" else (100, (2, 32))
 
     def rate(t):
         return start + spin * t
@@ -254,9 +254,6 @@ def test_the_same_in_axes_that_turn_with_the_material(case, element, wheels):
     assert distance.min(axis=1).max() < 1e-6  # a whole number of cells, so that nodes come to nodes
     seen = w[distance.argmin(axis=1)] @ R.T
     assert np.abs(state.u - seen).max() < tolerance[element] * np.abs(seen).max()
-    if (case, element) == ("spin-up", "20N"):
-        lowest = state.u[np.argmin(X[:, 1])]
-        np.testing.assert_allclose(lowest[:2], (5.606998e-02, -1.164555e-02), rtol=2e-6)
 
 
 def test_a_further_rigid_turn(wheels):
@@ -306,8 +303,8 @@ def graded(wheels, **options):
 def test_energy_is_constant_on_a_graded_mesh(wheels):
     transient = graded(wheels)
     start = transient.energy()
-    energies = [transient.energy() for _ in kl.integrate(transient, STEP, 20_000, every=1000)]
-    assert np.abs(np.array(energies) / start - 1).max() < 20_000 * EPS  # each step rounds once
+    energies = [transient.energy() for _ in kl.integrate(transient, STEP, 4000, every=500)]
+    assert np.abs(np.array(energies) / start - 1).max() < 4000 * EPS  # each step rounds once
 
 
 def test_energy_grows_without_the_skew_form(wheels):

@@ -35,6 +35,8 @@ VOIGT = "tests/test_voigt.py"
 FIELDS = "tests/analysis/test_fields.py"
 LINES = "tests/analysis/test_line_values.py"
 COMPARED = "tests/analysis/test_comparison.py"
+ESTIMATE = "tests/analysis/test_error_estimate.py"
+PLATE = "tests/solvers/test_plate_level.py"
 
 MUTATIONS = [
     # ---- elements that lock, and those that do not
@@ -598,6 +600,26 @@ MUTATIONS = [
         "nodal[region.nodes] = values",
         "nodal[region.nodes] += 2 * values",
         "tests/analysis/test_values_at_points.py -k recovered",
+    ),
+    # ---- estimates of errors, thin bodies, ties of moving parts
+    Mutation("analysis/error_estimate.py", "energy + sums[method]", "energy - sums[method]", ESTIMATE),
+    Mutation("analysis/error_estimate.py", "SAFETY[name] ** 2 *", "SAFETY[name] *", ESTIMATE),
+    Mutation("analysis/error_estimate.py", "COARSE**2 *", "COARSE *", ESTIMATE),
+    Mutation(
+        "assembly/recovery.py",
+        '0.5 if shape.cell == "tetrahedron"',
+        '0.4 if shape.cell == "tetrahedron"',
+        "tests/assembly/test_recovery.py -k nodes_have_their_share",
+    ),
+    Mutation("analysis/quantities.py", "nodes[:, : group.element.shape.corners]", "nodes[:, :2]", QUANTITIES),
+    Mutation("ale/moving_part.py", "ALONG = 1e-6", "ALONG = 0.5", "tests/ale/test_parts.py -k glue"),
+    Mutation("solvers/plate_level.py", "or held > 0.5", "or held > 0.9", PLATE),
+    Mutation("solvers/plate_level.py", "along <= 0.5", "along <= 0.9", PLATE),
+    Mutation(
+        "solvers/plate_level.py",
+        "w + height * slope, w - height * slope",
+        "w - height * slope, w + height * slope",
+        PLATE,
     ),
     # ---- the plan of solution: both sides of each threshold
     *(
