@@ -361,6 +361,7 @@ def test_page_of_scaling_has_efficiencies_goals_and_a_plan():
 def test_backends_over_ranks_solve_the_same_block(tmp_path, monkeypatch, capsys):
     out = tmp_path / "distributed.json"
     monkeypatch.setattr(scaling, "PAGE", tmp_path / "scaling.md")
+    monkeypatch.delenv("KRATOS_LITE_BENCH_PYTHON", raising=False)
     assert command.main(["distributed", "--cells", "3", "--repeats", "1", "--out", str(out)]) == 0
     found = json.loads(out.read_text())
     assert [row.get("failed") for row in found["rows"]] == [None] * 16
