@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
 from kratos_lite.analysis.model import Model
@@ -12,6 +10,7 @@ from kratos_lite.elements import KinematicLinear
 from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.mesh.generators import box
 from kratos_lite.model.loads.nodal import NodalForces
+from kratos_lite.registry import remembered
 from kratos_lite.typing import Array
 from kratos_lite.verification.meshes import (
     element,
@@ -22,7 +21,7 @@ from kratos_lite.verification.meshes import (
     on_plane,
     shaped,
 )
-from kratos_lite.verification.problem import ELEMENTS, Problem, StaticProblem
+from kratos_lite.verification.problem import Problem, StaticProblem
 
 STEEL = Isotropic3D(E=210e9, nu=0.3)
 PLATE = Isotropic3D(E=200e9, nu=0.3, density=8000.0)
@@ -67,7 +66,7 @@ def fv52(kind: str) -> Model:
     return model
 
 
-@lru_cache(maxsize=len(ELEMENTS))
+@remembered
 def _modes(element_type: type[KinematicLinear]) -> Array:
     """Return ten frequencies of FV52 in Hz; several rows share them."""
     return fv52(element_type.__name__).modes(10)[0] / (2 * np.pi)
