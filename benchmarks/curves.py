@@ -18,11 +18,7 @@ CLOCKS = {"warm": "warm", "cold": "process"}
 """Second time in one process, from reading to the solution; and the whole process."""
 
 
-class Curve(NamedTuple):
-    """Points of one program and element on a scene, from coarse to fine."""
-
-    times: np.ndarray
-    errors: np.ndarray
+Curve = tuple[np.ndarray, np.ndarray]
 
 
 class Reached(NamedTuple):
@@ -37,17 +33,14 @@ class Reached(NamedTuple):
 
 
 def curves(rows: Iterable[Row], clock: str = "warm") -> dict[tuple[str, str, str], Curve]:
-    """Return the curve of each scene, program and element kind."""
+    """Return times and errors of each scene, program and element, from coarse to fine."""
     points: dict[tuple[str, str, str], list[tuple[int, float, float]]] = defaultdict(list)
     for row in rows:
         error, time = row.get("errors", {}).get("displacement"), row.get(CLOCKS[clock])
         if error is not None and time is not None:
             points[row["scene"], row["program"], row["kind"]].append((row["n"], -error, time))
-    made = {}
-    for key, found in points.items():
-        _, error, times = np.array(sorted(found)).T
-        made[key] = Curve(times, np.maximum(-error, 1e-16))
-    return made
+    sorted_ = {key: np.array(sorted(found)).T for key, found in points.items()}
+    return {key: (times, np.maximum(-errors, 1e-16)) for key, (_, errors, times) in sorted_.items()}
 
 
 def time_to(level: float, times: np.ndarray, found: np.ndarray) -> tuple[float, bool] | None:
@@ -67,8 +60,8 @@ def time_to(level: float, times: np.ndarray, found: np.ndarray) -> tuple[float, 
     if i == 0:
         return float(times[0]), True
     t, e = np.log(times[i - 1 : i + 1]), np.log(found[i - 1 : i + 1])
-    share = (np.log(level) - e[0]) / (e[1] - e[0])
-    return float(np.exp(t[0] + share * (t[1] - t[0]))), False
+    fraction = (np.log(level) - e[0]) / (e[1] - e[0])
+    return float(np.exp(t[0] + fraction * (t[1] - t[0]))), False
 
 
 def fastest(rows: Iterable[Row], clock: str) -> dict[tuple[str, float, str], Reached]:
@@ -116,15 +109,15 @@ def _sentence(scene: str, kinds: Mapping[str, Curve]) -> str:
         if len(times) >= 2 or (times and level == LEVELS[0]):
             break
     else:
-        best = min(kinds, key=lambda kind: kinds[kind].errors.min())
-        error = kinds[best].errors.min()
+        error, best = min((errors.min(), kind) for kind, (_, errors) in kinds.items())
         return f"{scene}: no element reaches 1 % at these sizes; {best} comes closest ({error:.1e})."
-    order = sorted(times, key=lambda kind: times[kind])
-    rest = ", ".join(f"{kind} takes {times[kind] / times[order[0]]:.1f} times as long" for kind in order[1:])
+    first, *others = sorted(times, key=times.__getitem__)
+    parts = [f"{scene}: for an error of {level:.2%} take {first} ({seconds(times[first])} s)"]
+    longer = (f"{kind} takes {times[kind] / times[first]:.1f} times as long" for kind in others)
     missing = [kind for kind in kinds if kind not in times]
-    text = f"{scene}: for an error of {level:.2%} take {order[0]} ({seconds(times[order[0]])} s)"
-    text += f"; {rest}" if rest else ""
-    return text + (f"; {', '.join(missing)} do not reach it." if missing else ".")
+    parts += [", ".join(longer)] if others else []
+    parts += [f"{', '.join(missing)} do not reach it"] if missing else []
+    return "; ".join(parts) + "."
 
 
 # ---- pictures --------------------------------------------------------------------------------------
@@ -133,10 +126,10 @@ def _sentence(scene: str, kinds: Mapping[str, Curve]) -> str:
 def best_kind(kinds: Mapping[str, Curve]) -> str:
     """Return the element that reaches the smallest error that any reaches, in the least time."""
     for level in (*reversed(LEVELS), 1e-1):
-        found = [(time[0], kind) for kind, c in kinds.items() if (time := time_to(level, *c))]
+        found = [(time[0], kind) for kind, curve in kinds.items() if (time := time_to(level, *curve))]
         if found:
             return min(found)[1]
-    return min(kinds, key=lambda kind: kinds[kind].errors.min())
+    return min(kinds, key=lambda kind: kinds[kind][1].min())
 
 
 def shown(rows: Sequence[Row], scene: str) -> list[tuple[str, str]]:
@@ -144,10 +137,9 @@ def shown(rows: Sequence[Row], scene: str) -> list[tuple[str, str]]:
     lines = []
     for program in PROGRAMS:
         kinds = {kind: curve for (s, p, kind), curve in curves(rows).items() if (s, p) == (scene, program)}
-        plain = {kind: curve for kind, curve in kinds.items() if " " not in kind}
-        chosen = [best_kind(some) for some in (kinds, plain if program == OURS else {}) if some]
-        lines += [(program, kind) for kind in dict.fromkeys(chosen)]
-    return lines
+        plain = {kind: curve for kind, curve in kinds.items() if program == OURS and " " not in kind}
+        lines += [(program, best_kind(some)) for some in (kinds, plain) if some]
+    return list(dict.fromkeys(lines))
 
 
 def picture(rows: Sequence[Row], scene: str, path: Path) -> None:
@@ -163,8 +155,8 @@ def picture(rows: Sequence[Row], scene: str, path: Path) -> None:
         found = curves(rows, clock)
         for program, kind in lines:
             if (curve := found.get((scene, program, kind))) is not None:
-                ax.loglog(curve.times, np.maximum(curve.errors, FLOOR), label=f"{program}, {kind}",
-                          **style(program, kind))  # fmt: skip
+                label = f"{program}, {kind}"
+                ax.loglog(curve[0], np.maximum(curve[1], FLOOR), label=label, **style(program, kind))
         for level in LEVELS:
             ax.axhline(level, color="k", linewidth=0.6, linestyle=":")
         ax.set(xlabel="seconds", title=what)
@@ -190,21 +182,8 @@ def style(program: str, kind: str) -> dict[str, Any]:
         look = {OURS: ("o", "-"), ADAPTIVE: ("*", "-")}.get(program, ("x", "--"))
         look = ("s", "--") if program == OURS and " " not in kind else look
         return {"color": "#d0021b", "linewidth": 2.2, "marker": look[0], "linestyle": look[1], "zorder": 5}
-    others = [name for name in PROGRAMS if not name.startswith(OURS)]
-    i = others.index(program)
-    color = COLORS[i % len(COLORS)]
-    return {"color": color, "linewidth": 1.2, "marker": ".dv^<>PXhp"[i % 10], "markersize": 5}
+    i = [name for name in PROGRAMS if not name.startswith(OURS)].index(program) % len(COLORS)
+    return {"color": COLORS[i], "linewidth": 1.2, "marker": ".dv^<>PXhp"[i], "markersize": 5}
 
 
-COLORS = (
-    "#1f3b73",
-    "#1b9e77",
-    "#7570b3",
-    "#66a61e",
-    "#a6761d",
-    "#e6ab02",
-    "#17becf",
-    "#e377c2",
-    "#666666",
-    "#8c564b",
-)
+COLORS = "#1f3b73 #1b9e77 #7570b3 #66a61e #a6761d #e6ab02 #17becf #e377c2 #666666 #8c564b".split()

@@ -7,7 +7,6 @@ between nodes, and tetrahedra without any order: bodies under their weight, each
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from pathlib import Path
 
 import numpy as np
 
@@ -94,21 +93,23 @@ def bonded(kind: str, n: int) -> kl.Model:
     points = np.vstack([lower.points, upper.points])
     model = weighty(kl.Mesh(points, [kl.Block(element(kind), nodes)]), ())
     model.fix(lower.nodes("z-"))
-    slaves = upper.nodes("z-")
-    W = lower.locate(upper.points[slaves]).weights()
+    dependent = upper.nodes("z-")
+    W = lower.locate(upper.points[dependent]).weights()
     rows = zip(np.split(W.indices, W.indptr[1:-1]), np.split(W.data, W.indptr[1:-1]), strict=True)
-    _link(model, slaves + start, rows)
+    _link(model, dependent + start, rows)
     return model
 
 
-def _link(model: kl.Model, slaves: Ints, masters: Iterable[tuple[Iterable[int], Iterable[float]]]) -> None:
+def _link(
+    model: kl.Model, dependent: Ints, independent: Iterable[tuple[Iterable[int], Iterable[float]]]
+) -> None:
     """Let nodes that nothing holds follow others, given with their weights."""
     held = model.supports.fixed.any(axis=1)
-    for slave, (nodes, weights) in zip(slaves.tolist(), masters, strict=True):
-        if not held[slave]:
+    for node, (nodes, weights) in zip(dependent.tolist(), independent, strict=True):
+        if not held[node]:
             terms = [(int(k), float(w)) for k, w in zip(nodes, weights, strict=True) if abs(w) > 1e-12]
             for axis in "xyz":
-                model.constrain((slave, axis), {(k, axis): w for k, w in terms})
+                model.constrain((node, axis), {(k, axis): w for k, w in terms})
 
 
 def unordered(kind: str, n: int, jitter: float = 0.25) -> kl.Model:
@@ -166,24 +167,19 @@ def _scene(name: str) -> Callable[[str, int], Scene]:
 
 
 HARD = {name: _scene(name) for name in MAKERS}
-"""Every scene of this module by name."""
 
 
-def write_system(scene: Scene, path: Path) -> None:
-    """Write the matrix of the free components of a scene in 3 × 3 blocks, its load, and its nodes."""
+def system(scene: Scene) -> dict[str, Array]:
+    """Return the matrix of the free components of a scene in 3 × 3 blocks, its load, and its nodes."""
     model = scene.model
     constraints = model.supports.constraint_map
     system = ConstrainedSystem(model.mesh.points, model.element_groups(), constraints, solver="direct")
-    free, K = system.constraint_map.free.reshape(-1, 3), system.K
-    assert (free == 3 * (free[:, :1] // 3) + np.arange(3)).all(), "a node is held along some axes alone"
-    load = system.gather(scene.forces()) - K @ system.constraint_map.c
-    A = system.constraint_map.reduce_matrix(K.scipy().tocsr()).tobsr((3, 3))
+    reduction, K = system.constraint_map, system.K
+    free = reduction.free.reshape(-1, 3)
+    if not (free == 3 * (free[:, :1] // 3) + np.arange(3)).all():
+        raise ValueError(f"{scene.name}: a node is constrained along some axes alone")
+    load = reduction.reduce(system.gather(scene.forces()) - K @ reduction.c)
+    A = reduction.reduce_matrix(K.scipy().tocsr()).tobsr((3, 3))
     A.sort_indices()
-    np.savez(
-        path,
-        data=A.data,
-        indices=A.indices,
-        indptr=A.indptr,
-        load=system.constraint_map.reduce(load),
-        points=system.points[free[:, 0] // 3],
-    )
+    arrays = {"data": A.data, "indices": A.indices, "indptr": A.indptr}
+    return arrays | {"load": load, "points": system.points[free[:, 0] // 3]}

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 import numpy as np
 
 from benchmarks import ale, stall
 from benchmarks.curves import CLOCKS, cheapest, summary
-from benchmarks.motion import MOTIONS
-from benchmarks.tables import OURS, THEIRS, Row, ratio, seconds, table
+from benchmarks.motion import MOTIONS, SOLFEC
+from benchmarks.tables import NUMPY, OURS, THEIRS, Row, error, megabytes, ratio, seconds, table
 
 UNLIKE = 1e-4
 """Relative difference of displacements above which a solver has not solved the problem."""
@@ -34,8 +33,13 @@ def by_place(rows: Iterable[Row]) -> dict[tuple[str, str, int], dict[str, Row]]:
     """Return the rows of each scene, kind and size by program."""
     found: dict[tuple[str, str, int], dict[str, Row]] = defaultdict(dict)
     for row in rows:
-        found[row["scene"], row["kind"], row["n"]][row["program"]] = row
+        found[place_of(row)][row["program"]] = row
     return dict(found)
+
+
+def place_of(row: Row) -> tuple[str, str, int]:
+    """Return scene, kind and size of a row."""
+    return row["scene"], row["kind"], row["n"]
 
 
 def label(place: tuple[str, str, int]) -> str:
@@ -51,53 +55,31 @@ def goals(rows: Sequence[Row]) -> str:
     """Return whole processes beside Kratos: seconds, memory, and their ratios."""
     body = []
     for place, found in by_place(rows).items():
-        ours, theirs = found.get(OURS), found.get(THEIRS)
-        if ours is None:
+        if OURS not in found:
             continue
-        other = theirs or {}
-        numpy = found.get("kratos_lite NumPy", {})
-        difference = other.get("errors", {}).get("difference")
+        ours, theirs, numpy, pyamg = (found.get(name, {}) for name in (OURS, THEIRS, NUMPY, "pyamg"))
+        time, memory = ([row.get(word) for row in (ours, theirs)] for word in ("process", "peak"))
+        solver = linear_solver(ours)
         body.append(
-            [
-                label(place),
-                str(ours.get("unknowns", "")),
-                seconds(ours["process"]),
-                seconds(numpy.get("process")),
-                seconds(other.get("process")),
-                ratio(ours["process"], other.get("process")),
-                f"{ours['peak'] / 1e6:.0f}",
-                f"{other['peak'] / 1e6:.0f}" if other else "",
-                ratio(ours["peak"], other.get("peak")),
-                ratio(linear_solver(ours), linear_solver(other)),
-                ratio(linear_solver(ours), linear_solver(found.get("pyamg", {}))),
-                "" if difference is None else f"{difference:.0e}",
-            ]
+            [label(place), str(ours.get("unknowns", ""))]
+            + [seconds(value) for value in (time[0], numpy.get("process"), time[1])]
+            + [ratio(*time), *map(megabytes, memory), ratio(*memory)]
+            + [ratio(solver, linear_solver(other)) for other in (theirs, pyamg)]
+            + [error(theirs.get("errors", {}).get("difference"))]
         )
-    head = [
-        "scene",
-        "unknowns",
-        "kratos_lite s",
-        "NumPy s",
-        "Kratos s",
-        "time",
-        "kratos_lite MB",
-        "Kratos MB",
-    ]
-    return table([*head, "memory", "solver", "solver / pyamg", "difference"], body)
+    head = (
+        "scene | unknowns | kratos_lite s | NumPy s | Kratos s | time | kratos_lite MB | Kratos MB | memory"
+    )
+    return table(f"{head} | solver | solver / pyamg | difference", body)
 
 
-def phases(rows: Sequence[Row], scale: float = 1.0) -> str:
+def phases(rows: Sequence[Row]) -> str:
     """Return the phases of every row, in seconds."""
     names = list(dict.fromkeys(name for row in rows for name in row.get("phases", {}) if name != "answer"))
-    body = [
-        [
-            label((row["scene"], row["kind"], row["n"])),
-            row["program"],
-            *(seconds(row["phases"].get(name)) for name in names),
-            seconds(row["process"]),
-        ]
-        for row in rows
-    ]
+    body = []
+    for row in rows:
+        times = [row["phases"].get(name) for name in names] + [row["process"]]
+        body.append([label(place_of(row)), row["program"], *map(seconds, times)])
     return table(["scene", "program", *names, "process"], body)
 
 
@@ -119,25 +101,18 @@ def errors(rows: Sequence[Row]) -> str:
 
 
 def promises(rows: Sequence[Row]) -> str:
-    """Return the errors in the energy norm of the adaptive solution: asked for, reported and true."""
+    """Return the errors in the energy norm of the adaptive solution: requested, reported and true."""
     body = [
-        [
-            row["scene"],
-            f"{100 * float(row['variant']):g} %",
-            *(f"{100 * error:.2g} %" for error in (row["reported"], row["errors"]["energy"])),
-            str(row["unknowns"]),
-            seconds(row["warm"]),
-        ]
+        [row["scene"], f"{100 * float(row['variant']):g} %"]
+        + [f"{100 * error:.2g} %" for error in (row["reported"], row["errors"]["energy"])]
+        + [str(row["unknowns"]), seconds(row["warm"])]
         for row in rows
         if "reported" in row
     ]
-    return table(["scene", "asked", "reported", "true", "unknowns", "warm, s"], body)
+    return table("scene | asked | reported | true | unknowns | warm, s", body)
 
 
-TITLES = {
-    "warm": "Warm: the second time in one process",
-    "cold": "Cold: the whole process",
-}
+TITLES = {"warm": "Warm: the second time in one process", "cold": "Cold: the whole process"}
 
 
 # ---- growth and the rest -----------------------------------------------------------------------------
@@ -154,50 +129,40 @@ def exponent(unknowns: Sequence[float], values: Sequence[float]) -> float:
 
 def growth(rows: Sequence[Row]) -> str:
     """Return iterations, seconds and bytes per degree of freedom by size, with the fitted exponent."""
-    body = [
-        [
-            row["program"],
-            row["kind"],
-            str(row["n"]),
-            str(row.get("unknowns", "")),
-            str(row.get("iterations", "")),
-            seconds(row["work"]),
-            f"{1e6 * row['work'] / row['unknowns']:.3g}",
-            f"{row['peak'] / row['unknowns']:.0f}",
-        ]
-        for row in rows
-        if row.get("unknowns")
-    ]
-    text = table(
-        ["program", "element", "n", "unknowns", "iterations", "s", "µs per unknown", "B per unknown"], body
-    )
-    for program, kind in dict.fromkeys((row["program"], row["kind"]) for row in rows):
-        mine = [
-            r for r in rows if (r["program"], r["kind"]) == (program, kind) and r.get("unknowns", 0) > 20_000
-        ]
-        if len(mine) > 1:
-            p = exponent([r["unknowns"] for r in mine], [r["work"] for r in mine])
+    body, curves = [], defaultdict(list)
+    for row in rows:
+        if unknowns := row.get("unknowns"):
+            cells = [str(row.get(word, "")) for word in ("program", "kind", "n", "unknowns", "iterations")]
+            each = f"{1e6 * row['work'] / unknowns:.3g}", f"{row['peak'] / unknowns:.0f}"
+            body.append([*cells, seconds(row["work"]), *each])
+            if unknowns > 20_000:
+                curves[row["program"], row["kind"]].append((unknowns, row["work"]))
+    text = table("program | element | n | unknowns | iterations | s | µs per unknown | B per unknown", body)
+    for (program, kind), points in curves.items():
+        if len(points) > 1:
+            p = exponent(*zip(*points, strict=True))
             text += f"\n{program}, {kind}: seconds grow as unknowns^{p:.2f} (fit above 20 000 unknowns).\n"
     return text
 
 
-def compared(rows: Sequence[Row], names: Sequence[str], process: bool = False) -> str:
+def compared(rows: Sequence[Row], names: Sequence[str]) -> str:
     """Return phases of all programs on each scene, with the ratio of kratos_lite to each of them."""
     body = []
     for place, found in by_place(rows).items():
-        ours = found.get(OURS)
+        ours = times_of(found.get(OURS), names)
         for program, row in found.items():
-            times = {name: row["phases"].get(name) for name in names}
-            times |= {"process": row["process"]} if process else {}
-            mine = {name: ours["phases"].get(name) for name in names} if ours else {}
-            mine |= {"process": ours["process"]} if ours and process else {}
-            cells = [
-                seconds(t)
-                + (f" ({ratio(mine.get(name), t)})" if t and mine.get(name) and row is not ours else "")
-                for name, t in times.items()
-            ]
+            cells = []
+            for mine, time in zip(ours, times_of(row, names), strict=True):
+                beside = f" ({ratio(mine, time)})" if time and mine and program != OURS else ""
+                cells.append(seconds(time) + beside)
             body.append([label(place), program, *cells])
-    return table(["scene", "program", *names, *(["process"] if process else [])], body)
+    return table(["scene", "program", *names], body)
+
+
+def times_of(row: Row | None, names: Sequence[str]) -> list[float | None]:
+    """Return the seconds of phases and of the whole process of a row."""
+    times = row["phases"] | {"process": row["process"]} if row else {}
+    return [times.get(name) for name in names]
 
 
 def skips(rows: Sequence[Row]) -> str:
@@ -206,12 +171,11 @@ def skips(rows: Sequence[Row]) -> str:
     plain = {row["scene"]: row for row in rows if row["variant"] in ("plain", "two bodies, both loaded")}
     body = []
     for row in rows:
-        base = plain.get(pairs.get(row["scene"], "block"))
-        time = ratio(row["process"], base["process"]) if base else ""
-        memory = ratio(row["peak"], base["peak"]) if base else ""
-        name = label((row["scene"], row["kind"], row["n"]))
-        body.append([row["variant"], name, seconds(row["process"]), time, f"{row['peak'] / 1e6:.0f}", memory])
-    return table(["what", "scene", "process s", "of plain", "MB", "of plain"], body)
+        base = plain.get(pairs.get(row["scene"], "block"), {})
+        words = [row["variant"], label(place_of(row))]
+        words += [seconds(row["process"]), ratio(row["process"], base.get("process"))]
+        body.append([*words, megabytes(row["peak"]), ratio(row["peak"], base.get("peak"))])
+    return table("what | scene | process s | of plain | MB | of plain", body)
 
 
 def failures(rows: Iterable[Row]) -> str:
@@ -225,30 +189,23 @@ def failures(rows: Iterable[Row]) -> str:
         if difference > UNLIKE:
             what = f"its displacements differ by {difference:.0e} from those of the first program"
         if what:
-            body.append([label((row["scene"], row["kind"], row["n"])), row["program"], what])
-    return table(["scene", "program", "what happened"], body)
+            body.append([label(place_of(row)), row["program"], what])
+    return table("scene | program | what happened", body)
 
 
 def motions(rows: Sequence[Row]) -> str:
     """Return seconds per step of bodies in motion beside those of Solfec-1.0, and what drifts."""
     body = []
     for (name, _, _), found in by_place(rows).items():
-        ours, motion = found.get(OURS), MOTIONS.get(name)
-        if ours is None or motion is None:
+        if OURS not in found or name not in MOTIONS:
             continue
-        step, theirs = ours["phases"]["step"], motion.solfec
-        numpy = found.get("kratos_lite NumPy", {}).get("phases", {}).get("step")
-        body.append(
-            [
-                motion.what,
-                micro(step),
-                micro(numpy),
-                " … ".join(dict.fromkeys(micro(s) for s in theirs)),
-                ratio(step, theirs[0]) if theirs else "",
-                *("" if np.isnan(drift) else f"{drift:.0e}" for drift in ours["drift"].values()),
-            ]
-        )
-    head = ["what", "µs", "NumPy µs", "Solfec-1.0 µs", "ratio", "drift of energy", "of angular momentum"]
+        motion, row, theirs = MOTIONS[name], found[OURS], SOLFEC.get(name, ())
+        step = row["phases"]["step"]
+        times = micro(step), micro(found.get(NUMPY, {}).get("phases", {}).get("step"))
+        solfec = " … ".join(dict.fromkeys(map(micro, theirs))), ratio(step, theirs[0]) if theirs else ""
+        drifts = (error(None if np.isnan(drift) else drift) for drift in row["drift"].values())
+        body.append([motion.what, *times, *solfec, *drifts])
+    head = "what | µs | NumPy µs | Solfec-1.0 µs | ratio | drift of energy | of angular momentum"
     return table(head, body)
 
 
@@ -256,25 +213,14 @@ def wheels(rows: Sequence[Row]) -> str:
     """Return seconds of M, G, H and K beside GetFEM's, and how far the entries are from each other's."""
     body = []
     for place, found in by_place(rows).items():
-        ours, theirs = (shortest(found.get(program)) for program in (OURS, "GetFEM"))
-        numpy, pattern = shortest(found.get("kratos_lite NumPy")), ours.get("pattern", 0.0)
+        ours, numpy, theirs = (shortest(found.get(program)) for program in (OURS, NUMPY, "GetFEM"))
         difference = found.get("GetFEM", {}).get("errors", {}).get("difference")
-        for name in ale.NAMES:
-            if name not in ours:
-                continue
-            body.append(
-                [
-                    label(place),
-                    name,
-                    seconds(ours[name]),
-                    seconds(numpy.get(name)),
-                    seconds(theirs.get(name)),
-                    ratio(ours[name], theirs.get(name)),
-                    ratio(pattern + ours[name], theirs.get(name)),
-                    "" if difference is None else f"{difference:.0e}",
-                ]
-            )
-    head = ["mesh", "matrix", "kratos_lite s", "NumPy s", "GetFEM s", "ratio", "with pattern", "difference"]
+        for name in filter(ours.__contains__, ale.NAMES):
+            times = ours[name], numpy.get(name), theirs.get(name)
+            both = ours.get("pattern", 0.0) + ours[name]
+            ratios = ratio(times[0], times[2]), ratio(both, times[2])
+            body.append([label(place), name, *map(seconds, times), *ratios, error(difference)])
+    head = "mesh | matrix | kratos_lite s | NumPy s | GetFEM s | ratio | with pattern | difference"
     return table(head, body)
 
 
@@ -305,8 +251,8 @@ SECTIONS = {
     "growth": ("Growth: the clamped block up to the memory", growth),
     "stall": ("Scenes on which multigrid may stall", stall.tables),
     "assembly": ("Assembly alone", lambda rows: compared(rows, ("pattern", "matrix", "matrix, again"))),
-    "parse": ("Reading an `.mdpa` file", lambda rows: compared(rows, ("read",), process=True)),
-    "cube1": ("One element, whole process", lambda rows: compared(rows, (), process=True)),
+    "parse": ("Reading an `.mdpa` file", lambda rows: compared(rows, ("read", "process"))),
+    "cube1": ("One element, whole process", lambda rows: compared(rows, ("process",))),
     "skips": ("What need not be computed", skips),
     "motion": ("Bodies in motion: time of one step of one body", motions),
     "ale": ("Matrices of a wheel in flow", wheels),
@@ -340,6 +286,13 @@ NOTES = {
 }
 
 
+HEAD = (
+    "# Benchmarks\n\nThis page is made by `python -m benchmarks report` from `benchmarks/results/`; what is "
+    "measured and how is stated in `benchmarks/README.md`. Compare ratios, not seconds: each table is from "
+    "one run, in which the programs took turns.\n"
+)
+
+
 def text(rows: Sequence[Row]) -> str:
     """Return all tables of the rows as Markdown."""
     parts = []
@@ -356,31 +309,18 @@ def text(rows: Sequence[Row]) -> str:
     return "\n".join(parts)
 
 
-def page(kept: Sequence[dict[str, Any]], images: str = "../images/benchmarks") -> str:
+def page(kept: Sequence[Row], images: str = "../images/benchmarks") -> str:
     """Return docs/about/benchmarks.md of the results kept."""
     rows = [row for found in kept for row in found["rows"]]
-    lines = [
-        "# Benchmarks\n",
-        "This page is made by `python -m benchmarks report` from `benchmarks/results/`; what is measured "
-        "and how is stated in `benchmarks/README.md`. Compare ratios, not seconds: each "
-        "table is from one run, in which the programs took turns.\n",
-        table(
-            ["run", "date", "machine", "versions"],
-            [
-                [
-                    f"`{found['command']}`",
-                    found["date"],
-                    f"{found['machine']['processor']}, {found['machine']['cores']} cores",
-                    ", ".join(f"{name} {version}" for name, version in found["versions"].items()),
-                ]
-                for found in kept
-            ],
-        ),
-    ]
+    runs = []
+    for found in kept:
+        versions = ", ".join(f"{name} {version}" for name, version in found["versions"].items())
+        machine = f"{found['machine']['processor']}, {found['machine']['cores']} cores"
+        runs.append([f"`{found['command']}`", found["date"], machine, versions])
     body = text(rows)
     if mine := of(rows, "error"):
         title = f"## {SECTIONS['error'][0]}\n"
         scenes = dict.fromkeys(row["scene"] for row in mine)
         pictures = "\n".join(f"![{scene}: error over seconds]({images}/{scene}.png)\n" for scene in scenes)
         body = body.replace(title, f"{title}\n{pictures}", 1)
-    return "\n".join([*lines, body])
+    return "\n".join([HEAD, table("run | date | machine | versions", runs), body])

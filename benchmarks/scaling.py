@@ -1,20 +1,91 @@
-"""The page about scaling over ranks, docs/about/scaling.md, from what `distributed` has measured."""
+"""Scaling over ranks: the runs of `distributed`, and docs/about/scaling.md made of them."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Any
 
-Row = dict[str, Any]
+import numpy as np
 
+import kratos_lite as kl
+from benchmarks.driver import ROOT, Run, scratch
+from benchmarks.programs import ENGINES
+from benchmarks.tables import Row, error, table
+
+RESULTS = Path(__file__).with_name("results") / "distributed.json"
+PAGE = ROOT / "docs" / "about" / "scaling.md"
+CELLS = {"8N": (32, 64), "27N": (16, 32)}
+"""Cells along an edge of the block of one rank."""
+PLAIN_LIMIT = 40**3
+"""Cells of 8N above which the plain assembly is left out: it holds all triplets, 20 kB for each unknown."""
 MOST_RANKS = 2
 TOLERANCE = 1e-10
-GOALS = {"efficiency": 0.9, "memory": 2.5, "serial": 1.5}
+EFFICIENCY, MEMORY, SERIAL = 0.9, 2.5, 1.5
 """Parallel efficiency on 2 ranks at least; kB per unknown, and time of 1 rank over serial, at most."""
 PLANNED = (1e7, 1e8, 1e9)
 PER_RANK = 500_000
 """Unknowns of a rank in the plan."""
+WORDS = ("engine", "ranks", "cells", "threads")
+NAMES = {
+    "own": "own engine",
+    "petsc": "over ranks",
+    "whole": "over ranks, the mesh on rank 0",
+    "plain": "PETSc, plain assembly",
+}
+
+
+# ---- runs ------------------------------------------------------------------------------------------
+
+
+def runs(sizes: Sequence[int] | None = None) -> list[Run]:
+    """Return the clamped block by every engine, and of 2 ranks twice as much."""
+    return [
+        run(kind, n, engine, count, twice)
+        for kind in CELLS
+        for n in sizes or CELLS[kind]
+        for engine, count in ENGINES
+        for twice in ((False, True) if (engine, count) == ("petsc", MOST_RANKS) else (False,))
+        if engine != "plain" or n**3 * (8 if kind == "27N" else 1) <= PLAIN_LIMIT
+    ]
+
+
+def run(kind: str, n: int, engine: str, count: int, twice: bool) -> Run:
+    """Return the solution of a block by an engine on so many ranks, or threads of the own engine."""
+    ranks, threads = (1, count) if engine == "own" else (count, 1)
+    values = engine, ranks, tuple(cube(n, twice)), threads
+    options = (*zip(WORDS, values, strict=True), ("tolerance", TOLERANCE))
+    program = f"{engine} {count}"
+    return Run("distributed", program, "block", kind, n, "ranks", options, "twice" * twice, WORDS)
+
+
+def compared(rows: Sequence[Row]) -> Sequence[Row]:
+    """Return rows with the relative difference of the work of the loads to that of the own engine."""
+    for row in (row for row in rows if "load work" in row):
+        alike = chosen(rows, engine="own", kind=row["kind"], cells=row["cells"])
+        if alike and alike[0] is not row:
+            row["difference"] = abs(row["load work"] / alike[0]["load work"] - 1)
+    return rows
+
+
+def text_files(sizes: Sequence[int] | None = None) -> list[Row]:
+    """Return the sizes of .mdpa files of blocks, their places with all digits, and their unknowns."""
+    from benchmarks.programs.ranks import MATERIAL, model_of
+
+    found = []
+    for kind, cells in CELLS.items():
+        n = min(sizes or cells, key=lambda n: abs(n - 16))
+        mesh = model_of("own", kind, [n, n, n])[0].mesh
+        shift = np.random.default_rng(0).uniform(0.0, 1e-6, mesh.points.shape)
+        with scratch() as name:
+            path = Path(name) / "block.mdpa"
+            kl.write(path, kl.Model(mesh.replace(points=mesh.points + shift), MATERIAL))
+            found.append({"kind": kind, "bytes": path.stat().st_size, "unknowns": 3 * mesh.n_nodes})
+    return found
+
+
+# ---- the page --------------------------------------------------------------------------------------
 
 
 def name_of(row: Row) -> str:
@@ -53,12 +124,6 @@ def per_unknown(row: Row) -> float:
     return float(row["memory"] * row["ranks"] / row["unknowns"] / 1e3)
 
 
-def table(heads: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
-    """Return a table."""
-    rows = [heads, ["---"] * len(heads), *lines]
-    return "\n".join("| " + " | ".join(row) + " |" for row in rows) + "\n"
-
-
 def scaling(rows: Sequence[Row]) -> str:
     """Return strong and weak scaling with efficiencies and memory."""
     lines = []
@@ -66,39 +131,42 @@ def scaling(rows: Sequence[Row]) -> str:
         own = chosen(rows, kind=kind, n=n, engine="own", threads=1)
         ones = chosen(rows, kind=kind, n=n, engine="petsc", ranks=1)
         for row in chosen(rows, kind=kind, n=n, engine="petsc"):
-            weak = row["cells"] != cube(n)
-            phases = row["phases"]
-            efficiency = ""
+            weak, efficiency, serial = row["cells"] != cube(n), "", ""
             if ones and row is not ones[0]:
-                share = time_of(ones[0]) / time_of(row) / (1 if weak else row["ranks"])
-                efficiency = f"{share:.2f} {'weak' if weak else 'strong'}"
-            serial = f"{row['seconds'] / own[0]['seconds']:.2f}" if own and not weak else ""
-            times = [f"{seconds:.2f}" for seconds in (row["mesh"], phases["assemble"], phases["solve"])]
-            sizes = [f"{kind} {'×'.join(map(str, row['cells']))}", f"{row['unknowns']}", f"{row['ranks']}"]
-            ends = [f"{row['seconds']:.2f}", f"{row['iterations']}", efficiency, serial]
-            off = f"{row['difference']:.0e}" if "difference" in row else ""
-            lines.append([*sizes, *times, *ends, f"{per_unknown(row):.2f}", off])
-    heads = ["cells", "unknowns", "ranks", "mesh s", "assembly s", "set-up and solver s", "solution s"]
-    heads += ["iterations", "efficiency", "/ serial", "kB per unknown", "difference"]
-    return table(heads, lines)
+                fraction = time_of(ones[0]) / time_of(row) / (1 if weak else row["ranks"])
+                efficiency = f"{fraction:.2f} {'weak' if weak else 'strong'}"
+            if own and not weak:
+                serial = f"{row['seconds'] / own[0]['seconds']:.2f}"
+            line = [f"{kind} {'×'.join(map(str, row['cells']))}", f"{row['unknowns']}", f"{row['ranks']}"]
+            line += [f"{row['mesh']:.2f}", *times(row), efficiency, serial, f"{per_unknown(row):.2f}"]
+            lines.append([*line, error(row.get("difference"))])
+    head = (
+        "cells | unknowns | ranks | mesh s | assembly s | set-up and solver s | solution s | iterations | "
+        "efficiency | / serial | kB per unknown | difference"
+    )
+    return table(head, lines)
+
+
+def times(row: Row) -> list[str]:
+    """Return seconds of assembly, solver and solution, and iterations."""
+    seconds = (row["phases"]["assemble"], row["phases"]["solve"], row["seconds"])
+    return [*(f"{s:.2f}" for s in seconds), f"{row['iterations']}"]
 
 
 def others(rows: Sequence[Row]) -> str:
     """Return the engines beside each other on one block."""
-    lines = []
-    for kind, n in places(rows):
-        for row in chosen(rows, kind=kind, n=n):
-            if row["cells"] == cube(n):
-                times = [f"{row['phases'][name]:.2f}" for name in ("assemble", "solve")]
-                last = [f"{row['seconds']:.2f}", f"{row['iterations']}", f"{per_unknown(row):.2f}"]
-                lines.append(
-                    [f"{kind} n = {n}", f"{ENGINES[row['engine']]}, {processors(row)}", *times, *last]
-                )
-    heads = ["block", "engine", "assembly s", "set-up and solver s", "solution s", "iterations"]
-    return table([*heads, "kB per unknown"], lines)
-
-
-ENGINES = {"own": "own engine", "petsc": "over ranks", "plain": "PETSc, plain assembly"}
+    lines = [
+        [
+            f"{kind} n = {n}",
+            f"{NAMES[row['engine']]}, {processors(row)}",
+            *times(row),
+            f"{per_unknown(row):.2f}",
+        ]
+        for kind, n in places(rows)
+        for row in chosen(rows, kind=kind, n=n, cells=cube(n))
+    ]
+    head = "block | engine | assembly s | set-up and solver s | solution s | iterations | kB per unknown"
+    return table(head, lines)
 
 
 def places(rows: Iterable[Row]) -> list[tuple[str, int]]:
@@ -115,25 +183,22 @@ def plan(found: Row) -> str:
         if not two:
             continue
         largest = max(two, key=lambda row: row["unknowns"])
-        grows, base = iterations_by_tenfold(two), largest["iterations"]
-        text = next((one for one in found["files"] if one["kind"] == kind), None)
+        slope, base, size = iterations_by_tenfold(two), largest["iterations"], largest["unknowns"]
+        files = [file["bytes"] / file["unknowns"] for file in found["files"] if file["kind"] == kind]
+        fraction = PER_RANK * MOST_RANKS / size  # of the work of a rank that was measured
+        solve = largest["phases"]["solve"] * fraction
         for unknowns in PLANNED:
             ranks = math.ceil(unknowns / PER_RANK)
-            count = base + grows * math.log10(unknowns / largest["unknowns"])
-            share = PER_RANK * MOST_RANKS / largest["unknowns"]  # of the work of a rank that was measured
-            solve = largest["phases"]["solve"] * share
-            rest = (time_of(largest) - largest["phases"]["solve"]) * share
-            seconds = rest + solve * (count / base if base else 1.0)
+            count = base + slope * math.log10(unknowns / size)
+            seconds = time_of(largest) * fraction - solve + solve * count / base
             memory = per_unknown(largest) * 1e3 * unknowns + ranks * largest["imports"]
-            sizes = [text["bytes"] / text["unknowns"] * unknowns / 1e9 if text else math.nan]
-            sizes += [largest.get("bytes written", math.nan) / largest["unknowns"] * unknowns / 1e9]
+            bytes_ = (*files, math.nan)[0], largest.get("bytes written", math.nan) / size
             lines.append(
                 [f"{kind} 1e{math.log10(unknowns):.0f}", f"{ranks}", f"{memory / 1e9:.0f}"]
-                + [f"{size:.1f}" for size in sizes]
+                + [f"{one * unknowns / 1e9:.1f}" for one in bytes_]
                 + [f"{count:.0f}", f"{seconds:.0f}"]
             )
-    heads = ["unknowns", "ranks", "memory GB", "`.mdpa` parts GB", "`.pvtu` GB", "iterations", "time s"]
-    return table(heads, lines)
+    return table("unknowns | ranks | memory GB | `.mdpa` parts GB | `.pvtu` GB | iterations | time s", lines)
 
 
 def iterations_by_tenfold(rows: Sequence[Row]) -> float:
@@ -143,8 +208,8 @@ def iterations_by_tenfold(rows: Sequence[Row]) -> float:
     2.0
     """
     first, last = (pick(rows, key=lambda row: row["unknowns"]) for pick in (min, max))
-    ratio = last["unknowns"] / first["unknowns"]
-    return max(0.0, (last["iterations"] - first["iterations"]) / math.log10(ratio)) if ratio > 1 else 0.0
+    tenfolds = math.log10(last["unknowns"] / first["unknowns"])
+    return max(0.0, (last["iterations"] - first["iterations"]) / tenfolds) if tenfolds else 0.0
 
 
 def goals(rows: Sequence[Row]) -> str:
@@ -158,25 +223,22 @@ def goals(rows: Sequence[Row]) -> str:
         if not (1 in here and MOST_RANKS in here and weak and own):
             continue
         one, two = here[1], here[MOST_RANKS]
-        strong = time_of(one) / time_of(two) / MOST_RANKS
-        memory = max(map(per_unknown, (one, two, *weak)))
-        serial = one["seconds"] / own[0]["seconds"]
-        values = [f"{strong:.2f}", f"{time_of(one) / time_of(weak[0]):.2f}", f"{memory:.2f}", f"{serial:.2f}"]
-        lines.append([f"{kind} n = {n}", *values])
-    limits = f"≥ {GOALS['efficiency']}", f"≤ {GOALS['memory']}", f"≤ {GOALS['serial']}"
-    lines.append(["goal", limits[0], limits[0], *limits[1:]])
-    heads = ["block", f"efficiency, {MOST_RANKS} ranks, strong", "weak", "kB per unknown", "1 rank / serial"]
-    return table(heads, lines)
+        values = [time_of(one) / time_of(two) / MOST_RANKS, time_of(one) / time_of(weak[0])]
+        values += [max(map(per_unknown, (one, two, *weak))), one["seconds"] / own[0]["seconds"]]
+        lines.append([f"{kind} n = {n}", *(f"{value:.2f}" for value in values)])
+    lines.append(["goal", *2 * [f"≥ {EFFICIENCY}"], f"≤ {MEMORY}", f"≤ {SERIAL}"])
+    head = f"block | efficiency, {MOST_RANKS} ranks, strong | weak | kB per unknown | 1 rank / serial"
+    return table(head, lines)
 
 
 TEXT = """# Scaling over ranks
 
 How [a model over many processes](../howto/cluster.md) scales, measured by `python -m benchmarks distributed`
-on {processor}, {cores} cores, {date} ({versions}; medians of {repeats}). The clamped block under gravity in
-three directions, to a relative residual of {tolerance:g}; each rank makes its share of the mesh. Compare
+on {machine}, {date} ({versions}; medians of {repeats}). The clamped block under gravity in
+three directions, to a relative residual of 1e-10; each rank makes its share of the mesh. Compare
 ratios, not seconds. Ranks of one machine share its memory, and say nothing about a network.
 
-{goals}
+{tables[goals]}
 Efficiency is that of mesh and solution; the weak one is the time for one share on one rank over that for two
 shares on two. Memory is the most that a rank holds above its imports, over its share of the unknowns. Serial
 is the own engine on one thread.
@@ -186,39 +248,33 @@ is the own engine on one thread.
 On one rank and two: the same block, and for two ranks one of twice the cells. "Solution" is everything in
 `model.solve()`, checks included. The last column compares the work of the loads with the own engine.
 
-{scaling}
+{tables[scaling]}
 ## Beside the own engine and a plain assembly
 
 The own engine on one thread and on as many as there are ranks, and PETSc's GAMG with conjugate gradients fed
 by an assembly in NumPy, with all element matrices at once and a sort of their entries, as finite-element
 libraries in Python do it.
 
-{others}
+{tables[others]}
 ## What large models need
 
-From the largest block above at {per_rank} unknowns a rank: memory and files grow with the unknowns,
+From the largest block above at 500000 unknowns a rank: memory and files grow with the unknowns,
 iterations as measured with their logarithm, and time with the iterations. What the network adds is not in
 it; neither are reading and partitioning. Indices of 32 bits reach 2.1e9 unknowns; beyond, PETSc must be built
 for 64.
 
-{plan}"""
+{tables[plan]}"""
 
 
 def page(found: Row) -> str:
     """Return the page."""
-    rows, about = found["rows"], found["machine"]
+    rows = found["rows"]
     failed = [f"- {name_of(row)}: {row['failed']}\n" for row in rows if "failed" in row]
     text = TEXT.format(
-        processor=about["processor"],
-        cores=about["cores"],
+        machine=f"{found['machine']['processor']}, {found['machine']['cores']} cores",
         date=found["date"],
         versions=", ".join(f"{name} {one}" for name, one in found["versions"].items()),
         repeats=found["repeats"],
-        tolerance=TOLERANCE,
-        per_rank=PER_RANK,
-        goals=goals(rows),
-        scaling=scaling(rows),
-        others=others(rows),
-        plan=plan(found),
+        tables={make.__name__: make(rows) for make in (goals, scaling, others)} | {"plan": plan(found)},
     )
     return text + ("\nWhat did not end well:\n\n" + "".join(failed) if failed else "")

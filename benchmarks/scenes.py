@@ -5,7 +5,6 @@ Every program gets the same discrete problem: nodes, elements, fixed components 
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -14,14 +13,17 @@ import numpy as np
 
 import kratos_lite as kl
 from benchmarks.cases import write_for_kratos
-from benchmarks.hard_scenes import HARD, write_system
+from benchmarks.hard_scenes import HARD, system, weighty
 from benchmarks.programs import ALL, FORMULATIONS
+from kratos_lite.typing import Array
 from kratos_lite.verification import concentrations
 from kratos_lite.verification import scenes as shared
-from kratos_lite.verification.meshes import element, joined, on_plane
-from kratos_lite.verification.scenes import Scene, bending, cavity, cube, l_domain, manufactured, sphere
+from kratos_lite.verification.meshes import element, joined, on_plane, plane, shaped
+from kratos_lite.verification.pressure import lame_cylinder
+from kratos_lite.verification.scenes import UNIT, Scene, bending, cavity, cube, l_domain, manufactured, sphere
 
 KINDS = (*ALL, *FORMULATIONS)
+SOLID = kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0)
 
 
 def stem(name: str, kind: str, n: int) -> str:
@@ -53,6 +55,13 @@ def write(scene: Scene, folder: Path) -> Path:
     return path
 
 
+def write_system(scene: Scene, folder: Path) -> Path:
+    """Write the linear system of a scene as `.npz`; return the path without ending."""
+    path = folder / stem(scene.name, scene.kind, scene.n)
+    np.savez(f"{path}.npz", **system(scene))
+    return path
+
+
 def cook(kind: str, n: int) -> Scene:
     """Return Cook's membrane in plane strain, with its energy."""
     return replace(shared.cook(kind, n), energy=ENERGIES["cook"])
@@ -68,69 +77,85 @@ def hole_incompressible(kind: str, n: int) -> Scene:
     return replace(concentrations.hole(kind, n, nu=0.4999), name="hole_incompressible")
 
 
-def block(kind: str, n: int) -> Scene:
+def hole(kind: str, n: int) -> Scene:
+    """Return the plate with a hole."""
+    return concentrations.hole(kind, n)
+
+
+def cylinder(kind: str, n: int) -> Scene:
+    """Return a quarter of a thick cylinder, radii 1 and 3, under inner pressure in plane strain."""
+
+    def place(X: Array) -> Array:
+        r, angle = 1 + 2 * X[:, 0], np.pi / 2 * X[:, 1]
+        return np.column_stack([r * np.cos(angle), r * np.sin(angle), 0.5 * X[:, 2]])
+
+    def exact(X: Array) -> Array:
+        r = np.linalg.norm(X[..., :2], axis=-1, keepdims=True)
+        flat = lame_cylinder(UNIT.nu, UNIT.E, 1.0, 3.0, r) * X[..., :2] / r
+        return np.concatenate([flat, 0.0 * r], axis=-1)
+
+    mesh = shaped(kind, (n, n, 1), place)
+    model = kl.Model(mesh, UNIT)
+    model.fix(plane(0, 0.0), "x")
+    model.fix(plane(1, 0.0), "y")
+    for end in (0.0, 0.5):
+        model.fix(plane(2, end), "z")
+    model.add(kl.Pressure(np.abs(np.linalg.norm(mesh.points[:, :2], axis=1) - 1) < 1e-9, 1.0))
+    return Scene("cylinder", kind, n, model, exact)
+
+
+def box_under_gravity(kind: str, n: int) -> kl.Model:
     """Return the unit block of n³ cells, clamped at its bottom, under gravity in three directions."""
-    model = kl.Model(
-        kl.box(cells=(n, n, n), element=element(kind)), kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0)
-    )
-    model.fix("z-")
-    model.add(kl.Gravity((3.0, 2.0, -9.81)))
-    return Scene("block", kind, n, model, energy=ENERGIES["block"])
+    return weighty(kl.box(cells=(n, n, n), element=element(kind)), material=SOLID)
+
+
+def block(kind: str, n: int) -> Scene:
+    """Return the block under gravity with its energy."""
+    return Scene("block", kind, n, box_under_gravity(kind, n), energy=ENERGIES["block"])
 
 
 # ---- scenes for what can be skipped ------------------------------------------------------------------
 
 
-def _two(name: str, kind: str, n: int, loaded: int) -> Scene:
+def two_bodies(kind: str, n: int, loaded: int = 2) -> Scene:
     """Return two clamped blocks apart from each other, of which the first or both carry a load."""
     mesh = joined([kl.box(cells=(n, n, n), element=element(kind), origin=(2.0 * i, 0, 0)) for i in range(2)])
-    model = kl.Model(mesh, kl.Isotropic3D(E=210e6, nu=0.3))
+    model = kl.Model(mesh, SOLID)
     model.fix("z-")
     model.add(kl.Traction(on_plane(mesh, 2, 1.0) & (mesh.points[:, 0] < 1.5 * loaded), (1e3, 0.0, -1e3)))
-    return Scene(name, kind, n, model)
-
-
-def two_bodies(kind: str, n: int) -> Scene:
-    """Return two clamped blocks apart from each other, both loaded."""
-    return _two("two_bodies", kind, n, 2)
+    return Scene("two_bodies", kind, n, model)
 
 
 def half_unloaded(kind: str, n: int) -> Scene:
     """Return the same with one of them unloaded: it need not be solved."""
-    return _two("half_unloaded", kind, n, 1)
+    return replace(two_bodies(kind, n, 1), name="half_unloaded")
 
 
 def unloaded(kind: str, n: int) -> Scene:
     """Return the clamped block without any load."""
-    loaded = block(kind, n)
-    loaded.model.loads.clear()
-    return Scene("unloaded", kind, n, loaded.model)
+    model = box_under_gravity(kind, n)
+    model.loads.clear()
+    return Scene("unloaded", kind, n, model)
 
 
 def unreferenced(kind: str, n: int) -> Scene:
     """Return the clamped block with as many nodes again that belong to no element."""
     mesh = kl.box(cells=(n, n, n), element=element(kind))
     more = kl.Mesh(np.vstack([mesh.points, mesh.points + 5.0]), mesh.blocks)
-    model = kl.Model(more, kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0))
-    model.fix(on_plane(more, 2, 0.0))
-    model.add(kl.Gravity((3.0, 2.0, -9.81)))
-    return Scene("unreferenced", kind, n, model)
+    return Scene("unreferenced", kind, n, weighty(more, material=SOLID))
 
 
 def warped(kind: str, n: int) -> Scene:
     """Return the clamped block with its inner nodes moved, so that no Jacobian is constant."""
-    plain = block(kind, n).model
-    X = plain.mesh.points
+    mesh = kl.box(cells=(n, n, n), element=element(kind))
+    X = mesh.points
     points = X + 0.1 / n * (np.sin(7 * np.pi * X) * np.sin(5 * np.pi * X[:, [1, 2, 0]]))
-    model = kl.Model(kl.Mesh(points, plain.mesh.blocks), kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0))
-    model.fix(on_plane(model.mesh, 2, 0.0))
-    model.add(kl.Gravity((3.0, 2.0, -9.81)))
-    return Scene("warped", kind, n, model)
+    return Scene("warped", kind, n, weighty(kl.Mesh(points, mesh.blocks), material=SOLID))
 
 
 def held(kind: str, n: int) -> Scene:
-    """Return the block with all nodes of its lower half held."""
-    model = block(kind, n).model
+    """Return the block with all nodes of its lower half constrained."""
+    model = box_under_gravity(kind, n)
     model.fix(model.mesh.points[:, 2] < 0.5 + 1e-9)
     return Scene("held", kind, n, model)
 
@@ -140,8 +165,8 @@ ENERGIES: dict[str, float | None] = {"cook": 457.481, "cantilever": 0.215581, "b
 SCENES: dict[str, Callable[[str, int], Scene]] = {
     made.__name__: made
     for made in (
-        manufactured, sphere, bending, cook, l_domain, cavity, hole_incompressible, cantilever, block, cube,
-        two_bodies, half_unloaded, unloaded, unreferenced, warped, held,
+        manufactured, sphere, bending, cook, l_domain, cavity, hole, hole_incompressible, cylinder,
+        cantilever, block, cube, two_bodies, half_unloaded, unloaded, unreferenced, warped, held,
     )
 } | HARD  # fmt: skip
 """Every scene by name."""
@@ -150,12 +175,3 @@ SCENES: dict[str, Callable[[str, int], Scene]] = {
 def make(name: str, kind: str, n: int) -> Scene:
     """Return a scene by name, element kind and size."""
     return replace(SCENES[name](FORMULATIONS.get(kind, kind), n), kind=kind)
-
-
-if __name__ == "__main__":  # a process of its own, so that large scenes leave no memory behind
-    name, kind, n, folder, task = sys.argv[1:]
-    scene = make(name, kind, int(n))
-    if task == "linear":
-        write_system(scene, Path(folder) / f"{stem(name, kind, int(n))}.npz")
-    else:
-        write(scene, Path(folder))

@@ -6,40 +6,31 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks import ale
+from benchmarks import ale, cases
 from benchmarks.driver import Run
-from benchmarks.motion import MOTIONS
 from benchmarks.programs import PROGRAMS
 from benchmarks.scenes import KINDS
-from benchmarks.tables import ADAPTIVE, OURS
+from benchmarks.tables import ADAPTIVE, NUMPY, OURS, THEIRS
 
+Place = tuple[str, str, int]
 CURVED = ("sphere", "cavity", "hole_incompressible")
 """Scenes where quadratic elements have curved edges."""
-LINEAR = {
-    "manufactured": (6, 12, 36),
-    "sphere": (4, 8, 24),
-    "bending": (4, 8, 24),
-    "l_domain": (6, 12, 48),
-    "cavity": (2, 6, 16, 32),
-    "hole_incompressible": (2, 6, 14, 40),
-    "cantilever": (2, 6, 12),
-    "cook": (6, 20, 60),
-    "block": (6, 16, 28),
+CELLS = {
+    "manufactured": ((6, 12, 36), (2, 4, 8, 16)),
+    "sphere": ((4, 8, 24), (1, 2, 5, 10)),
+    "bending": ((4, 8, 24), (1, 2)),
+    "l_domain": ((6, 12, 48), (2, 6, 28, 42)),
+    "cavity": ((2, 6, 16, 32), (1, 2, 6, 18)),
+    "hole_incompressible": ((2, 6, 14, 40), (1, 3, 6, 14, 30)),
+    "cantilever": ((2, 6, 12), (1, 3, 5, 10)),
+    "cook": ((6, 20, 60), (2, 6, 20, 30)),
+    "block": ((6, 16, 28), (2, 6, 18, 28)),
 }
-"""Cells along an edge of the error scenes, for linear elements."""
-QUADRATIC = {
-    "manufactured": (2, 4, 8, 16),
-    "sphere": (1, 2, 5, 10),
-    "bending": (1, 2),
-    "l_domain": (2, 6, 28, 42),
-    "cavity": (1, 2, 6, 18),
-    "hole_incompressible": (1, 3, 6, 14, 30),
-    "cantilever": (1, 3, 5, 10),
-    "cook": (2, 6, 20, 30),
-    "block": (2, 6, 18, 28),
-}
-"""The same for quadratic ones: errors of 1 %, 0.1 % and 0.01 % lie between two of them where they can."""
-ERROR_SCENES = tuple(QUADRATIC)
+"""Cells along an edge of the error scenes for linear elements, and for quadratic ones.
+
+Errors of 1 %, 0.1 % and 0.01 % lie between two of them where they can.
+"""
+ERROR_SCENES = tuple(CELLS)
 GOALS_OF_ERROR = (0.1, 0.05, 0.02, 0.01, 3e-3, 1e-3, 3e-4, 1e-4)
 """Relative errors in the energy norm that the adaptive solution is asked for."""
 START = ("20N", 2)
@@ -74,8 +65,11 @@ SKIPS: tuple[tuple[str, str, tuple[tuple[str, Any], ...]], ...] = (
 """Scene, what it is, and options: each row is compared with the plain one of the same size."""
 KRATOS_SOLVERS = {"cantilever": "LU", "hole_incompressible": "LU"}
 """Of scenes on which its multigrid does not converge, or takes longer."""
-FROM_FILES = ("kratos_lite", "kratos_lite NumPy", "Kratos")
+FROM_FILES = (OURS, NUMPY, THEIRS)
 """Programs that read `.mdpa` files with everything they say."""
+WRITTEN = (("write", True),)
+QUICK_SIZES = {"4N": (4, 8), "8N": (4, 8), "10N": (2, 4), "20N": (2, 4), "27N": (2, 4)}
+QUICK_PROGRAMS = (OURS, NUMPY, THEIRS, "scikit-fem")
 
 
 def takes(program: str, scene: str, kind: str) -> bool:
@@ -89,18 +83,34 @@ def takes(program: str, scene: str, kind: str) -> bool:
     return kind in (given.curved if curved else given.kinds)
 
 
-def goal_runs(programs: Sequence[str], goals: Iterable[tuple[str, str, int]] = GOALS) -> list[Run]:
+def quick(programs: Sequence[str]) -> list[Run]:
+    """Return a set that ends within two minutes."""
+    some = [name for name in programs if name in QUICK_PROGRAMS]
+    runs = goal_runs(programs, (("block", "8N", 10), ("cube", "8N", 10), ("block", "27N", 4)))
+    runs += error_runs(some, ("manufactured", "cantilever"), QUICK_SIZES)
+    runs += assembly_runs(some, {"8N": 10, "10N": 4, "27N": 4})
+    return runs + parse_runs(programs, (10,)) + cube1_runs(programs) + skip_runs(programs, 8)
+
+
+def kratos(programs: Sequence[str], cells: Sequence[int] | None, folder: Path, target: Path) -> list[Run]:
+    """Return the goal rows, with other cells if some are given, and the real scenes of a folder."""
+    goals: Iterable[Place] = GOALS
+    if cells:
+        goals = [(*kind, n) for kind in dict.fromkeys(goal[:2] for goal in GOALS) for n in cells]
+    files = [(str(path), "", 0) for path in cases.prepared(folder, target)] if folder.is_dir() else []
+    return goal_runs(programs, goals) + runs("case", FROM_FILES, programs, files, "solve", WRITTEN)
+
+
+def runs(
+    group: str, names: Sequence[str], programs: Sequence[str], places: Iterable[Place], *words: Any
+) -> list[Run]:
+    """Return runs of those of the programs named that are wanted on each scene, kind and size."""
+    return [Run(group, name, *place, *words) for place in places for name in names if name in programs]
+
+
+def goal_runs(programs: Sequence[str], goals: Iterable[Place] = GOALS) -> list[Run]:
     """Return whole processes from `.mdpa` to VTK files, and pyamg as it comes for its solver alone."""
-    chosen = [program for program in (*FROM_FILES, "pyamg") if program in programs]
-    options = (("write", True),)
-    return [Run("goal", program, *goal, options=options) for goal in goals for program in chosen]
-
-
-def case_runs(programs: Sequence[str], files: Iterable[Path]) -> list[Run]:
-    """Return the same for real scenes, whole in `.mdpa` files."""
-    chosen = [program for program in FROM_FILES if program in programs]
-    options = (("write", True),)
-    return [Run("case", program, str(file), "", 0, options=options) for file in files for program in chosen]
+    return runs("goal", (*FROM_FILES, "pyamg"), programs, goals, "solve", WRITTEN)
 
 
 def error_runs(
@@ -113,19 +123,17 @@ def error_runs(
     words = (("errors", True), ("warm", True), ("arrays", True))
     runs = []
     for scene in scenes:
-        for kind in KINDS:
-            for n in (sizes or {kind: sizes_of(scene, kind)}).get(kind, ()):
-                runs += [
-                    Run("error", program, scene, kind, n, options=words + solver_of(program, scene))
-                    for program in programs
-                    if program in PROGRAMS
-                    and program != ADAPTIVE
-                    and kind in chosen(program, scene, elements)
-                ]
+        solver = {THEIRS: (("kratos_solver", KRATOS_SOLVERS.get(scene, "AMGCL")),)}
+        runs += [
+            Run("error", program, scene, kind, n, options=words + solver.get(program, ()))
+            for kind in KINDS
+            for n in (sizes or {kind: sizes_of(scene, kind)}).get(kind, ())
+            for program in programs
+            if program in PROGRAMS and program != ADAPTIVE and kind in chosen(program, scene, elements)
+        ]
         if ADAPTIVE in programs:
-            start = (*words, ("scene", scene), ("n", START[1]))
             runs += [
-                Run("error", ADAPTIVE, scene, *START, options=(*start, ("goal", goal)), variant=f"{goal:g}")
+                Run("error", ADAPTIVE, scene, *START, options=(*words, ("goal", goal)), variant=f"{goal:g}")
                 for goal in GOALS_OF_ERROR
             ]
     return runs
@@ -158,78 +166,39 @@ def sizes_of(scene: str, kind: str) -> tuple[int, ...]:
     >>> sizes_of("bending", "8N enhanced"), sizes_of("bending", "20N")
     ((4, 8, 24), (1, 2))
     """
-    sizes = (LINEAR if kind.split(maxsplit=1)[0] in ("4N", "8N") else QUADRATIC)[scene]
+    sizes = CELLS[scene][kind.split(maxsplit=1)[0] not in ("4N", "8N")]
     return sizes[sizes[0] == 1 :] if kind == "20N reduced" else sizes
 
 
-def solver_of(program: str, scene: str) -> tuple[tuple[str, Any], ...]:
-    """Return the words for the solver of Kratos that is best on a scene, by measurement."""
-    return (("kratos_solver", KRATOS_SOLVERS.get(scene, "AMGCL")),) if program == "Kratos" else ()
-
-
-def growth_runs(
-    programs: Sequence[str], sizes: Sequence[int] = GROWTH, kinds: Sequence[str] = ("8N",)
-) -> list[Run]:
-    """Return the clamped block from small to as large as memory takes."""
-    return [
-        Run("growth", program, "block", kind, n)
-        for kind in kinds
-        for n in sizes
-        for program in FROM_FILES[:1] + FROM_FILES[2:]
-        if program in programs
-    ]
-
-
-def assembly_runs(programs: Sequence[str], sizes: dict[str, int] | None = None, repeat: int = 4) -> list[Run]:
+def assembly_runs(programs: Sequence[str], sizes: dict[str, int] | None = None) -> list[Run]:
     """Return pattern and matrix alone, on the clamped block."""
-    wanted = [p for p in programs if p in PROGRAMS and p not in ("CalculiX", ADAPTIVE)]
     return [
-        Run("assembly", program, "block", kind, n, "assembly", (("repeat", repeat),))
+        Run("assembly", program, "block", kind, n, "assembly", (("repeat", 4),))
         for kind, n in (sizes or ASSEMBLY).items()
-        for program in wanted
-        if takes(program, "block", kind)
+        for program in programs
+        if program in PROGRAMS and program not in ("CalculiX", ADAPTIVE) and takes(program, "block", kind)
     ]
 
 
 def parse_runs(programs: Sequence[str], sizes: Sequence[int] = (20, 50)) -> list[Run]:
     """Return reading a `.mdpa` file: kratos_lite, Kratos and meshio."""
-    chosen = [p for p in ("kratos_lite", "kratos_lite NumPy", "Kratos", "meshio") if p in programs]
-    return [Run("parse", program, "block", "8N", n, "parse") for n in sizes for program in chosen]
+    return runs("parse", (*FROM_FILES, "meshio"), programs, [("block", "8N", n) for n in sizes], "parse")
 
 
-def motion_runs(programs: Sequence[str]) -> list[Run]:
-    """Return bodies in motion: seconds per step."""
-    chosen = [p for p in FROM_FILES[:2] if p in programs]
-    return [
-        Run("motion", program, name, "", 0, "motion", (("motion", name),))
-        for name in MOTIONS
-        for program in chosen
-    ]
-
-
-def ale_runs(
-    programs: Sequence[str], sizes: Sequence[tuple[str, int]] = ale.MESHES, repeat: int = 4
-) -> list[Run]:
+def ale_runs(programs: Sequence[str], sizes: Iterable[Any] = ale.MESHES, repeat: int = 4) -> list[Run]:
     """Return the matrices of a wheel in flow, beside GetFEM."""
-    chosen = [p for p in (*FROM_FILES[:2], "GetFEM") if p in programs]
-    return [
-        Run("ale", program, ale.SCENE, kind, n, "ale", (("repeat", repeat), ("n", n)))
-        for kind, n in sizes
-        for program in chosen
-    ]
+    places = [(ale.SCENE, *size) for size in sizes]
+    return runs("ale", (OURS, NUMPY, "GetFEM"), programs, places, "ale", (("repeat", repeat),))
 
 
 def cube1_runs(programs: Sequence[str]) -> list[Run]:
     """Return the whole process for one element, beside a process that imports NumPy alone."""
-    chosen = [p for p in ("import numpy", *FROM_FILES) if p in programs]
-    return [Run("cube1", program, "cube", "8N", 1) for program in chosen]
+    return runs("cube1", ("import numpy", *FROM_FILES), programs, [("cube", "8N", 1)])
 
 
 def skip_runs(programs: Sequence[str], n: int = 32) -> list[Run]:
     """Return pairs with and without work that can be skipped."""
-    if "kratos_lite" not in programs:
-        return []
+    pairs = [((scene, "8N", n), options, variant) for scene, variant, options in SKIPS]
     return [
-        Run("skips", "kratos_lite", scene, "8N", n, options=options, variant=variant)
-        for scene, variant, options in SKIPS
+        run for place, *words in pairs for run in runs("skips", (OURS,), programs, [place], "solve", *words)
     ]

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 
 from benchmarks import hard_scenes
 from benchmarks.driver import Run
 from benchmarks.programs import SOLVERS
-from benchmarks.tables import OURS, Row, ratio, seconds, table
+from benchmarks.tables import OURS, Row, error, megabytes, ratio, seconds, table
 
 UNKNOWNS = 60_000
 """About so many are solved for if nothing else is asked for."""
@@ -21,22 +22,12 @@ PROJECTED = ("8N enhanced", "10N B-bar", "20N B-bar", "27N B-bar")
 BENIGN = "block"
 ELEMENTS: dict[str, tuple[str, ...]] = {
     BENIGN: (*MOST, *PROJECTED[1:]),
-    "flat_10": BRICKS,
-    "flat_100": MOST,
-    "flat_1000": BRICKS,
-    "needles_10": BRICKS,
-    "needles_100": MOST,
-    "needles_1000": BRICKS,
-    "needles_one_layer": BRICKS,
-    "plate_100": MOST,
-    "plate_1000": BRICKS,
-    "cantilever_plate_100": MOST,
-    "cantilever_plate_100_layers": BRICKS,
-    "cantilever_plate_1000": MOST,
-    "contrast_layers": ("8N", "10N", "20N"),
-    "contrast_inclusions": ("8N", "10N", "20N"),
-    "links_periodic": ("8N", "20N"),
-    "links_bonded": ("8N", "20N"),
+    **dict.fromkeys(("flat_10", "flat_1000", "needles_10", "needles_1000", "needles_one_layer"), BRICKS),
+    **dict.fromkeys(("flat_100", "needles_100", "plate_100"), MOST),
+    **dict.fromkeys(("plate_1000", "cantilever_plate_100_layers"), BRICKS),
+    **dict.fromkeys(("cantilever_plate_100", "cantilever_plate_1000"), MOST),
+    **dict.fromkeys(("contrast_layers", "contrast_inclusions"), ("8N", "10N", "20N")),
+    **dict.fromkeys(("links_periodic", "links_bonded"), ("8N", "20N")),
     "tetrahedra": ("4N", "10N"),
     **{hard_scenes.name_of(nu): PROJECTED for nu in hard_scenes.RATIOS},
 }
@@ -85,22 +76,11 @@ def runs(
 
 def tables(rows: Sequence[Row]) -> str:
     """Return what kratos_lite takes beside its block, and beside the other solvers."""
-    places = dict.fromkeys((row["scene"], row["kind"], row["n"]) for row in rows)
-    found = {place: {row["program"]: row for row in rows if place == _place(row)} for place in places}
-    mine = {place: here[OURS] for place, here in found.items() if OURS in here}
-    return "\n".join(
-        text
-        for text in (
-            _ours(mine),
-            _peers(found),
-            _missed(mine, found),
-        )
-        if text
-    )
-
-
-def _place(row: Row) -> Place:
-    return row["scene"], row["kind"], row["n"]
+    found: dict[Place, dict[str, Row]] = defaultdict(dict)
+    for row in rows:
+        found[row["scene"], row["kind"], row["n"]][row["program"]] = row
+    ours = {place: here[OURS] for place, here in found.items() if OURS in here}
+    return "\n".join(filter(None, (_ours(ours), _peers(found), _missed(ours, found))))
 
 
 def _ours(rows: dict[Place, Row]) -> str:
@@ -110,23 +90,12 @@ def _ours(rows: dict[Place, Row]) -> str:
         if "failed" in row:
             body.append([scene, kind, "", row["failed"], *[""] * 6])
             continue
-        base, phases = _base(row, rows), row["phases"]
-        body.append(
-            [
-                scene,
-                kind,
-                str(row["unknowns"]),
-                f"{row['solver']}, {row['iterations']}",
-                seconds(phases["setup"]),
-                seconds(phases["solve"]),
-                ratio(_per_unknown(row, _time), _per_unknown(base, _time)),
-                _megabytes(row),
-                ratio(_per_unknown(row, _memory), _per_unknown(base, _memory)),
-                f"{row['residual']:.0e}",
-            ]
-        )
-    head = ["scene", "element", "unknowns", "solver, iterations", "set-up s", "solve s", "of block"]
-    return table([*head, "MB", "of block", "residual"], body)
+        times = (seconds(row["phases"][phase]) for phase in ("setup", "solve"))
+        cells = [scene, kind, str(row["unknowns"]), f"{row['solver']}, {row['iterations']}", *times]
+        cells += [_of_block(row, rows, _time), megabytes(row.get("memory")), _of_block(row, rows, _memory)]
+        body.append([*cells, error(row["residual"])])
+    head = "scene | element | unknowns | solver, iterations | set-up s | solve s | of block | MB | of block"
+    return table(f"{head} | residual", body)
 
 
 def _peers(found: dict[Place, dict[str, Row]]) -> str:
@@ -143,54 +112,44 @@ def _peers(found: dict[Place, dict[str, Row]]) -> str:
 
 def _best(here: dict[str, Row]) -> tuple[str, str]:
     """Return the fastest other solver, and the time of kratos_lite over its."""
-    times = {name: _time(here.get(name)) for name in SOLVERS}
-    known = {name: time for name, time in times.items() if time is not None}
-    if not known:
+    times = {name: time for name in SOLVERS if (time := _time(here.get(name))) is not None}
+    if not times:
         return "", ""
-    best = min(known, key=known.__getitem__)
-    return best, ratio(_time(here.get(OURS)), known[best])
+    best = min(times, key=times.__getitem__)
+    return best, ratio(_time(here.get(OURS)), times[best])
 
 
-def _missed(mine: dict[Place, Row], found: dict[Place, dict[str, Row]]) -> str:
+def _missed(ours: dict[Place, Row], found: dict[Place, dict[str, Row]]) -> str:
     """Return how many rows miss each goal."""
-    solved = {place: row for place, row in mine.items() if _time(row) is not None}
-    ratios = [float(_best(found[place])[1] or 0.0) for place in solved]
-    counts = {
-        "not solved": len(mine) - len(solved),
-        "more than 40 iterations, or a factorization": sum(map(_stalls, solved.values())),
-        "more than 3 times the time of the block": _over(solved, mine, _time, MOST_TIME),
-        "more than 1.5 times its memory": _over(solved, mine, _memory, MOST_MEMORY),
-        "more than 0.25 of the best other": sum(ratio > MOST_OF_OTHERS for ratio in ratios),
+    solved = {place: row for place, row in ours.items() if _time(row) is not None}
+    stalled = [row["iterations"] > MOST_ITERATIONS or row["solver"] == "direct" for row in solved.values()]
+    slow, large = (
+        [_per_unknown(row, ours, value) > limit for row in solved.values()]
+        for value, limit in ((_time, MOST_TIME), (_memory, MOST_MEMORY))
+    )
+    missed = {
+        "not solved": len(ours) - len(solved),
+        "more than 40 iterations, or a factorization": sum(stalled),
+        "more than 3 times the time of the block": sum(slow),
+        "more than 1.5 times its memory": sum(large),
+        "more than 0.25 of the best other": sum(
+            float(_best(found[place])[1] or 0.0) > MOST_OF_OTHERS for place in solved
+        ),
     }
-    lines = [f"- {what}: {count}" for what, count in counts.items()]
-    return "\n".join([f"Of the {len(mine)} rows of kratos_lite miss a goal:\n", *lines, ""]) if mine else ""
+    lines = [f"- {what}: {count}" for what, count in missed.items()]
+    return "\n".join([f"Of the {len(ours)} rows of kratos_lite miss a goal:\n", *lines, ""]) if ours else ""
 
 
-def _over(
-    solved: dict[Place, Row], mine: dict[Place, Row], value: Callable[[Row], float | None], limit: float
-) -> int:
-    """Return how many rows are beyond `limit` times the value of their block, by unknown."""
-    count = 0
-    for row in solved.values():
-        base = _base(row, mine)
-        here, there = _per_unknown(row, value), _per_unknown(base, value)
-        count += bool(here and there and here > limit * there)
-    return count
+def _per_unknown(row: Row, rows: dict[Place, Row], value: Callable[[Row], float | None]) -> float:
+    """Return a value by unknown over that of the block of the same element; 0 if one is not known."""
+    base = rows.get((BENIGN, row["kind"], row["n"]), {"failed": ""})
+    here, there = value(row), None if "failed" in base else value(base)
+    return here / row["unknowns"] / (there / base["unknowns"]) if here and there else 0.0
 
 
-def _stalls(row: Row) -> bool:
-    return bool(row["iterations"] > MOST_ITERATIONS or row["solver"] == "direct")
-
-
-def _base(row: Row, rows: dict[Place, Row]) -> Row | None:
-    """Return the block of the same element with the size of a row."""
-    found = rows.get((BENIGN, row["kind"], row["n"]))
-    return None if found is None or "failed" in found else found
-
-
-def _per_unknown(row: Row | None, value: Callable[[Row], float | None]) -> float | None:
-    found = value(row) if row else None
-    return found / row["unknowns"] if row and found else None
+def _of_block(row: Row, rows: dict[Place, Row], value: Callable[[Row], float | None]) -> str:
+    found = _per_unknown(row, rows, value)
+    return f"{found:.2g}" if found else ""
 
 
 def _memory(row: Row) -> float | None:
@@ -216,9 +175,5 @@ def _cell(row: Row | None) -> str:
         return str(row["failed"]).removeprefix("failed: ").strip()
     iterations = f" ({row['iterations']})" if row["iterations"] else ""
     if not _reached(row):
-        return f"residual {row['residual']:.0e}{iterations}"
-    return f"{seconds(_time(row))}{iterations}, {_megabytes(row)} MB"
-
-
-def _megabytes(row: Row) -> str:
-    return f"{row['memory'] / 1e6:.0f}" if row.get("memory") else ""
+        return f"residual {error(row['residual'])}{iterations}"
+    return f"{seconds(_time(row))}{iterations}, {megabytes(row.get('memory'))} MB"

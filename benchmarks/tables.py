@@ -6,22 +6,23 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 Row = dict[str, Any]
-OURS, ADAPTIVE, THEIRS = "kratos_lite", "kratos_lite adaptive", "Kratos"
+OURS, ADAPTIVE, NUMPY, THEIRS = "kratos_lite", "kratos_lite adaptive", "kratos_lite NumPy", "Kratos"
 
 
-def table(head: Sequence[str], body: Iterable[Sequence[str]]) -> str:
+def table(head: str | Sequence[str], body: Iterable[Sequence[str]]) -> str:
     """Return a Markdown table, or "" without rows.
 
-    >>> print(table(["a", "b"], [["1", "2"]]))
+    >>> print(table("a | b", [["1", "2"]]))
     | a | b |
     | --- | --- |
     | 1 | 2 |
     <BLANKLINE>
     """
+    names = head.split(" | ") if isinstance(head, str) else head
     lines = ["| " + " | ".join(row) + " |" for row in body]
     if not lines:
         return ""
-    return "\n".join(["| " + " | ".join(head) + " |", "|" + " --- |" * len(head), *lines]) + "\n"
+    return "\n".join(["| " + " | ".join(names) + " |", "|" + " --- |" * len(names), *lines]) + "\n"
 
 
 def ratio(ours: float | None, theirs: float | None) -> str:
@@ -34,3 +35,13 @@ def seconds(value: float | None) -> str:
     if value is None:
         return ""
     return f"{value:.3f}" if value < 1 else f"{value:.3g}"
+
+
+def megabytes(value: float | None) -> str:
+    """Return a memory in bytes as whole MB."""
+    return f"{value / 1e6:.0f}" if value else ""
+
+
+def error(value: float | None) -> str:
+    """Return a relative error in one digit."""
+    return "" if value is None else f"{value:.0e}"

@@ -48,16 +48,14 @@ class Given:
         zero = np.zeros_like(u)
         return kl.Result(model.mesh, model.element_groups(), u, zero, self.forces.copy(), None)
 
+    def displacement(self, program: str) -> Path:
+        """Return the file of the displacements of a program."""
+        return self.stem.with_suffix(f".{PROGRAMS[program].module}.npy")
+
     def job(self, program: str) -> dict[str, str]:
         """Return the job for a program."""
-        return {
-            "task": "solve",
-            "stem": str(self.stem),
-            "kind": self.scene.kind,
-            "folder": str(self.stem.parent),
-            "displacement": f"{self.stem}.{PROGRAMS[program].module}.npy",
-            "kratos_solver": "LU",
-        }
+        job = {"task": "solve", "stem": str(self.stem), "kind": self.scene.kind, "kratos_solver": "LU"}
+        return job | {"folder": str(self.stem.parent), "displacement": str(self.displacement(program))}
 
 
 def is_curved(mesh: kl.Mesh) -> bool:
@@ -85,17 +83,16 @@ def given(model: kl.Model, kind: str, folder: Path, number: int) -> Given | None
 def prepared(rows: list[Row], folder: Path) -> dict[int, list[Given]]:
     """Write the models of all rows that are problems at rest; rows with the same models share them."""
     known: dict[object, list[Given | None]] = {}
-    for row in rows:
+    ready = {}
+    for i, row in enumerate(rows):
         if isinstance(row.problem, StaticProblem):
             key = row.problem.models, row.element
             if key not in known:
                 models = row.problem.models(row.element)
-                known[key] = [given(m, row.kind, folder, 10 * len(known) + i) for i, m in enumerate(models)]
-    return {
-        i: known[row.problem.models, row.element]
-        for i, row in enumerate(rows)
-        if isinstance(row.problem, StaticProblem) and None not in known[row.problem.models, row.element]
-    }
+                known[key] = [given(m, row.kind, folder, 10 * len(known) + k) for k, m in enumerate(models)]
+            if None not in known[key]:
+                ready[i] = known[key]
+    return ready
 
 
 def takes(program: str, one: Given) -> bool:
@@ -105,13 +102,14 @@ def takes(program: str, one: Given) -> bool:
 
 
 def solved(program: str, python: str, jobs: list[dict[str, str]], folder: Path) -> str:
-    """Let a program do its jobs; return its version, or "" where it is absent."""
-    path = folder / f"{PROGRAMS[program].module}.json"
+    """Let a program do its jobs in one process; return its version, or "" where it is absent."""
+    module, environment = PROGRAMS[program].module, PROGRAMS[program].environment
+    path = folder / f"{module}.json"
     path.write_text(json.dumps(jobs))
-    words = [python, "-m", "benchmarks.programs.batch", PROGRAMS[program].module, str(path)]
-    variables = os.environ | {"PYTHONPATH": str(ROOT)} | PROGRAMS[program].environment
-    with (folder / f"{PROGRAMS[program].module}.log").open("w") as log:
-        subprocess.run(words, env=variables, cwd=folder, check=True, stdout=log, stderr=subprocess.STDOUT)
+    with path.with_suffix(".log").open("w") as log:
+        variables = os.environ | {"PYTHONPATH": str(ROOT)} | environment
+        command = [python, "-m", "benchmarks.programs", module, str(path)]
+        subprocess.run(command, env=variables, cwd=folder, check=True, stdout=log, stderr=subprocess.STDOUT)
     told = json.loads(path.with_suffix(".answer.json").read_text())
     if "absent" in told:
         print(f"{program} is left out: {told['absent']}")
@@ -125,19 +123,15 @@ def beside(rows: list[Row], python: str, folder: Path) -> tuple[list[Row], dict[
     """Return the rows with what other programs find, and the versions of these."""
     ready, versions = prepared(rows, folder), {}
     for program in PEERS:
-        jobs = {
-            str(one.stem): one.job(program)
-            for models in ready.values()
-            for one in models
-            if takes(program, one)
-        }
+        able = {i: models for i, models in ready.items() if all(takes(program, one) for one in models)}
+        jobs = {str(one.stem): one.job(program) for models in able.values() for one in models}
         version = solved(program, python, list(jobs.values()), folder)
         if not version:
             continue
         versions[program] = version
-        for i, models in ready.items():
-            paths = [Path(one.job(program)["displacement"]) for one in models]
-            if all(takes(program, one) for one in models) and all(path.exists() for path in paths):
+        for i, models in able.items():
+            paths = [one.displacement(program) for one in models]
+            if all(path.exists() for path in paths):
                 results = [one.result(np.load(path)) for one, path in zip(models, paths, strict=True)]
                 value = float(rows[i].problem.measure(*results))
                 rows[i] = replace(rows[i], others=rows[i].others | {program: value})
@@ -152,8 +146,8 @@ def keep(rows: list[Row], versions: dict[str, str]) -> None:
             values = {name: float(f"{value:.8g}") for name, value in row.others.items()}
             found.setdefault(row.problem.name, {})[row.kind] = values
     problems = ",\n".join(f"  {json.dumps(name)}: {json.dumps(kinds)}" for name, kinds in found.items())
-    text = f'{{\n "versions": {json.dumps(versions)},\n "problems": {{\n{problems}\n }}\n}}\n'
-    RESULTS.write_text(text, encoding="utf-8")
+    head = f'{{\n "versions": {json.dumps(versions)},\n "problems": {{\n'
+    RESULTS.write_text(f"{head}{problems}\n }}\n}}\n", encoding="utf-8")
 
 
 def kept(rows: list[Row]) -> tuple[list[Row], dict[str, str]]:

@@ -67,25 +67,6 @@ def write_whole(path: str | Path, data: bytes | Callable[[BinaryIO], None]) -> N
 
     The bytes go to a temporary file in the same folder, are forced to the disk, and only then take the
     place of `path`.  A failure of any kind, also Ctrl-C, deletes the temporary file.
-
-    Parameters
-    ----------
-    path : the file to write; its folder must exist.
-    data : the bytes, or a function that writes them to the open binary file it is given.
-
-    Raises
-    ------
-    InputError
-        The folder is missing or not writable, the disk is full, or `path` is no ordinary file; the
-        ``OSError`` is its cause.
-
-    Examples
-    --------
-    >>> folder = getfixture("tmp_path")
-    >>> write_whole(folder / "a.txt", b"first")
-    >>> write_whole(folder / "a.txt", lambda file: file.writelines([b"sec", b"ond"]))
-    >>> (folder / "a.txt").read_bytes(), len(list(folder.iterdir()))
-    (b'second', 1)
     """
     with replacing(path) as temporary, open(temporary, "r+b") as file:
         if callable(data):
@@ -99,15 +80,6 @@ def replacing(path: str | Path) -> Iterator[Path]:
     """Give an empty temporary file, with the ending of `path`, that replaces `path` on success.
 
     Use this where another library insists on a file name; otherwise use `write_whole`.
-
-    Parameters
-    ----------
-    path : the file to write; its folder must exist.
-
-    Raises
-    ------
-    InputError
-        As `write_whole`.
     """
     try:
         # Through a symbolic link the target is replaced, not the link.

@@ -97,27 +97,7 @@ def whole_numbers(
     dtype: type[np.signedinteger[Any]] = np.int64,
     error: type[KratosLiteError] = InputError,
 ) -> Numbers:
-    """Return an array of whole numbers, such as rows and ids; an empty list is one, too.
-
-    Parameters
-    ----------
-    shape : lengths of the axes; a word such as ``"n"`` stands for any length.
-    size : of what has these rows, which must lie in 0 … size - 1.
-    dtype : of the array returned.
-
-    Raises
-    ------
-    InputError
-        If it is made of anything else, has another shape, or a row does not exist.
-
-    Examples
-    --------
-    >>> whole_numbers([3, 1], "rows", ("n",), size=4)
-    array([3, 1])
-    >>> whole_numbers([0.5], "rows")
-    Traceback (most recent call last):
-    kratos_lite.errors.InputError: rows must be whole numbers; got [0.5]
-    """
+    """Return an array of whole numbers, such as rows and ids; an empty list is one, too."""
     try:
         array = np.asarray(value)
     except (TypeError, ValueError):

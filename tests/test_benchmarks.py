@@ -22,10 +22,10 @@ sys.path.insert(0, str(ROOT))
 
 from benchmarks import __main__ as command  # noqa: E402
 from benchmarks import (  # noqa: E402
+    accuracy,
     ale,
     cases,
     curves,
-    distributed,
     driver,
     hard_scenes,
     motion,
@@ -36,7 +36,7 @@ from benchmarks import (  # noqa: E402
     stall,
     tables,
 )
-from benchmarks.programs import PROGRAMS, SOLVERS  # noqa: E402
+from benchmarks.programs import PROGRAMS, RANKS, SOLVERS  # noqa: E402
 from kratos_lite.verification import errors, fields  # noqa: E402
 
 E, NU = 1.0, 0.3
@@ -185,6 +185,16 @@ def test_a_program_that_fails_is_a_row_that_says_so(tmp_path, monkeypatch):
     assert str(ROOT) not in rows[0]["failed"]
 
 
+def test_one_element_stands_beside_a_process_that_imports_numpy(tmp_path):
+    rows = driver.Driver(tmp_path, 1, tell=lambda line: None).measure(
+        sets.cube1_runs((tables.OURS, "import numpy"))
+    )
+    lines = report.text(rows).splitlines()
+    assert [line.split(" | ")[:2] for line in lines[-2:]] == [
+        ["| cube 8N n = 1", name] for name in ("import numpy", "kratos_lite")
+    ]
+
+
 def test_a_run_is_stopped_at_its_limit(tmp_path):
     short = driver.Driver(tmp_path, 1, limit=0.01, tell=lambda line: None)
     (row,) = short.measure([driver.Run("goal", "kratos_lite", "block", "8N", 1)])
@@ -209,7 +219,7 @@ def test_real_scenes_are_written_whole(shared, tmp_path):
 
 @pytest.mark.parametrize("name", [name for name in motion.MOTIONS if not name.startswith("many")])
 def test_motions_keep_what_they_should(name):
-    found = motion.measured(kl, name, share=100)
+    found = motion.measured(kl, name, divisor=100)
     exact = 1e-12 if "em" in name else 1e-4
     assert found["step"] > 0
     assert found["energy"] < exact
@@ -303,8 +313,7 @@ def test_solvers_take_one_linear_system(name, tmp_path):
 @pytest.mark.parametrize("name", hard_scenes.MAKERS)
 def test_systems_of_files_are_those_of_the_models(name, tmp_path):
     scene = scenes.make(name, stall.ELEMENTS[name][-1], 2)
-    hard_scenes.write_system(scene, tmp_path / "system.npz")
-    with np.load(tmp_path / "system.npz") as file:
+    with np.load(f"{scenes.write_system(scene, tmp_path)}.npz") as file:
         A = sparse.bsr_array((file["data"], file["indices"], file["indptr"])).toarray()
         q, points = np.linalg.solve(A, file["load"]), file["points"]
     u = scene.model.solve(tolerance=1e-13).displacement()
@@ -349,14 +358,19 @@ def test_page_of_scaling_has_efficiencies_goals_and_a_plan():
 
 
 @needs_mpi
-def test_engines_over_ranks_solve_the_same_block(capsys):
-    found = distributed.run(None, None, [3], 1, 300.0)
+def test_engines_over_ranks_solve_the_same_block(tmp_path, monkeypatch, capsys):
+    out = tmp_path / "distributed.json"
+    monkeypatch.setattr(scaling, "PAGE", tmp_path / "scaling.md")
+    assert command.main(["distributed", "--cells", "3", "--repeats", "1", "--out", str(out)]) == 0
+    found = json.loads(out.read_text())
     assert [row.get("failed") for row in found["rows"]] == [None] * 16
     for row in found["rows"]:
         assert row.get("difference", 0.0) < 1e-8
         assert row["imports"] > 0
     assert {row["kind"] for row in found["files"]} == {"8N", "27N"}
-    assert "| 8N 3×3×3 |" in scaling.page(found)
+    page = (tmp_path / "scaling.md").read_text()
+    assert "| 8N 3×3×3 |" in page
+    assert "| 27N n = 3 | over ranks, the mesh on rank 0, 2 ranks |" in page
 
 
 # ---- sets, results and report --------------------------------------------------------------------------
@@ -364,10 +378,12 @@ def test_engines_over_ranks_solve_the_same_block(capsys):
 
 def test_every_set_names_scenes_and_programs_that_exist(tmp_path):
     for name, make in command.COMMANDS.items():
-        runs = make(command.arguments([name, "--cases", str(tmp_path)]), tmp_path)
+        options = command.arguments([name, "--cases", str(tmp_path)])
+        options.folder = tmp_path
+        runs = make(options)
         assert runs, name
         assert {run.scene for run in runs} <= {*scenes.SCENES, *motion.MOTIONS, ale.SCENE}
-        assert {run.program for run in runs} <= {*PROGRAMS, *command.HELPERS}
+        assert {run.program for run in runs} <= {*PROGRAMS, *command.HELPERS, *RANKS}
         assert len(set(runs)) == len(runs)
 
 
@@ -483,7 +499,9 @@ def test_goal_table_gives_ratios():
     assert line in report.goals(rows)
 
 
-@pytest.mark.parametrize("module", [curves, tables, sets, stall, hard_scenes, report, scaling, command])
+@pytest.mark.parametrize(
+    "module", [accuracy, curves, driver, tables, sets, stall, hard_scenes, report, scaling, command]
+)
 def test_examples_of_the_modules_hold(module):
     assert doctest.testmod(module).failed == 0
 

@@ -1,4 +1,4 @@
-"""The programs compared: one small module each, run as ``python -m benchmarks.programs.NAME job.json``."""
+"""The programs compared: one small module each, run as ``python -m benchmarks.programs NAME job.json``."""
 
 from __future__ import annotations
 
@@ -46,8 +46,8 @@ class Program:
 
 
 ONE_BLAS_THREAD = {"OPENBLAS_NUM_THREADS": "1"}
-TWO_PROCESSES = ("mpiexec", "-n", "2")
 AS_ANYONE = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMP_NUM_THREADS": "1"}
+SHARED = {"OMPI_MCA_rmaps_base_oversubscribe": "1", "OMPI_MCA_hwloc_base_binding_policy": "none"}
 QUADRATIC = ("10N", "20N", "27N")
 CALCULIX = ("4N", "6N", "8N", "10N", "15N", "20N", "20N reduced")
 OWN = ALL + tuple(FORMULATIONS)
@@ -71,8 +71,8 @@ PEERS = ("scikit-fem", "FElupe", "fedoo", "SfePy", "NGSolve", "GetFEM", "torch-f
 """Those of them that are Python libraries."""
 HELPERS = {
     "pyamg": Program("pyamg_"),
-    "PETSc GAMG": Program("petsc_", environment=AS_ANYONE, launcher=TWO_PROCESSES),
-    "PETSc BoomerAMG": Program("petsc_", environment=AS_ANYONE, launcher=TWO_PROCESSES),
+    "PETSc GAMG": Program("petsc_", environment=AS_ANYONE, launcher=("mpiexec", "-n", "2")),
+    "PETSc BoomerAMG": Program("petsc_", environment=AS_ANYONE, launcher=("mpiexec", "-n", "2")),
     "PARDISO": Program("direct"),
     "CHOLMOD": Program("direct"),
     "meshio": Program("meshio_"),
@@ -81,3 +81,16 @@ HELPERS = {
 """What else is timed: solvers on our matrix, a reader, and the least that NumPy takes to start."""
 SOLVERS = ("Kratos", "pyamg", "PETSc GAMG", "PETSc BoomerAMG", "PARDISO", "CHOLMOD")
 """Programs that solve the linear system of a file."""
+
+
+def on_ranks(engine: str, count: int) -> Program:
+    """Return the program that solves a block by an engine, on so many ranks, or threads of one process."""
+    own = engine == "own"
+    environment = AS_ANYONE | SHARED | {"KRATOS_LITE_THREADS": str(count if own else 1)}
+    return Program("ranks", environment=environment, launcher=() if own else ("mpirun", "-n", str(count)))
+
+
+ENGINES = (*(("own", n) for n in (1, 2)), *(("petsc", n) for n in (1, 2)), ("whole", 2),
+           *(("plain", n) for n in (1, 2)))  # fmt: skip
+RANKS = {f"{engine} {count}": on_ranks(engine, count) for engine, count in ENGINES}
+"""Programs of `scaling`."""

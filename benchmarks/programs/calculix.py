@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.programs.common import Array, Job, run
+from benchmarks.programs.common import Array, Job
 
 ELEMENTS = {"4N": "C3D4", "6N": "C3D6", "8N": "C3D8", "10N": "C3D10", "15N": "C3D15", "20N": "C3D20"}
 ELEMENTS["20N reduced"] = "C3D20R"
@@ -47,25 +47,22 @@ def version(program: str) -> str:
 def deck(job: Job, path: Path) -> None:
     """Write the input deck; ccx reads 20 characters of a number, which is 13 digits."""
     E, nu = job.elasticity.tolist()
-    numbered = np.arange(1, len(job.points) + 1)
+    numbers = np.arange(1, len(job.points) + 1)
     free = int((~job.fixed).sum())
     solver = "SPOOLES" if free <= DIRECT_LIMIT else "ITERATIVE CHOLESKY"
     with path.open("w") as out:
         out.write("*NODE, NSET=ALL\n")
-        out.writelines(
-            f"{i},{x:.12E},{y:.12E},{z:.12E}\n"
-            for i, (x, y, z) in zip(numbered.tolist(), job.points.tolist(), strict=True)
-        )
+        np.savetxt(out, np.column_stack([numbers, job.points]), "%d,%.12E,%.12E,%.12E")
         out.write(f"*ELEMENT, TYPE={ELEMENTS[job.kind]}, ELSET=EALL\n")
         out.writelines(element_lines((job.cells + 1).tolist()))
         out.write(f"*MATERIAL, NAME=M\n*ELASTIC\n{E!r},{nu!r}\n*SOLID SECTION, ELSET=EALL, MATERIAL=M\n")
         out.write(f"*STEP\n*STATIC, SOLVER={solver}\n*BOUNDARY\n")
-        out.writelines(
-            f"{i + 1},{a + 1},{a + 1},{job.values[i, a]:.12E}\n" for i, a in np.argwhere(job.fixed).tolist()
-        )
+        nodes, axes = np.nonzero(job.fixed)
+        values = job.values[nodes, axes]
+        np.savetxt(out, np.column_stack([nodes + 1, axes + 1, axes + 1, values]), "%d,%d,%d,%.12E")
+        nodes, axes = np.nonzero((job.forces != 0) & ~job.fixed)
         out.write("*CLOAD\n")
-        loaded = np.argwhere((job.forces != 0) & ~job.fixed).tolist()
-        out.writelines(f"{i + 1},{a + 1},{job.forces[i, a]:.12E}\n" for i, a in loaded)
+        np.savetxt(out, np.column_stack([nodes + 1, axes + 1, job.forces[nodes, axes]]), "%d,%d,%.12E")
         out.write("*NODE PRINT, NSET=ALL\nU\n*END STEP\n")
 
 
@@ -78,14 +75,8 @@ def element_lines(cells: list[list[int]]) -> Iterable[str]:
 
 def displacements(job: Job, path: Path) -> Array:
     """Return the displacements (n, 3) of the `.dat` file."""
-    rows = [
-        line.split() for line in path.read_text().splitlines() if line[:1] == " " and len(line.split()) == 4
-    ]
-    table = np.array([row for row in rows if row[0].isdigit()], dtype=float)
+    rows = [line.split() for line in path.read_text().splitlines() if line.startswith(" ")]
+    table = np.array([row for row in rows if len(row) == 4 and row[0].isdigit()], dtype=float)
     u = np.zeros_like(job.points)
     u[table[:, 0].astype(int) - 1] = table[:, 1:]
     return u
-
-
-if __name__ == "__main__":
-    run(work)

@@ -6,7 +6,6 @@ Only NumPy is imported here; SciPy and the rest where they are needed, inside th
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,6 +19,16 @@ Array = NDArray[np.float64]
 DIRECT_LIMIT = 10_000
 """Unknowns up to which SuperLU is the fastest way; PARDISO, where it is there, up to PARDISO_LIMIT."""
 PARDISO_LIMIT = 50_000
+SMOOTHER = ("chebyshev", {"degree": 2, "iterations": 1})
+FASTEST: dict[str, Any] = {
+    "strength": ("symmetric", {"theta": 0.0}),
+    "improve_candidates": None,
+    "presmoother": SMOOTHER,
+    "postsmoother": SMOOTHER,
+    "max_coarse": 300,
+    "coarse_solver": "splu",
+}
+"""The fastest settings of pyamg that were measured; fixed components stay in, uncoupled."""
 OVERHEAD = ("import", "write", "answer")
 """Phases outside the work that is compared with the error."""
 WARM = 1.0
@@ -34,9 +43,10 @@ class Job:
     stem : path of the scene without ending.
     kind : element kind such as ``8N``.
     tolerance : relative residual for iterative solvers.
-    points, nodes, fixed, values, forces, elasticity, reference : the problem as `read` leaves it.
+    element, points, nodes, fixed, values, forces, elasticity, reference : the problem as `read` leaves it.
     """
 
+    element: NDArray[np.str_]
     points: Array
     nodes: NDArray[np.int32]
     vtk_order: NDArray[np.int64]
@@ -85,27 +95,25 @@ class Job:
         return found
 
 
-def run(work: Callable[[Job], Array | None]) -> None:
-    """Do the job named on the command line and write its answer; say so where the program is absent."""
-    start = perf_counter()
-    job = Job(json.loads(Path(sys.argv[1]).read_text()))
+Work = Callable[[Job], Array | None]
+
+
+def run(work: Work, given: dict[str, Any]) -> None:
+    """Do a job and write its answer; say so where the program is absent."""
+    job = Job(given)
     try:
         u = work(job)
     except ModuleNotFoundError as error:
-        job.answer = {"absent": str(error)}
-        u = None
-    finish = perf_counter()
-    if u is not None:
-        np.save(job.given["displacement"], u)
-        if job.given.get("warm"):
-            job.answer["warm"] = again(work, job.given)
-    phases = job.answer.setdefault("phases", {})
-    phases["answer"] = phases.get("answer", 0.0) + perf_counter() - finish
-    job.answer["inside"] = finish - start
-    Path(job.given["answer"]).write_text(json.dumps(job.answer))
+        job.answer, u = {"absent": str(error), "phases": {}}, None
+    with job.phase("answer"):
+        if u is not None:
+            np.save(given["displacement"], u)
+            if given.get("warm"):
+                job.answer["warm"] = again(work, given)
+    Path(given["answer"]).write_text(json.dumps(job.answer))
 
 
-def again(work: Callable[[Job], Array | None], given: dict[str, Any]) -> float:
+def again(work: Work, given: dict[str, Any]) -> float:
     """Return the seconds of the same work in a process that has done it: the shortest of three times."""
     times: list[float] = []
     while len(times) < 3 and sum(times) < WARM:
@@ -115,9 +123,12 @@ def again(work: Callable[[Job], Array | None], given: dict[str, Any]) -> float:
     return min(times)
 
 
-def dof_numbers(count: int) -> NDArray[np.int64]:
-    """Return the degrees of freedom 3·node + axis as (n, 3)."""
-    return np.arange(3 * count).reshape(-1, 3)
+def assembled(job: Job, stiffness: Callable[[], Any], dofs: NDArray[np.int64] | None = None) -> Array | None:
+    """Time the matrix of a program; return the solution unless the matrix alone is asked for."""
+    K = job.fastest("matrix", stiffness)
+    if job.task == "assembly":
+        return None
+    return solve(job, K, np.arange(3 * len(job.points)).reshape(-1, 3) if dofs is None else dofs)
 
 
 def rows_of(points: Array, wanted: Array) -> NDArray[np.int64]:
@@ -127,20 +138,20 @@ def rows_of(points: Array, wanted: Array) -> NDArray[np.int64]:
     return np.asarray(cKDTree(points).query(wanted)[1])
 
 
-def solve(job: Job, K: Any, dofs: NDArray[np.int64]) -> Array:
+def solve(job: Job, K: Any, dofs: NDArray[np.int64], multigrid: dict[str, Any] | None = None) -> Array:
     """Return the displacements (n, 3) that solve K u = f with the supports of the job.
 
     Parameters
     ----------
     K : sparse matrix of the program, before any support.
     dofs : (n, 3), the row of K for each component of each node of the job.
+    multigrid : settings of pyamg; else a factorization for few unknowns, and `FASTEST` for many.
     """
     with job.phase("import"):  # whatever the method needs belongs to the start, not to its time
         import scipy.sparse as sp
 
-        direct = _direct(int((~job.fixed).sum()))
-        if not direct:
-            need_pyamg()
+        direct = None if multigrid is not None else _direct(int((~job.fixed).sum()))
+        pyamg = None if direct else _pyamg()
     with job.phase("constrain"):
         order = dofs.ravel()
         K = sp.csr_matrix(K)
@@ -148,12 +159,18 @@ def solve(job: Job, K: Any, dofs: NDArray[np.int64]) -> Array:
             K = K[order][:, order]
         fixed, u = job.fixed.ravel(), np.where(job.fixed, job.values, 0.0).ravel()
         free = np.flatnonzero(~fixed)
-        b = job.forces.ravel() - K @ u
+        b = (job.forces.ravel() - K @ u) * ~fixed
+        A = K[free][:, free] if direct else sp.bsr_matrix(uncoupled(K, ~fixed), blocksize=(3, 3))
     with job.phase("solve"):
         if direct:
-            u[free] = direct(K[free][:, free], b[free])
+            u[free] = direct(A, b[free])
         else:
-            u = np.where(fixed, u, _multigrid(job, K, ~fixed, b))
+            settings = FASTEST if multigrid is None else multigrid
+            modes, residuals = rigid_modes(job.points) * ~fixed[:, None], []
+            hierarchy = pyamg.smoothed_aggregation_solver(A, B=modes, **settings)
+            x = hierarchy.solve(b, tol=job.tolerance, accel="cg", maxiter=500, residuals=residuals)
+            u = np.where(fixed, u, x)
+            job.answer["iterations"] = len(residuals) - 1
     job.answer["unknowns"] = len(free)
     return u.reshape(-1, 3)
 
@@ -179,12 +196,13 @@ def _direct(unknowns: int) -> Callable[[Any, Array], Array] | None:
     return factorized
 
 
-def need_pyamg() -> None:
-    """Import pyamg; a program that is there but has no solver fails rather than being absent."""
+def _pyamg() -> Any:
+    """Return pyamg; a program that is there but has no solver fails rather than being absent."""
     try:
-        import pyamg  # noqa: F401
+        import pyamg
     except ImportError:
         raise RuntimeError(f"more than {DIRECT_LIMIT} unknowns need pyamg in this interpreter") from None
+    return pyamg
 
 
 def rigid_modes(points: Array) -> Array:
@@ -204,26 +222,3 @@ def uncoupled(K: Any, free: NDArray[np.bool_]) -> Any:
     K = K.copy()
     K.data = np.where((free[rows] & free[K.indices]) | (rows == K.indices), K.data, 0.0)
     return K
-
-
-def _multigrid(job: Job, K: Any, free: NDArray[np.bool_], b: Array) -> Array:
-    """Solve by the fastest settings of pyamg that were measured; fixed components stay in, uncoupled."""
-    import pyamg
-    import scipy.sparse as sp
-
-    A = sp.bsr_matrix(uncoupled(K, free), blocksize=(3, 3))
-    smoother = ("chebyshev", {"degree": 2, "iterations": 1})
-    hierarchy = pyamg.smoothed_aggregation_solver(
-        A,
-        B=rigid_modes(job.points) * free[:, None],
-        strength=("symmetric", {"theta": 0.0}),
-        improve_candidates=None,
-        presmoother=smoother,
-        postsmoother=smoother,
-        max_coarse=300,
-        coarse_solver="splu",
-    )
-    residuals: list[float] = []
-    u = hierarchy.solve(b * free, tol=job.tolerance, accel="cg", maxiter=300, residuals=residuals)
-    job.answer["iterations"] = len(residuals) - 1
-    return np.asarray(u)

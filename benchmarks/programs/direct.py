@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from benchmarks.programs import linear
-from benchmarks.programs.common import Array, Job, run
+from benchmarks.programs.common import Array, Job
 
 
 def work(job: Job) -> None:
@@ -23,7 +23,7 @@ def work(job: Job) -> None:
         rows = sp.triu(A, format="csr") if program == "PARDISO" else A.tocsc()
     with linear.measured(job):
         x = (pardiso if program == "PARDISO" else cholmod)(job, library, rows, b)
-    linear.judge(job, A, b, x)
+    linear.check_solution(job, A, b, x)
 
 
 def pardiso(job: Job, pypardiso: Any, rows: Any, b: Array) -> Array:
@@ -45,7 +45,3 @@ def cholmod(job: Job, library: Any, rows: Any, b: Array) -> Array:
         factor = library.cholesky(rows, mode="supernodal", ordering_method="metis")
     with job.phase("solve"):
         return factor(b)
-
-
-if __name__ == "__main__":
-    run(work)

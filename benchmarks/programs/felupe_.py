@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from benchmarks.programs.common import Array, Job, dof_numbers, run, solve
+from benchmarks.programs.common import Array, Job, assembled
 
 REGIONS = {
     "4N": ("tetra", "RegionTetra"),
@@ -27,15 +25,4 @@ def work(job: Job) -> Array | None:
         field = felupe.FieldContainer([felupe.Field(getattr(felupe, region)(mesh), dim=3)])
         E, nu = job.elasticity
         material = felupe.LinearElastic(E=E, nu=nu)
-
-    def stiffness() -> Any:
-        return felupe.SolidBody(material, field).assemble.matrix()
-
-    K = job.fastest("matrix", stiffness)
-    if job.task == "assembly":
-        return None
-    return solve(job, K, dof_numbers(len(job.points)))
-
-
-if __name__ == "__main__":
-    run(work)
+    return assembled(job, felupe.SolidBody(material, field).assemble.matrix)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.programs.common import Array, Job, rows_of, run
+from benchmarks.programs.common import Array, Job, rows_of
 
 METHODS = {
     "4N": ("GT_PK(3,1)", "FEM_PK(3,1)", "IM_TETRAHEDRON(1)"),
@@ -73,7 +73,3 @@ def make_mesh(job: Job, getfem: Any) -> tuple[Any, Any, Any, Any]:
     coefficients = getfem.MeshFem(mesh, 1)
     coefficients.set_classical_fem(0)
     return mesh, field, getfem.MeshIm(mesh, getfem.Integ(rule)), coefficients
-
-
-if __name__ == "__main__":
-    run(work)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from benchmarks.programs.common import Array, Job, dof_numbers, run, solve
+from benchmarks.programs.common import Array, Job, assembled
 
 ELEMENTS = {"4N": "TET4", "8N": "HEX8", "10N": "TET10", "27N": "HEX27"}
 DEGREES = {"4N": 1, "8N": 3, "10N": 2, "27N": 5}
@@ -32,8 +32,7 @@ def work(job: Job) -> Array | None:
         problem.newton_update([zero])
         return scipy.sparse.csr_matrix((problem.V, (problem.I, problem.J)), shape=(zero.size, zero.size))
 
-    K = job.fastest("matrix", stiffness)
-    return None if job.task == "assembly" else solve(job, K, dof_numbers(len(job.points)))
+    return assembled(job, stiffness)
 
 
 def make_problem(job: Job, jax: Any, jax_fem: Any) -> Any:
@@ -52,7 +51,3 @@ def make_problem(job: Job, jax: Any, jax_fem: Any) -> Any:
     kind = ELEMENTS[job.kind]
     mesh = jax_fem.problem.Mesh(job.points, job.cells, ele_type=kind)
     return Elasticity(mesh, vec=3, dim=3, ele_type=kind, gauss_order=DEGREES[job.kind])
-
-
-if __name__ == "__main__":
-    run(work)

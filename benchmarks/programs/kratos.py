@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.programs import linear
-from benchmarks.programs.common import Array, Job, run
+from benchmarks.programs.common import Array, Job
 
 AXES = "XYZ"
 SOLVERS = {
@@ -57,9 +57,9 @@ def read(job: Job, KM: Any, SMA: Any) -> Any:
     KEEP.append(model)
     part = model.CreateModelPart("Structure")
     part.ProcessInfo[KM.DOMAIN_SIZE] = 3
-    for variable in (KM.DISPLACEMENT, KM.REACTION, KM.VOLUME_ACCELERATION, SMA.POINT_LOAD, SMA.SURFACE_LOAD):
-        part.AddNodalSolutionStepVariable(variable)
-    for variable in (KM.POSITIVE_FACE_PRESSURE, KM.NEGATIVE_FACE_PRESSURE):
+    pressures = KM.POSITIVE_FACE_PRESSURE, KM.NEGATIVE_FACE_PRESSURE
+    loads = KM.VOLUME_ACCELERATION, SMA.POINT_LOAD, SMA.SURFACE_LOAD
+    for variable in (KM.DISPLACEMENT, KM.REACTION, *loads, *pressures):
         part.AddNodalSolutionStepVariable(variable)
     KM.ModelPartIO(job.stem, KM.IO.READ | KM.IO.SKIP_TIMER).ReadModelPart(part)
     return part
@@ -80,11 +80,7 @@ def linear_solver(job: Job, KM: Any) -> Any:
     from KratosMultiphysics.python_linear_solver_factory import ConstructSolver
 
     job.answer["solver"] = job.given.get("kratos_solver", "")
-    settings = {
-        "solver_type": "amgcl",
-        "tolerance": job.tolerance,
-        "max_iteration": 1000,
-    } | BLOCKS
+    settings = {"solver_type": "amgcl", "tolerance": job.tolerance, "max_iteration": 1000} | BLOCKS
     return ConstructSolver(KM.Parameters(json.dumps(settings | SOLVERS.get(job.answer["solver"], {}))))
 
 
@@ -100,11 +96,15 @@ def solve(job: Job, KM: Any, part: Any) -> None:
         strategy.Initialize()
         strategy.InitializeSolutionStep()
         A, b = strategy.GetSystemMatrix(), strategy.GetSystemVector()
-    if job.task == "assembly":
-        job.fastest("matrix", lambda: build(space, builder, scheme, part, A, b))
-        return
-    with job.phase("matrix"):
+
+    def build() -> None:
+        space.SetToZeroMatrix(A)
+        space.SetToZeroVector(b)
         builder.Build(scheme, part, A, b)
+
+    job.fastest("matrix", build)
+    if job.task == "assembly":
+        return
     x = KM.Vector(b.Size())
     space.SetToZeroVector(x)
     with job.phase("constrain"):
@@ -136,14 +136,7 @@ def system(job: Job, KM: Any) -> None:
     with linear.measured(job), job.phase("solve"):
         solver.Initialize(K, x, load)
         solver.Solve(K, x, load)
-    linear.judge(job, A, b, np.array(x), solver.GetIterationsNumber())
-
-
-def build(space: Any, builder: Any, scheme: Any, part: Any, A: Any, b: Any) -> None:
-    """Build the matrix anew."""
-    space.SetToZeroMatrix(A)
-    space.SetToZeroVector(b)
-    builder.Build(scheme, part, A, b)
+    linear.check_solution(job, A, b, np.array(x), solver.GetIterationsNumber())
 
 
 def write(job: Job, KM: Any, part: Any) -> None:
@@ -157,7 +150,3 @@ def write(job: Job, KM: Any, part: Any) -> None:
         "gauss_point_variables_extrapolated_to_nodes": ["CAUCHY_STRESS_VECTOR", "VON_MISES_STRESS"],
     }
     KM.VtkOutput(part, KM.Parameters(json.dumps(settings))).PrintOutput()
-
-
-if __name__ == "__main__":
-    run(work)

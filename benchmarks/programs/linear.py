@@ -65,7 +65,7 @@ def measured(job: Job) -> Iterator[None]:
     job.answer["memory"] = memory.peak()
 
 
-def judge(job: Job, A: Any, b: Array, x: Array, iterations: int = 0) -> None:
+def check_solution(job: Job, A: Any, b: Array, x: Array, iterations: int = 0) -> None:
     """Keep the true relative residual, and the one that rounding alone makes likely."""
     size = float(np.linalg.norm(b))
     norm = float(np.asarray(abs(A).sum(axis=1)).max())
@@ -85,12 +85,12 @@ class Clock:
         self.memory: Memory | None = None
         self.peak: int | None = None
 
-    def __call__(self, phase: str, share: float) -> None:
-        """Note the first time of each phase and share."""
-        if self.memory is None and (phase, share) == ("assemble", 1.0):
+    def __call__(self, phase: str, fraction: float) -> None:
+        """Note the first time of each phase and fraction."""
+        if self.memory is None and (phase, fraction) == ("assemble", 1.0):
             self.memory = Memory()
-        self.at.setdefault((phase, share), perf_counter())
-        if (phase, share) == ("verify", 0.0) and self.memory:
+        self.at.setdefault((phase, fraction), perf_counter())
+        if (phase, fraction) == ("verify", 0.0) and self.memory:
             self.peak = self.memory.peak()
 
     def phases(self) -> dict[str, float]:
@@ -117,4 +117,4 @@ def ours(job: Job, kl: Any) -> None:
     u, constraints = result.displacement(), model.supports.constraint_map(np.arange(model.mesh.n_nodes))
     del analysis, result
     A, b, _ = read(job)
-    judge(job, A, b, (u.ravel() - constraints.c)[constraints.free], report.iterations)
+    check_solution(job, A, b, (u.ravel() - constraints.c)[constraints.free], report.iterations)

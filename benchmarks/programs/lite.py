@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.programs.common import Array, Job, run
+from benchmarks.programs.common import Array, Job
 
 WORDS = {"tolerance", "solver"}
-ARRAYS = ("points", "nodes", "fixed", "values", "forces", "elasticity", "element")
 
 
 def work(job: Job) -> Array | None:
@@ -21,7 +20,7 @@ def work(job: Job) -> Array | None:
         from benchmarks.motion import SLOW, measured
         from kratos_lite.native import kernels
 
-        found = measured(kl, job.given["motion"], 1 if kernels("motion") else SLOW)
+        found = measured(kl, job.given["scene"], 1 if kernels("motion") else SLOW)
         job.answer["phases"]["step"] = found.pop("step")
         job.answer["drift"] = found
         return None
@@ -34,6 +33,8 @@ def work(job: Job) -> Array | None:
 
         linear.ours(job, kl)
         return None
+    if job.given.get("arrays"):
+        job.read()
     with job.phase("read"):
         model = from_arrays(job, kl) if job.given.get("arrays") else kl.read(f"{job.stem}.mdpa")
     if job.task == "parse":
@@ -65,13 +66,11 @@ def work(job: Job) -> Array | None:
 
 def from_arrays(job: Job, kl: Any) -> Any:
     """Return the model made of the arrays that the other Python libraries read, too."""
-    with np.load(f"{job.stem}.npz") as file:
-        points, nodes, fixed, values, forces, elasticity, element = (file[name] for name in ARRAYS)
-    E, nu = elasticity.tolist()
-    model = kl.Model(kl.Mesh(points, [kl.Block(str(element), nodes)]), kl.Isotropic3D(E=E, nu=nu))
-    for axis, held in enumerate(fixed.T):
-        model.fix(held, "xyz"[axis], values[held, axis, None])
-    model.add(kl.NodalForces(forces))
+    E, nu = job.elasticity.tolist()
+    model = kl.Model(kl.Mesh(job.points, [kl.Block(str(job.element), job.nodes)]), kl.Isotropic3D(E=E, nu=nu))
+    for axis, constrained in enumerate(job.fixed.T):
+        model.fix(constrained, "xyz"[axis], job.values[constrained, axis, None])
+    model.add(kl.NodalForces(job.forces))
     return model
 
 
@@ -89,7 +88,3 @@ def assembly(job: Job, model: Any) -> None:
 
     made = job.fastest("pattern", pattern)
     job.fastest("matrix", lambda: assemble_stiffness(points, groups, made))
-
-
-if __name__ == "__main__":
-    run(work)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from benchmarks.programs.common import Array, Job, run
+from benchmarks.programs.common import Array, Job
 
 
 def work(job: Job) -> Array | None:
@@ -12,7 +12,3 @@ def work(job: Job) -> Array | None:
     job.answer["version"] = meshio.__version__
     with job.phase("read"):
         meshio.read(f"{job.stem}.mdpa")
-
-
-if __name__ == "__main__":
-    run(work)

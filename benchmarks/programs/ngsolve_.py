@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.programs.common import Array, Job, run, solve
+from benchmarks.programs.common import Array, Job, assembled
 
 
 def work(job: Job) -> Array | None:
@@ -23,16 +23,13 @@ def work(job: Job) -> Array | None:
         form = bilinear_form(job, ngsolve, space)
 
     def stiffness() -> Any:
-        form.Assemble()
+        with ngsolve.TaskManager():
+            form.Assemble()
         values, columns, pointer = (np.asarray(part) for part in form.mat.CSR())
         return scipy.sparse.csr_matrix((values, columns, pointer), shape=(space.ndof, space.ndof))
 
-    with ngsolve.TaskManager():
-        K = job.fastest("matrix", stiffness)
-    if job.task == "assembly":
-        return None
     n = len(job.points)
-    return solve(job, K, np.arange(n)[:, None] + n * np.arange(3))
+    return assembled(job, stiffness, np.arange(n)[:, None] + n * np.arange(3))
 
 
 def make_mesh(job: Job, netgen: Any, ngsolve: Any) -> Any:
@@ -55,11 +52,6 @@ def bilinear_form(job: Job, ngsolve: Any, space: Any) -> Any:
     u, v = space.TnT()
     strain_u, strain_v = ngsolve.Sym(ngsolve.Grad(u)), ngsolve.Sym(ngsolve.Grad(v))
     form = ngsolve.BilinearForm(space)
-    form += (
-        2 * mu * ngsolve.InnerProduct(strain_u, strain_v) + lam * ngsolve.div(u) * ngsolve.div(v)
-    ) * ngsolve.dx
+    energy = 2 * mu * ngsolve.InnerProduct(strain_u, strain_v) + lam * ngsolve.div(u) * ngsolve.div(v)
+    form += energy * ngsolve.dx
     return form
-
-
-if __name__ == "__main__":
-    run(work)

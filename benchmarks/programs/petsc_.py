@@ -7,8 +7,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from benchmarks.programs import linear
-from benchmarks.programs.common import Array, Job, rigid_modes, run
+from benchmarks.programs.common import Array, Job, rigid_modes
 
 OPTIONS = {
     "PETSc GAMG": {"pc_type": "gamg", "pc_gamg_threshold": "0.01"},
@@ -39,8 +41,10 @@ def work(job: Job) -> None:
     with job.phase("matrix"):
         start, stop = (3 * (len(points) * (comm.rank + k) // comm.size) for k in (0, 1))
         mine = A.tocsr()[start:stop]
-        K = distributed(PETSc, mine, len(b))
-        modes = [vector(PETSc, mode, start, stop) for mode in orthonormal(points).T]
+        size = (stop - start, len(b))
+        K = PETSc.Mat().createAIJ(size=(size, size), bsize=3, csr=(mine.indptr, mine.indices, mine.data))
+        K.setOption(PETSc.Mat.Option.SPD, True)
+        modes = [vector(PETSc, mode, start, stop) for mode in np.linalg.qr(rigid_modes(points))[0].T]
         K.setNearNullSpace(PETSc.NullSpace().create(vectors=modes))
         rhs, x = vector(PETSc, b, start, stop), vector(PETSc, 0 * b, start, stop)
         whole = A if comm.rank == 0 else None
@@ -67,17 +71,7 @@ def work(job: Job) -> None:
     if comm.rank:
         raise SystemExit  # the first process answers for all
     job.answer["version"] = ".".join(map(str, PETSc.Sys.getVersion()))
-    linear.judge(job, whole, b, everything.getArray(), ksp.getIterationNumber())
-
-
-def distributed(PETSc: Any, rows: Any, size: int) -> Any:
-    """Return a matrix of PETSc whose rows here are these."""
-    local = (rows.shape[0], size)
-    K = PETSc.Mat().createAIJ(
-        size=(local, (rows.shape[0], size)), bsize=3, csr=(rows.indptr, rows.indices, rows.data)
-    )
-    K.setOption(PETSc.Mat.Option.SPD, True)
-    return K
+    linear.check_solution(job, whole, b, everything.getArray(), ksp.getIterationNumber())
 
 
 def vector(PETSc: Any, values: Array, start: int, stop: int) -> Any:
@@ -85,14 +79,3 @@ def vector(PETSc: Any, values: Array, start: int, stop: int) -> Any:
     made = PETSc.Vec().createMPI((stop - start, len(values)), bsize=3)
     made.setArray(values[start:stop])
     return made
-
-
-def orthonormal(points: Array) -> Array:
-    """Return the six rigid modes (3n, 6), orthonormal as PETSc needs them."""
-    import numpy as np
-
-    return np.linalg.qr(rigid_modes(points))[0]
-
-
-if __name__ == "__main__":
-    run(work)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.programs.common import Array, Job, rows_of, run, solve
+from benchmarks.programs.common import Array, Job, assembled, rows_of
 
 
 def work(job: Job) -> Array | None:
@@ -18,11 +18,7 @@ def work(job: Job) -> Array | None:
     with job.phase("mesh"):
         basis = make_basis(job, skfem)
         nodes = rows_of(basis.doflocs[:, ::3].T, job.points)
-        starts = 3 * nodes
-    K = job.fastest("matrix", lambda: stiffness(job, basis, skfem))
-    if job.task == "assembly":
-        return None
-    return solve(job, K, starts[:, None] + np.arange(3))
+    return assembled(job, lambda: stiffness(job, basis), 3 * nodes[:, None] + np.arange(3))
 
 
 def make_basis(job: Job, skfem: Any) -> Any:
@@ -43,12 +39,8 @@ def make_basis(job: Job, skfem: Any) -> Any:
     return skfem.Basis(mesh, skfem.ElementVector(element), intorder=3 if job.kind == "8N" else 5)
 
 
-def stiffness(job: Job, basis: Any, skfem: Any) -> Any:
+def stiffness(job: Job, basis: Any) -> Any:
     """Return the stiffness matrix."""
     from skfem.models.elasticity import lame_parameters, linear_elasticity
 
     return linear_elasticity(*lame_parameters(*job.elasticity)).assemble(basis)
-
-
-if __name__ == "__main__":
-    run(work)

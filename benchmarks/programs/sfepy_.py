@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.programs.common import Array, Job, rows_of, run, solve
+from benchmarks.programs.common import Array, Job, assembled, rows_of
 
 CELLS = {"4N": ("3_4", 4, 1), "8N": ("3_8", 8, 1), "10N": ("3_4", 4, 2), "27N": ("3_8", 8, 2)}
 """Cell, its corners, and the order of the field."""
@@ -26,22 +26,13 @@ def work(job: Job) -> Array | None:
         problem, field = make_problem(job)
         places = rows_of(field.get_coor(), job.points)
         evaluator, start = problem.get_evaluator(), problem.get_initial_state()()
-    K = job.fastest("matrix", lambda: evaluator.eval_tangent_matrix(start))
-    if job.task == "assembly":
-        return None
-    return solve(job, K, 3 * places[:, None] + np.arange(3))
+    dofs = 3 * places[:, None] + np.arange(3)
+    return assembled(job, lambda: evaluator.eval_tangent_matrix(start), dofs)
 
 
 def make_problem(job: Job) -> tuple[Any, Any]:
     """Return the problem without any support, and its field."""
-    from sfepy.discrete import (
-        Equation,
-        Equations,
-        FieldVariable,
-        Integral,
-        Material,
-        Problem,
-    )
+    from sfepy.discrete import Equation, Equations, FieldVariable, Integral, Material, Problem
     from sfepy.discrete.conditions import Conditions
     from sfepy.discrete.fem import FEDomain, Field, Mesh
     from sfepy.mechanics.matcoefs import stiffness_from_youngpoisson
@@ -64,7 +55,3 @@ def make_problem(job: Job) -> tuple[Any, Any]:
     problem.time_update()
     problem.update_materials()
     return problem, field
-
-
-if __name__ == "__main__":
-    run(work)

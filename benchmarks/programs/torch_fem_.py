@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.programs.common import Array, Job, run
+from benchmarks.programs.common import Array, Job
 
 
 def work(job: Job) -> Array | None:
@@ -43,7 +43,3 @@ def solve(job: Job, torch: Any, sparse: Any, model: Any, k: Any) -> Array:
         found, *_, iterations = sparse.sparse_solve(K, b, model.near_null_space(), stol=job.tolerance)
     job.answer |= {"unknowns": int((~fixed).sum()), "iterations": iterations}
     return np.asarray(found).reshape(-1, 3)
-
-
-if __name__ == "__main__":
-    run(work)

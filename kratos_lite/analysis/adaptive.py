@@ -65,30 +65,7 @@ def solve_to(
     geometry: Geometry | None = None,
     quantity: Quantity | None = None,
 ) -> Result:
-    """Solve a static model on meshes that become finer until the error is as small as asked for.
-
-    Parameters
-    ----------
-    model : the structure; it stays as it is.
-    error : of the energy norm or of the quantity, relative, such as 0.01.
-    solver, tolerance, progress : as for `Model.solve`.
-    most_unknowns : no larger mesh is solved after the first one.
-    geometry : by part, a function that takes places (k, 3) in m near its true surface onto it.
-    quantity : the mesh is made finer for it, where its `QuantityError` lies.
-
-    Returns
-    -------
-    Result
-        On the last mesh; ``report.history`` has all of them.
-
-    Raises
-    ------
-    InputError
-        The error is no number between 0 and 1, another argument is not what it must be, or the quantity is of
-        rows, which are others on finer meshes.
-    MeshError, ModelError, SolveError
-        As by `Model.solve`; what the model has cannot be carried over to a finer mesh; or the quantity is 0.
-    """
+    """Solve a static model on meshes that become finer until the error is as small as asked for."""
     aim = number(error, "error")
     if not 0 < aim < 1:
         raise InputError(f"error must be a share between 0 and 1, such as 0.01; got {error!r}")
@@ -183,12 +160,7 @@ def _started(level: Level | None, steps: Sequence[Finer]) -> Array | None:
 
 
 def check_quantity(quantity: Quantity | None) -> None:
-    """Raise InputError for what is no quantity, or one that does not hold on finer meshes.
-
-    Parameters
-    ----------
-    quantity : such as `DisplacementAt`, or None.
-    """
+    """Raise InputError for what is no quantity, or one that does not hold on finer meshes."""
     if quantity is None:
         return
     if not isinstance(quantity, Quantity):
@@ -202,20 +174,7 @@ def check_quantity(quantity: Quantity | None) -> None:
 
 
 def check_geometry(geometry: Geometry | None, mesh: Mesh) -> None:
-    """Raise an error for what are no functions of places by parts of a mesh.
-
-    Parameters
-    ----------
-    geometry : by part, a function of places, or None.
-    mesh : with these parts.
-
-    Raises
-    ------
-    InputError
-        It is no mapping, or a value is no function.
-    MeshError
-        There is no such part.
-    """
+    """Raise an error for what are no functions of places by parts of a mesh."""
     must = "geometry must map parts to functions of places (k, 3)"
     if not (geometry is None or isinstance(geometry, Mapping)):
         raise InputError(f"{must}; got {short(geometry)}")

@@ -31,16 +31,7 @@ SAME = 1e-6
 def error_of(
     result: Solved, origin: Origin, quantity: Quantity, strained: Array, recovery: Recovery
 ) -> QuantityError:
-    """Return the estimated error of a quantity of a result.
-
-    Parameters
-    ----------
-    result : with the quantity.
-    origin : what was solved.
-    quantity : its number.
-    strained : displacements (n, 3) in m that strain.
-    recovery : recovers stresses on its mesh.
-    """
+    """Return the estimated error of a quantity of a result."""
     load, motion, value = quantity.load(result), quantity.motion(result), quantity.value(result)
     z = origin.adjoint(load, motion)
     warnings = []

@@ -19,18 +19,7 @@ ENGINES = ("own", "petsc")
 
 
 def engine_of(engine: str | None, petsc: str | None) -> str:
-    """Return the engine: ``own`` if none is named and no PETSc options are given.
-
-    Raises
-    ------
-    InputError
-        There is no such engine, PETSc is not installed, or its options cannot be read.
-
-    Examples
-    --------
-    >>> engine_of(None, None)
-    'own'
-    """
+    """Return the engine: ``own`` if none is named and no PETSc options are given."""
     chosen = ("own" if petsc is None else "petsc") if engine is None else engine
     if choice(chosen, "engine", ENGINES) == "own":
         if petsc is not None:

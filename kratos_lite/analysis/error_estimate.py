@@ -62,13 +62,6 @@ def energy_error(
     Both underestimate the error near singular points and in coarse meshes; the recovered ones, polynomials of
     patches, may overestimate it many times where a few cells make up a curved body.  So both are raised by
     factors measured on problems with known solutions, and the smaller counts.
-
-    Parameters
-    ----------
-    recovered, averaged : (m,) squared energy norms of the differences in each element, J.
-    energy : ‖u_h‖² of the solution in J, twice its strain energy.
-    groups : the elements, whose class and material may speak against trusting the estimate.
-    mesh : the elements.
     """
     squares = {"recovery": recovered, "averaging": averaged}
     sums = {name: float(values.sum()) for name, values in squares.items()}

@@ -12,13 +12,7 @@ from kratos_lite.typing import Array, Ints
 
 
 def layer_direction(result: Result, allowed: float) -> Array | None:
-    """Return the first of x, y and z along which all elements have straight edges and constant stress.
-
-    Parameters
-    ----------
-    result : of hexahedra and wedges; others have no such direction.
-    allowed : energy norm in √J of what the stress differs at most from its mean along the direction.
-    """
+    """Return the first of x, y and z along which all elements have straight edges and constant stress."""
     for direction in np.eye(3):
         axes = [axes_along(result.mesh, block, direction) for block in result.mesh.blocks if len(block)]
         along = np.concatenate(axes)

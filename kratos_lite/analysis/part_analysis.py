@@ -35,12 +35,7 @@ class PartResult(Result):
     partition: Partition
 
     def table(self) -> list[tuple[str, str]]:
-        """Return the rows of the summary, the same in all parts; all of them ask for it.
-
-        Returns
-        -------
-        Labels and values.
-        """
+        """Return the rows of the summary, the same in all parts; all of them ask for it."""
         partition, report = self.partition, self.report
         here = element_counts(self.mesh, self.groups, report.formulation)
         counts: dict[str, int] = {}

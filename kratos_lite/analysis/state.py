@@ -122,13 +122,7 @@ def _check_subject(subject: object) -> None:
 
 
 def check_state(state: object, kind: str, shapes: Mapping[str, tuple[int, ...]]) -> State:
-    """Return a state of a kind of body, or of models, whose arrays have these shapes and are finite.
-
-    Raises
-    ------
-    InputError
-        It is another one, or no state.
-    """
+    """Return a state of a kind of body, or of models, whose arrays have these shapes and are finite."""
     whose = "a model" if kind == "model" else f"a {kind} body"
     if not isinstance(state, State):
         raise InputError(f"a State of {whose} is needed, such as kl.read_state gives; got {short(state)}")

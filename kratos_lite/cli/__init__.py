@@ -72,10 +72,11 @@ def _run(words: Sequence[str]) -> int:
     if rest and options.command != "bench":
         parser.refuse(options.command, rest)
     from kratos_lite.cli import commands
-    from kratos_lite.cli.apply_options import refuse_serial_options
     from kratos_lite.errors import InputError
 
     if getattr(options, "engine", None) == "petsc":
+        from kratos_lite.cli.apply_options import refuse_serial_options  # `info` does without it
+
         refuse_serial_options(options)
     elif getattr(options, "petsc", None) is not None:
         raise InputError("--petsc belongs to --engine petsc; add that, too")

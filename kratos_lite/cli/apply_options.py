@@ -36,19 +36,8 @@ if TYPE_CHECKING:
 OF_TIME = ("integrator", "rayleigh", "lumped", "restart", "state", "steps")
 """Options that need a time integration."""
 OF_MODELS = (
-    *(
-        "material",
-        "formulation",
-        "fix",
-        "gravity",
-        "traction",
-        "pressure",
-        "point_load",
-        "modes",
-        "solver",
-        "tolerance",
-        "error",
-    ),
+    *("material", "formulation", "fix", "gravity", "traction", "pressure", "point_load"),
+    *("modes", "solver", "tolerance", "error"),
     *("rotation", "translation", "center", "center_velocity", "center_acceleration", "stiffening"),
     *("boundaries", "damping", "moving_part"),
     *("integrator", "rayleigh", "lumped"),

@@ -40,13 +40,7 @@ class Rows:
         return len(self.indptr) - 1
 
     def local(self, own: int, first: int, ghosts: Ints) -> Rows:
-        """Return them with columns by place: own nodes from 0, then ghosts; ascending within a row.
-
-        Parameters
-        ----------
-        own, first : number of own columns, and of the first of them.
-        ghosts : ascending numbers of the others.
-        """
+        """Return them with columns by place: own nodes from 0, then ghosts; ascending within a row."""
         mine = (self.columns >= first) & (self.columns < first + own)
         place = np.where(mine, self.columns - first, own + np.searchsorted(ghosts, self.columns))
         row = np.repeat(np.arange(len(self)), np.diff(self.indptr))
@@ -78,17 +72,7 @@ class Coarser:
 def coarsened(
     kernel: Any, ghosts: Ghosts, all_nodes: int, b: int, modes: Array, largest: float
 ) -> Coarser | None:
-    """Return the next level, or None if it would have hardly fewer unknowns.
-
-    Parameters
-    ----------
-    kernel : the level, a SharedLevel.
-    ghosts : of it.
-    all_nodes : number of own nodes, ghosts, and others behind them.
-    b : unknowns of a node.
-    modes : (n, b, 6) of own nodes, 0 where fixed.
-    largest : eigenvalue of D^-1 A.
-    """
+    """Return the next level, or None if it would have hardly fewer unknowns."""
     ranks, own = ghosts.ranks, ghosts.own
     of, count = kernel.aggregates(STRENGTH)
     offsets = np.concatenate([[0], np.cumsum(ranks.gather(count))])

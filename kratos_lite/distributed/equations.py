@@ -110,18 +110,7 @@ class Equations:
     def solve(
         self, forces: Array, tolerance: float, start: Array | None = None
     ) -> tuple[Array, str, int, float, str]:
-        """Solve for the free degrees of freedom of own nodes.
-
-        Parameters
-        ----------
-        forces : (m, 3) N, 0 where nothing is free.
-        tolerance : relative residual at which the iteration stops.
-        start : (m, 3) m, at which the iteration begins.
-
-        Returns
-        -------
-        Displacements (m, 3) in m, what solved, iterations, backward error, and why it failed or "".
-        """
+        """Solve for the free degrees of freedom of own nodes."""
         with plain_errors():
             b, x = self._A.createVecLeft(), self._A.createVecLeft()
             b.setArray(forces.ravel())

@@ -97,19 +97,7 @@ class Krylov:
         progress: Progress | None = None,
         near: bool = False,
     ) -> tuple[int, float, str]:
-        """Solve for x, until the true residual is small; that of the iteration drifts from it by rounding.
-
-        Parameters
-        ----------
-        b, x : vectors of PETSc; the iteration begins at x if `near`.
-        tolerance : of the residual, relative to b, unless the user's options have one.
-        norm : of the matrix, the largest row sum.
-        progress : called on the ranks that give one.
-
-        Returns
-        -------
-        Iterations, backward error, and why it failed, or an empty text.
-        """
+        """Solve for x, until the true residual is small; that of the iteration drifts from it by rounding."""
         if self.given.get("ksp_rtol"):
             tolerance = float(self.given["ksp_rtol"] or tolerance)
         size = b.norm()

@@ -62,13 +62,7 @@ class PartSystem:
         self.warnings: list[str] = []
 
     def solve(self, forces: Array, prescribed: Array) -> tuple[Array, Solution]:
-        """Return the displacements (n, 3) under nodal forces, and how they were found.
-
-        Parameters
-        ----------
-        forces : (n, 3) N, summed over parts.
-        prescribed : (n, 3) m, 0 where nothing is.
-        """
+        """Return the displacements (n, 3) under nodal forces, and how they were found."""
         partition = self._partition
         load = forces - partition.add(internal_load(self._points, self._elastic, prescribed))
         b = np.where(self._held, 0.0, load)[self._rows]

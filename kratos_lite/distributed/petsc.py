@@ -43,13 +43,7 @@ OF_OPTIONS = (56, 86)
 
 @lru_cache(maxsize=1)
 def petsc() -> Any:
-    """Return petsc4py's module PETSc.
-
-    Raises
-    ------
-    InputError
-        It is not installed, does not load, or was made for complex numbers.
-    """
+    """Return petsc4py's module PETSc."""
     try:
         import petsc4py
     except ImportError:
@@ -109,18 +103,7 @@ def _cure(error: BaseException) -> str:
 
 
 def parsed(options: str | None) -> dict[str, str | None]:
-    """Return PETSc options as names without their dash, and values (None for a switch).
-
-    Raises
-    ------
-    InputError
-        A word is neither an option nor the value of one.
-
-    Examples
-    --------
-    >>> parsed("-ksp_type cg -ksp_view -ksp_rtol 1e-9")
-    {'ksp_type': 'cg', 'ksp_view': None, 'ksp_rtol': '1e-9'}
-    """
+    """Return PETSc options as names without their dash, and values (None for a switch)."""
     if options is None:
         return {}
     if not isinstance(options, str):

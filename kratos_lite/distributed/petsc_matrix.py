@@ -31,14 +31,6 @@ def petsc_matrix(ranks: Alone, K: BlockMatrix, rows: Ints, number: Ints, held: M
     Rows and columns of held degrees of freedom are 0 but for their own diagonal: the matrix stays
     symmetric and positive definite, and its blocks whole, as multigrid of PETSc needs them.  Multigrid
     (GAMG) takes no blocks (BAIJ), but single entries with a block size.
-
-    Parameters
-    ----------
-    ranks : that share it.
-    K : of all nodes here.
-    rows : (m,) own nodes with equations, in the order of these.
-    number : (n,) their number over all ranks, -1 without equations.
-    held : (n, 3) bool.
     """
     PETSc = petsc()
     A = PETSc.Mat().create(communicator(ranks))
@@ -98,15 +90,7 @@ def _blocks(K: BlockMatrix, rows: Ints, number: Ints, held: Mask) -> tuple[Rows,
 
 
 def add_rigid_modes(ranks: Alone, A: Any, points: Array, free: Mask) -> None:
-    """Give a matrix the rigid-body modes of its own nodes, from which multigrid makes its coarse levels.
-
-    Parameters
-    ----------
-    ranks : that share it.
-    A : matrix of PETSc.
-    points : (m, 3) m, of the nodes of its own rows.
-    free : (m, 3) bool, which degrees of freedom are free; the modes are 0 at others, as solutions are.
-    """
+    """Give a matrix the rigid-body modes of its own nodes, from which multigrid makes its coarse levels."""
     count = max(ranks.sum(len(points)), 1)
     modes = rigid_modes(points, ranks.sum(points.sum(axis=0)) / count) * free.reshape(-1, 1)
     sizes, axes = np.linalg.eigh(ranks.sum(modes.T @ modes))
@@ -135,13 +119,7 @@ def largest_row_sum(K: BlockMatrix, rows: Ints) -> float:
 
 
 def transformation(A: Any, slaves: Mapping[int, Mapping[int, float]]) -> Any:
-    """Return T of u = T q, as a matrix of PETSc: 1 on its diagonal, but for the slaves.
-
-    Parameters
-    ----------
-    A : the matrix, whose layout T has.
-    slaves : the weights of their masters; rows of this rank, columns of all.
-    """
+    """Return T of u = T q, as a matrix of PETSc: 1 on its diagonal, but for the slaves."""
     first, last = A.getOwnershipRange()
     lengths = np.ones(last - first, dtype=np.int32)
     for row, terms in slaves.items():

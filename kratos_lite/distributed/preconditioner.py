@@ -41,14 +41,7 @@ def plan_of(solver: str, unknowns: int, ratio: float, given: Mapping[str, str | 
 
 
 def options_of(method: str, given: Mapping[str, str | None], multigrid: bool) -> dict[str, str | None]:
-    """Return the options of PETSc for a method, but for what contradicts those of the user.
-
-    Parameters
-    ----------
-    method : ``direct`` or ``amg``.
-    given : options of the user.
-    multigrid : whether that of PETSc preconditions, not our own.
-    """
+    """Return the options of PETSc for a method, but for what contradicts those of the user."""
     chosen = dict(CONJUGATE_GRADIENTS if method == "amg" and not multigrid else MULTIGRID)
     if method == "direct" and not {"ksp_type", "pc_type"} & set(given):
         chosen = dict(FACTORIZATION)

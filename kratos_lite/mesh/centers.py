@@ -52,18 +52,7 @@ def corners_around(cell: str, xi: Array) -> tuple[int, ...]:
 
 
 def raise_order(points: Array, corners: Ints, shape: type[Shape]) -> tuple[Array, Ints]:
-    """Add the mid-edge, face and center nodes that `shape` has beyond its corners.
-
-    Parameters
-    ----------
-    points : (n, 3) float.
-    corners : (m, c) int, corner nodes of each cell in Kratos order.
-    shape : the shape wanted.
-
-    Returns
-    -------
-    points (n', 3), nodes (m, k); each new node lies in the middle of its corners.
-    """
+    """Add the mid-edge, face and center nodes that `shape` has beyond its corners."""
     around = surroundings(shape)
     nodes = [corners]
     for size in sorted({len(among) for among in around}):

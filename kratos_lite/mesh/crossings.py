@@ -18,17 +18,6 @@ def crossings(mesh: Cells, a: Array, b: Array) -> Array:
     """Return where on the line from a to b elements begin and end: 0 = t_0 < t_1 < … < t_k = 1.
 
     Between two of them the line lies in one element, if no face curves out of it and back.
-
-    Raises
-    ------
-    MeshError
-        A part of the line lies outside the mesh.
-
-    Examples
-    --------
-    >>> from kratos_lite import box
-    >>> crossings(box(cells=(4, 1, 1)), np.array([0, 0.5, 0.5]), np.array([1.0, 0.5, 0.5])).round(8).tolist()
-    [0.0, 0.25, 0.5, 0.75, 1.0]
     """
     near = Cells(mesh.points, select(mesh.blocks, _near(mesh, a, b)), mesh.node_ids, mesh.source)
 

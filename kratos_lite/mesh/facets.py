@@ -19,18 +19,6 @@ def facets(mesh: Mesh) -> tuple[int, float]:
 
     These have straight edges and meet two neighbors or more at small angles; along a fold of flat surfaces
     faces meet one.
-
-    Parameters
-    ----------
-    mesh : the mesh.
-
-    Examples
-    --------
-    >>> from kratos_lite import annulus, box
-    >>> facets(box(cells=(3, 3, 3)))
-    (0, 0.0)
-    >>> facets(annulus(1.0, 2.0, 1.0, (1, 24, 1), element="Element3D8N"))
-    (48, 15.0)
     """
     edges, faces, normals = (
         [np.zeros((0, 2), dtype=np.int64)],

@@ -40,37 +40,13 @@ class Finer:
     inside: Keys
 
     def interpolate(self, values: Array) -> Array:
-        """Return nodal values (n, ...) of the coarse mesh on all nodes of the finer one.
-
-        Parameters
-        ----------
-        values : (n, ...) float.
-
-        Returns
-        -------
-        (n', ...) float
-        """
+        """Return nodal values (n, ...) of the coarse mesh on all nodes of the finer one."""
         return np.concatenate([values, _interpolated(values, self.start, self.nodes, self.weights)])
 
     def onto(self, geometry: Mapping[str, Callable[[Array], Array]]) -> Finer:
         """Return the same with the new nodes of parts moved onto the true surfaces.
 
         Hanging nodes stay on the edges and faces of their masters.
-
-        Parameters
-        ----------
-        geometry : by part, a function of places (k, 3) in m near the surface that returns places on it.
-
-        Returns
-        -------
-        Finer
-
-        Raises
-        ------
-        InputError
-            A function does not return finite places.
-        MeshError
-            There is no such part.
         """
         points, old = self.mesh.points.copy(), self.coarse.n_nodes
         for part, function in geometry.items():
@@ -87,15 +63,6 @@ class Finer:
         A set of nodes on the surface means the boundary faces of elements that have all their nodes in it;
         new nodes inside these and on their edges belong to it.  A set with nodes that are on no such face
         means the edges, faces and elements, too, that have all their nodes in it and one of these.
-
-        Parameters
-        ----------
-        rows : (k,) int, nodes of the coarse mesh.
-
-        Returns
-        -------
-        (k',) int
-            The same nodes, and new ones.
         """
         if not len(self.inside) or not len(rows):
             return rows
@@ -104,59 +71,23 @@ class Finer:
         return np.concatenate([rows, new])
 
     def children(self, rows: Ints) -> Ints:
-        """Return the elements of the finer mesh that have come from elements of the coarse one.
-
-        Parameters
-        ----------
-        rows : (k,) int, elements of the coarse mesh.
-
-        Returns
-        -------
-        (k',) int
-        """
+        """Return the elements of the finer mesh that have come from elements of the coarse one."""
         return _descendants(self.elements, rows, self.coarse.n_elements)
 
     def where(self, where: Where) -> Where:
-        """Return what nodes of the coarse mesh are chosen by, as a choice of nodes of the finer one.
-
-        Parameters
-        ----------
-        where : part name or predicate, which stay; mask or rows, which grow.
-
-        Returns
-        -------
-        Where
-        """
+        """Return what nodes of the coarse mesh are chosen by, as a choice of nodes of the finer one."""
         if isinstance(where, str) or callable(where):
             return where
         return self.grown(self.coarse.nodes(where))
 
     def where_elements(self, where: WhereElements) -> WhereElements:
-        """Return likewise a choice of elements.
-
-        Parameters
-        ----------
-        where : part name, property id or None, which stay; or rows.
-
-        Returns
-        -------
-        WhereElements
-        """
+        """Return likewise a choice of elements."""
         if where is None or isinstance(where, (str, int)):
             return where
         return self.children(self.coarse.elements(where))
 
     def part(self, part: Part) -> Part:
-        """Return a part of the coarse mesh as one of the finer mesh.
-
-        Parameters
-        ----------
-        part : of the coarse mesh.
-
-        Returns
-        -------
-        Part
-        """
+        """Return a part of the coarse mesh as one of the finer mesh."""
         conditions = _descendants(self.conditions, part.conditions, self.coarse.n_conditions)
         elements = part.elements if len(part.elements) else elements_among(part.nodes, self.coarse)
         return replace(

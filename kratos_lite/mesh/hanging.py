@@ -226,14 +226,7 @@ def split_faces(blocks: Sequence[Block], centers: Centers, corner: Mask, existin
 
 
 def hanging_nodes(blocks: Sequence[Block], centers: Centers, n_nodes: int) -> HangingNodes | None:
-    """Return the hanging nodes of some elements, or None if there are none.
-
-    Parameters
-    ----------
-    blocks : the elements.
-    centers : all nodes in the middle of edges, faces and cells.
-    n_nodes : number of nodes.
-    """
+    """Return the hanging nodes of some elements, or None if there are none."""
     corner = is_corner(blocks, n_nodes)
     found, large, small = _Found(), [], []
     for edge in split_edges(blocks, centers, corner):

@@ -145,13 +145,6 @@ def locate(mesh: Cells, points: ArrayLike) -> Located:
     """Return the elements that contain points (..., 3), by the inverse isoparametric map.
 
     A tree of bounding boxes gives the candidates of each point, which are tried nearest first.
-
-    Raises
-    ------
-    InputError
-        Points are not finite or not of shape (..., 3).
-    MeshError
-        A node of the mesh has no finite coordinates.
     """
     x = finite(points, "points to locate")
     if x.shape[-1:] != (3,):

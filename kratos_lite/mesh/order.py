@@ -29,31 +29,7 @@ QUADRATIC: dict[str, type[Shape]] = {
 
 
 def raised(mesh: Mesh, element_of: Callable[[str], str] | None = None) -> Finer:
-    """Return the same cells as quadratic elements; conditions follow the faces that they lie on.
-
-    Parameters
-    ----------
-    mesh : the mesh; nodes of cells that are quadratic already stay where they are.
-    element_of : gives the name of the new element from that of the old one; linear elements become quadratic
-        ones of the same family, hexahedra with 20 nodes, if not given.
-
-    Returns
-    -------
-    Finer
-        The mesh, and how it has come from the old one.
-
-    Raises
-    ------
-    MeshError
-        The mesh has hanging nodes, an element of another family would take its place, or several processes
-        share the mesh.
-
-    Examples
-    --------
-    >>> from kratos_lite import box
-    >>> raised(box()).mesh.blocks[0].name
-    'Element3D20N'
-    """
+    """Return the same cells as quadratic elements; conditions follow the faces that they lie on."""
     if mesh.hanging is not None:
         raise MeshError("a mesh with hanging nodes keeps its order: raise the order first, then refine")
     names = {block.name: (element_of or quadratic)(block.name) for block in mesh.blocks}

@@ -39,31 +39,6 @@ def refine(mesh: Mesh, elements: ArrayLike | None = None, keep: ArrayLike | None
 
     A hexahedron, tetrahedron or wedge gives 8, a pyramid 6 and 4 tetrahedra.  Where a neighbor stays as it
     is, nodes hang: they take what its edge or face interpolates.
-
-    Parameters
-    ----------
-    mesh : the mesh.
-    elements : rows of the elements, or a mask; all if not given.
-    keep : (3,) float, a direction: edges along it are not cut, which gives 4 smaller elements.  Every
-        hexahedron and wedge of the mesh must have such edges, and all refinements of a mesh keep the same.
-
-    Returns
-    -------
-    Finer
-        The mesh, and how it has come from the old one.
-
-    Raises
-    ------
-    MeshError
-        Rows do not exist, an element has no shape that can be cut, or no edges along `keep`, or several
-        processes share the mesh.
-
-    Examples
-    --------
-    >>> from kratos_lite import box
-    >>> finer = refine(box(cells=(2, 1, 1)), [0])
-    >>> finer.mesh.n_elements, len(finer.mesh.hanging)
-    (9, 5)
     """
     marked = _mask(mesh, elements)
     centers = known_centers(mesh.blocks, mesh.hanging)

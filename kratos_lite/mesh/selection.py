@@ -76,18 +76,7 @@ def find_nodes(where: Callable[[Array], ArrayLike] | ArrayLike, mesh: Cells) -> 
 
 
 def point_of(where: Any) -> Array | None:
-    """Return the point (3,) in m that a choice of nodes means, or None if it means anything else.
-
-    Raises
-    ------
-    MeshError
-        It is three whole numbers, which may be a point or rows; or a point that is not finite.
-
-    Examples
-    --------
-    >>> point_of((1.0, 0, 0)), point_of([1, 0]), point_of(np.array([1, 0, 0]))
-    (array([1., 0., 0.]), None, None)
-    """
+    """Return the point (3,) in m that a choice of nodes means, or None if it means anything else."""
     if isinstance(where, (tuple, list)):
         if len(where) != 3 or not all(isinstance(x, (int, float, np.number)) for x in where):
             return None
@@ -105,12 +94,7 @@ def point_of(where: Any) -> Array | None:
 
 
 def nodes_at(point: Array, points: Array) -> tuple[Ints, str]:
-    """Return the rows of the nodes at a point (3,), nearest first, and what is near to it in words.
-
-    Parameters
-    ----------
-    points : (n, 3) float, m.
-    """
+    """Return the rows of the nodes at a point (3,), nearest first, and what is near to it in words."""
     if not len(points):
         return NO_ROWS, "there are no nodes"
     distance = np.linalg.norm(points - point, axis=1)

@@ -57,13 +57,7 @@ def vtk_cells(blocks: Sequence[Block], n_nodes: int) -> tuple[Numbers, Numbers, 
 
 
 def pyvista_grid(mesh: Cells, point_data: Mapping[str, Numbers], cell_data: Mapping[str, Numbers]) -> Any:
-    """Return a grid of PyVista with data of nodes and elements.
-
-    Raises
-    ------
-    KratosLiteError
-        PyVista is not installed.
-    """
+    """Return a grid of PyVista with data of nodes and elements."""
     try:
         from pyvista import UnstructuredGrid
     except ImportError as error:

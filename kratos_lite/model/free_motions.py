@@ -135,14 +135,7 @@ class FreeMotions:
     def check(
         self, loads: Iterable[Array], moving: Mask | bool, cure: str = "add loads that balance them"
     ) -> None:
-        """Raise ModelError where a part can still move, unless loads act on it that balance.
-
-        Parameters
-        ----------
-        loads : nodal forces (n, 3) in N of each load.
-        moving : which parts (p,) anything strains; others have no business to be free.
-        cure : besides supports.
-        """
+        """Raise ModelError where a part can still move, unless loads act on it that balance."""
         if not self.any:
             return
         total, size, R = np.zeros_like(self.mesh.points), np.zeros(self.mesh.n_nodes), self._pair[0]

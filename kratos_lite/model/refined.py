@@ -22,33 +22,6 @@ def refined(structure: S, finer: Finer) -> S:
 
     Parts and predicates choose nodes anew, sets of rows grow as `Finer.grown` says; prescribed values and
     nodal loads are interpolated unless they are functions of places, forces on nodes stay there.
-
-    Parameters
-    ----------
-    structure : that on the coarse mesh.
-    finer : the finer mesh, and how it has come from that of the structure.
-
-    Returns
-    -------
-    Structure
-        Of the same class.
-
-    Raises
-    ------
-    ModelError
-        It has a motion, a load that cannot be carried over, ties along edges that are cut, or rules of
-        its own for elements of another shape.
-
-    Examples
-    --------
-    >>> import kratos_lite as kl
-    >>> from kratos_lite.mesh.refinement import refine
-    >>> model = kl.Model(kl.box(cells=(2, 1, 1)), kl.Isotropic3D(E=1e9, nu=0.3))
-    >>> model.fix("x-")
-    >>> model.add(kl.Traction("x+", (0.0, 0.0, 1e3)))
-    >>> finer = refined(model, refine(model.mesh, [0]))
-    >>> finer.mesh.n_elements, finer.solve().report.total_load.round(6).tolist()
-    (9, [0.0, 0.0, 1000.0])
     """
     if structure.motion is not None:
         raise ModelError(

@@ -65,13 +65,7 @@ class Supports:
     # ---- prescribed displacements ------------------------------------------------------------------------
 
     def apply(self, fixing: Fixing) -> None:
-        """Prescribe or release what a call of `Structure` asks for; hanging nodes follow their masters.
-
-        Raises
-        ------
-        InputError, ModelError
-            As by `fix` and `prescribe_motion`.
-        """
+        """Prescribe or release what a call of `Structure` asks for; hanging nodes follow their masters."""
         rows, value = fixing.rows, fixing.value
         if fixing.released:
             self._free(rows, fixing.axes)
@@ -130,22 +124,7 @@ class Supports:
         return "\n".join([*map(str, self.fixings), *tied]) or "none"
 
     def fix(self, rows: Ints, axes: str, value: ArrayLike = 0.0, override: bool = False) -> None:
-        """Prescribe the displacement of nodes along axes.
-
-        Parameters
-        ----------
-        rows : the nodes.
-        axes : such as ``"xz"``.
-        value : m; one number, one per axis, or (rows, axes).
-        override : let this value win over an earlier one.
-
-        Raises
-        ------
-        InputError
-            The value has another shape, or is not finite.
-        ModelError
-            A degree of freedom has another value already.
-        """
+        """Prescribe the displacement of nodes along axes."""
         numbers = axis_numbers(axes)
         new = finite(value, "a prescribed displacement")
         try:
@@ -223,13 +202,7 @@ class Supports:
         self.value_version += 1
 
     def slaves(self) -> Slaves:
-        """Return the slaves of all constraints by free degrees of freedom.
-
-        Raises
-        ------
-        ModelError
-            Constraints contradict one another or what is prescribed.
-        """
+        """Return the slaves of all constraints by free degrees of freedom."""
         if self._slaves[0] != self.value_version:
             self._slaves = self.value_version, self._eliminated(self.values, agree=True)
         return self._slaves[1]
@@ -274,18 +247,7 @@ class Supports:
     # ---- for the equations ------------------------------------------------------------------------------
 
     def constraint_map(self, nodes: Ints, values: Array | None = None) -> ConstraintMap:
-        """Return the constraint map of the degrees of freedom of some nodes, renumbered in order.
-
-        Parameters
-        ----------
-        nodes : (a,) ascending rows.  Constraints of slaves on other nodes are left out.
-        values : (n, 3) m, in place of the prescribed displacements.
-
-        Raises
-        ------
-        ModelError
-            Constraints contradict one another, or use other nodes.
-        """
+        """Return the constraint map of the degrees of freedom of some nodes, renumbered in order."""
         fixed, u = self.fixed, self.values if values is None else values
         slaves = None
         if self.constraints:

@@ -107,6 +107,20 @@ def test_loads_are_derivatives_of_values_or_of_means_around_points(kind):
         assert (quantity.load(result) * change).sum() == pytest.approx(quantity.value(result))
 
 
+@pytest.mark.parametrize("kind", ["8N", "27N"])
+def test_the_load_of_a_stress_is_that_of_its_mean_over_all_cells_that_share_a_corner(kind):
+    model = kl.Model(kl.box((5, 3, 3), (5, 3, 3), f"KinematicLinear3D{kind}"), kl.Isotropic3D(E=1e3, nu=0.3))
+    change = np.random.default_rng(1).uniform(-1, 1, model.mesh.points.shape)
+    model.fix(np.arange(model.mesh.n_nodes), "xyz", change)
+    result, volume = model.solve(), model.solve().at_integration_points("INTEGRATION_WEIGHT")
+    centers = model.mesh.points[model.mesh.blocks[0].nodes].mean(axis=1)
+    around = np.abs(centers - (1.5, 0.5, 1.5)).max(axis=1) < 1.1
+    assert around.sum() == 18
+    mean = (result.stress("gauss") * volume[..., None])[around].sum(axis=(0, 1)) / 18.0
+    found = (kl.StressAt((1.4, 0.3, 1.6), "yz").load(result) * change).sum()
+    assert found == pytest.approx(mean[4])
+
+
 # ---- errors ------------------------------------------------------------------------------------------
 
 
@@ -322,6 +336,14 @@ def test_a_support_that_goes_on_beside_the_part_is_reported():
     shared = result.error(of=kl.ReactionOf(lambda X: (X[:, 0] == 0) & (X[:, 1] < 0.6), "y")).warnings
     assert len(shared) == 1
     assert shared[0].startswith("2 faces beside the part are held along y, too")
+
+
+def test_faces_beside_the_part_of_which_two_corners_are_held_carry_nothing():
+    model = kl.Model(kl.box((2, 1, 1), (4, 2, 2)), kl.Isotropic3D(E=1e3, nu=0.3))
+    model.fix(lambda X: (X[:, 0] == 0) & (X[:, 1] < 0.6))
+    model.fix("x+", "x", 0.01)
+    part = lambda X: (X[:, 0] == 0) & (X[:, 1] < 0.6)  # noqa: E731
+    assert model.solve().error(of=kl.ReactionOf(part, "y")).warnings == []
 
 
 def test_a_quantity_of_your_own():

@@ -159,20 +159,22 @@ def test_a_plate_supported_along_its_lower_edges():
     assert solver.solve(gravity(b), 1e-8, 0.0, None)[1] <= 40
 
 
+@pytest.mark.parametrize("known", [True, False], ids=["plate", "shell"])
 @pytest.mark.parametrize("element", ["10N", "13N", "15N", "20N", "27N"])
-def test_lines_of_a_plate_interpolate_constant_curvature(element):
+def test_lines_of_a_plate_interpolate_constant_curvature(element, known):
+    """Of a plate as it is, and as a shell, whose modes are quadratic in all coordinates."""
     mesh = kl.box((1.0, 0.7, 0.01), (4, 3, 2), f"KinematicLinear3D{element}")
     turn = np.linalg.qr(np.random.default_rng(2).standard_normal((3, 3)))[0]
     points, free = mesh.points @ turn, np.ones(mesh.points.size, dtype=bool)
     groups = kl.Model(mesh, STEEL).element_groups()
     lines = np.unique(np.round(mesh.points[:, :2], 9), axis=0, return_inverse=True)[1].ravel()
-    axes = plate_axes(points, free)
-    level = plate_level(points, free, axes, lines, coarse_level.p_coarse_level(points, groups))
+    axes, linear = plate_axes(points, free), coarse_level.p_coarse_level(points, groups)
+    level = plate_level(points, free, axes if known else None, lines, linear)
     nodes = np.repeat(np.arange(len(points)), np.diff(level.indptr))
-    found = np.zeros((len(points), 3, 9))
-    modes = level.modes.reshape(-1, 6, 12)[level.indices, :, :9]
+    found = np.zeros((len(points), 3, 12))
+    modes = level.modes.reshape(-1, 6, 12)[level.indices]
     np.add.at(found, nodes, np.einsum("kij,kjm->kim", level.blocks, modes))
-    found, want = found.reshape(-1, 9), bending_modes(points, axes)[:, :9]
+    found, want = found.reshape(-1, 12), bending_modes(points, axes)[:, :9]
     left = found - want @ np.linalg.lstsq(want, found, rcond=None)[0]
     assert np.abs(left).max() < 1e-6
     assert np.linalg.matrix_rank(found, tol=1e-4) == 9
@@ -265,6 +267,17 @@ def test_modes_of_bending_have_the_energy_of_constant_curvature():
     want = np.zeros((12, 12))
     want[6:9, 6:9] = inertia * np.array([[lame + 2 * mu, lame, 0], [lame, lame + 2 * mu, 0], [0, 0, mu]])
     np.testing.assert_allclose(np.abs(energy), want, rtol=0, atol=1e-6 * want.max())
+
+
+@pytest.mark.parametrize(("held", "is_thin"), [(0.3, True), (0.45, True), (0.55, False), (0.8, False)])
+def test_a_plate_most_of_which_is_held_along_its_normal_does_not_bend(held, is_thin):
+    mesh = kl.box((1.0, 1.0, 0.01), (20, 4, 1))
+    free = np.ones((mesh.n_nodes, 3), dtype=bool)
+    free[mesh.points[:, 0] < held, 2] = False
+    linear = coarse_level.p_coarse_level(mesh.points, kl.Model(mesh, STEEL).element_groups())
+    lines = np.unique(np.round(mesh.points[:, :2], 9), axis=0, return_inverse=True)[1].ravel()
+    assert (plate_axes(mesh.points, free.ravel()) is not None) == is_thin
+    assert (plate_level(mesh.points, free.ravel(), None, lines, linear) is not None) == is_thin
 
 
 @pytest.mark.parametrize("side", ["z", "thick"])

@@ -49,13 +49,7 @@ class StepKernel:
     newton: str
 
     def finish(self, plain: Plain, arrays: Arrays, h: float, method: str, tolerance: float) -> None:
-        """Take a step of bodies, the first of the arrays, by the kernel or else in NumPy.
-
-        Raises
-        ------
-        SolveError
-            Newton's method found no velocity, or a velocity grew without bound.
-        """
+        """Take a step of bodies, the first of the arrays, by the kernel or else in NumPy."""
         number = self.methods.index(method)
         failed = compiled(f"{self.word}_finish", *arrays, h, number, tolerance)
         if failed is NotImplemented:

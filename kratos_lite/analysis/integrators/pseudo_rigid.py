@@ -104,21 +104,7 @@ def finish_step(
     method: str = "explicit",
     tolerance: float = TOLERANCE,
 ) -> None:
-    """Take a step h of bodies q (..., 12), u (..., 12) in place, with the load (..., 12) at mid-step.
-
-    Parameters
-    ----------
-    euler : Euler tensor E0 (..., 3, 3) of the kinetic energy 1/2 tr(F' E0 F'^T).
-    mass, volume : (...) kg and m³.
-    C : (..., 6, 6) Pa, S = C E of the Saint Venant–Kirchhoff material.
-    damping : (...) s, times the stiffness.
-    method : one of `METHODS`.
-
-    Raises
-    ------
-    SolveError
-        Newton's method found no velocity, or a velocity grew without bound.  q and u are then of no use.
-    """
+    """Take a step h of bodies q (..., 12), u (..., 12) in place, with the load (..., 12) at mid-step."""
     constant = (euler, np.asarray(mass), np.asarray(volume), C, np.asarray(damping))
     KERNEL.finish(_finish, (q, u, load, *constant), h, method, tolerance)
 
@@ -139,19 +125,7 @@ def steps(
     tolerance: float = TOLERANCE,
     work: Array | None = None,
 ) -> None:
-    """Take steps h of bodies q (..., 12), u (..., 12) in place, under loads that stay constant.
-
-    Parameters
-    ----------
-    acceleration : (..., 3) m/s² of gravity.
-    spatial : (..., 12) load.
-    work : (...) J, which grows by the work of the loads.
-
-    Raises
-    ------
-    SolveError
-        As `finish_step`.
-    """
+    """Take steps h of bodies q (..., 12), u (..., 12) in place, under loads that stay constant."""
     constant = (euler, np.asarray(mass), np.asarray(volume), C, np.asarray(damping))
     arrays = (q, u, *constant, acceleration, spatial)
     KERNEL.steps(_step, arrays, h, count, method, tolerance, work)

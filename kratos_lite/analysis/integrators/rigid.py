@@ -119,19 +119,7 @@ def finish_step(
     method: str = "momentum_conserving",
     tolerance: float = TOLERANCE,
 ) -> None:
-    """Complete a step h from q (..., 12), u (..., 6) in place, with the load (..., 6) at qh (..., 12).
-
-    Parameters
-    ----------
-    inertia, inverse : referential inertia (..., 3, 3) in kg m² and its inverse.
-    mass : (...) kg.
-    method : one of `METHODS`.
-
-    Raises
-    ------
-    SolveError
-        Newton's method found no velocity, or a velocity grew without bound.  q and u are then of no use.
-    """
+    """Complete a step h from q (..., 12), u (..., 6) in place, with the load (..., 6) at qh (..., 12)."""
     constant = (inertia, inverse, np.asarray(mass))
     KERNEL.finish(_finish, (q, u, qh, load, *constant), h, method, tolerance)
 
@@ -151,20 +139,7 @@ def steps(
     tolerance: float = TOLERANCE,
     work: Array | None = None,
 ) -> None:
-    """Take steps h of bodies q (..., 12), u (..., 6) in place, under loads that stay constant.
-
-    Parameters
-    ----------
-    acceleration : (..., 3) m/s² of gravity.
-    spatial : (..., 6) spatial torque and force.
-    follower : (..., 6) referential torque, and a force that turns with the body.
-    work : (...) J, which grows by the work of the loads.
-
-    Raises
-    ------
-    SolveError
-        As `finish_step`.
-    """
+    """Take steps h of bodies q (..., 12), u (..., 6) in place, under loads that stay constant."""
     arrays = (q, u, inertia, inverse, np.asarray(mass), acceleration, spatial, follower)
     KERNEL.steps(_step, arrays, h, count, method, tolerance, work)
 

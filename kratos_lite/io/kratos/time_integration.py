@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 from kratos_lite.errors import InputError, naming
 from kratos_lite.io.case import TimeIntegration
-from kratos_lite.io.kratos.context import times_of
 from kratos_lite.io.kratos.time_dependent import ProcessesInTime
 from kratos_lite.io.settings import Settings
 from kratos_lite.validation import finite
@@ -25,7 +24,7 @@ DYNAMIC_KEYS = (
 def time_integration_of(settings: Settings, processes: ProcessesInTime) -> TimeIntegration:
     """Return the time integration of a dynamic run file; InputError with the place of what is wrong."""
     solver, problem = settings.section("solver_settings"), settings.section("problem_data")
-    times = times_of(problem, solver)
+    times = processes.context.times
     text = f"must be 0 for dynamic solutions; got {times[0]:g}: shift the times"
     problem.expect(times[0] == 0, "start_time", text)
     rayleigh = tuple(solver.number(key, 0.0) for key in ("rayleigh_alpha", "rayleigh_beta"))

@@ -1,0 +1,274 @@
+"""Estimated beside true errors, and requested errors beside hand-made meshes, where the field is known.
+
+``python -m benchmarks effectivity`` solves the scenes with all elements on two meshes each, and compares
+`result.error()` with the error of the solution, and recovered and averaged stresses at nodes with the exact
+ones.  ``python -m benchmarks adaptive`` asks `Model.solve(error=…)` for three errors from one coarse mesh of
+8N, and solves meshes made by hand of several elements, uniform ones, and graded ones at the corner.
+Times are of the processor, that of the solution alone; hand-made meshes have theirs at the true error of the
+adaptive solution, on the line through the two meshes of one element nearest to it.  Both write the last
+section of docs/about/estimated-errors.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from pathlib import Path
+from time import process_time
+from typing import Any
+
+import numpy as np
+
+import kratos_lite as kl
+from benchmarks import scenes
+from benchmarks.driver import ROOT, load, save
+from benchmarks.programs import FORMULATIONS
+from benchmarks.programs.adaptive import geometry_of, scene_of
+from benchmarks.tables import Row, table
+from kratos_lite import voigt
+from kratos_lite.errors import KratosLiteError
+from kratos_lite.verification import fields
+from kratos_lite.verification.errors import errors, norms
+from kratos_lite.verification.meshes import kind_of
+from kratos_lite.verification.scenes import UNIT, Scene
+
+RESULTS = Path(__file__).with_name("results")
+PAGE = ROOT / "docs" / "about" / "estimated-errors.md"
+SCENES = ("manufactured", "sphere", "bending", "l_domain", "cavity", "hole_incompressible")
+ELEMENTS = ("4N", "5N", "6N", "8N", "10N", "13N", "15N", "20N", "27N", *scenes.FORMULATIONS)
+SIZES = {1: (4, 8), 2: (2, 4)}
+"""Cells along an edge by degree of the element."""
+EXACT = 1e-9
+"""Relative error below which a solution is exact, and has no effectivity."""
+GOALS = (0.03, 0.01, 0.003)
+BY_HAND = ("20N", "20N reduced", "27N", "8N enhanced", "27N B-bar")
+"""Elements of the meshes made by hand."""
+BY_HAND_SIZES = (1, 2, 3, 4, 6, 8, 12, 16)
+GRADINGS = {"l_domain": (2.0,)}
+"""Powers with which cells become smaller towards the planes through the origin."""
+LONGEST = 0.4
+"""Seconds after which no finer mesh is made by hand."""
+TEXT = """## Measured
+
+Reported over true error on two meshes, the second of half the cell size; "exact" where the element has the
+exact solution, "-" where it is refused or the scene is not made for it.
+
+"""
+"""Heading of what is measured, which `write_page` renews at the end of the page."""
+STRESSES = """
+Stresses at nodes, relative error in percent on the finer mesh, root mean square over all nodes: \
+recovered / averaged.
+
+"""
+ASKED = ("l_domain", "cavity", "hole", "sphere", "cylinder", "manufactured", "bending", "hole_incompressible")
+"""Scenes on which errors are requested."""
+REQUESTED = """
+A requested error, from one coarse mesh of 8N: asked for, true and reported error in percent of the energy
+norm, unknowns of the last mesh, number of meshes, and processor time of all; beside them the fastest mesh
+made by hand with the same true error, and the ratio of the two times. These are of the elements
+{kinds}, uniform or, at the corner of the L, graded;
+"-" where none of half a second has that error. They have no estimate, and nobody knows their error
+beforehand.
+
+"""
+
+
+# ---- estimated errors ------------------------------------------------------------------------------
+
+
+def measured(name: str, kind: str, n: int) -> Row:
+    """Return what one scene says: true and reported error, and errors of nodal stresses, all relative."""
+    row: Row = {"scene": name, "kind": kind, "n": n}
+    try:
+        scene = scenes.make(name, kind, n)
+        result = scene.model.solve()
+    except KratosLiteError as error:
+        return row | {"failed": str(error)}
+    true, estimate = errors(scene, result.u)["energy"], result.error()
+    row |= {"true": true, "reported": estimate.relative, "method": estimate.method}
+    row |= {"warnings": estimate.warnings}
+    C = scene.model.element_groups()[0].material.C
+    exact = voigt.symmetric_gradient(fields.gradient(scene.exact, scene.model.mesh.points)) @ C
+    known = np.isfinite(exact).all(axis=1)
+    for place in ("node", "averaged"):
+        off = (result.stress(place) - exact)[known]
+        row[place] = float(np.linalg.norm(off) / np.linalg.norm(exact[known]))
+    return row
+
+
+def entry(rows: Sequence[Row]) -> str:
+    """Return reported over true error of the meshes of a scene.
+
+    >>> entry([{"true": 0.2, "reported": 0.3, "warnings": ["coarse"]}])
+    '1.50*'
+    """
+    if not rows or any("failed" in row for row in rows):
+        return "-"
+    if all(row["true"] < EXACT for row in rows):
+        return "exact"
+    return " → ".join(f"{row['reported'] / row['true']:.2f}{'*' * bool(row['warnings'])}" for row in rows)
+
+
+def stress_entry(rows: Sequence[Row]) -> str:
+    """Return the errors of recovered and of averaged stresses on the finer mesh in percent."""
+    if not rows or "failed" in rows[-1]:
+        return "-"
+    return f"{100 * rows[-1]['node']:.2g} / {100 * rows[-1]['averaged']:.2g}"
+
+
+def across(rows: Sequence[Row], show: Callable[[Sequence[Row]], str], names: Sequence[str]) -> str:
+    """Return a table, elements down and scenes across."""
+    body = []
+    for kind in dict.fromkeys(row["kind"] for row in rows):
+        found = [[r for r in rows if r["kind"] == kind and r["scene"] == name] for name in names]
+        body.append([kind, *map(show, found)])
+    return table(["element", *(name.replace("_", " ") for name in names)], body)
+
+
+def effectivity(names: Sequence[str] | None, kinds: Sequence[str] | None) -> None:
+    """Measure the scenes and elements asked for, print them as they come, and write all rows."""
+    rows = []
+    for kind in kinds or ELEMENTS:
+        for name in names or SCENES:
+            degree = kind_of(FORMULATIONS.get(kind, kind)).shape.degree
+            found = [measured(name, kind, n) for n in SIZES[degree]]
+            print(f"{name:20} {kind:12} {entry(found)}", flush=True)
+            rows += found
+    save(RESULTS / "effectivity.json", {"set": "effectivity", "rows": rows})
+    write_page()
+
+
+# ---- requested errors ------------------------------------------------------------------------------
+
+
+def make(name: str, kind: str, n: int, grading: float = 1.0) -> Scene:
+    """Return a scene, its cells smaller towards the planes x = 0 and y = 0 by a power of the places."""
+    scene = scene_of(name, kind, n)
+    if grading == 1.0:
+        return scene
+    old, X = scene.model, scene.model.mesh.points.copy()
+    X[:, :2] = np.sign(X[:, :2]) * np.abs(X[:, :2]) ** grading
+    scene.model = kl.Model(kl.Mesh(X, old.mesh.blocks), UNIT)
+    for fixing in old.supports.fixings:
+        where = fixing.rows if fixing.where is None else fixing.where
+        scene.model.fix(where, fixing.axes, field=fixing.field)
+    return scene
+
+
+def timed(work: Callable[[], Any], repeats: int) -> tuple[Any, float]:
+    """Return what some work gives, and its least processor time in s."""
+    least = np.inf
+    for _ in range(repeats):
+        start = process_time()
+        found = work()
+        least = min(least, process_time() - start)
+    return found, least
+
+
+def by_hand(name: str, kind: str, grading: float, aim: float) -> list[Row]:
+    """Return meshes of one element, ever finer, until the relative error is below `aim`."""
+    rows: list[Row] = []
+    for n in BY_HAND_SIZES:
+        scene = make(name, kind, n, grading)
+        try:
+            result, seconds = timed(scene.model.solve, 3)
+        except KratosLiteError:
+            return rows
+        true = errors(scene, result.u)["energy"]
+        row = {"scene": name, "kind": kind, "grading": grading, "n": n, "true": true}
+        rows.append(row | {"unknowns": result.report.unknowns, "seconds": seconds})
+        if true < aim or seconds > LONGEST:
+            break
+    return rows
+
+
+def requested(name: str, goal: float, kind: str = "8N", n: int = 2) -> Row:
+    """Return what a solution to a requested error says."""
+    row: Row = {"scene": name, "goal": goal}
+    scene = make(name, kind, n)
+    geometry = geometry_of(name, scene.model.mesh)
+    result, seconds = timed(lambda: scene.model.solve(error=goal, geometry=geometry), 2)
+    true = norms(scene.exact, result.mesh.points, result.groups, result.u)[1]  # type: ignore[arg-type]
+    report = result.report
+    row |= {"true": true, "reported": report.error, "unknowns": report.unknowns, "seconds": seconds}
+    row |= {"history": [[step.unknowns, step.error, step.seconds] for step in report.history]}
+    return row | {"warnings": report.warnings}
+
+
+def at_error(rows: Sequence[Row], true: float, key: str = "seconds") -> float:
+    """Return time or unknowns of meshes of one element at an error, on a line of logarithms.
+
+    >>> at_error([{"true": 0.1, "seconds": 1.0}, {"true": 0.001, "seconds": 100.0}], 0.01)
+    10.0
+    """
+    for coarse, fine in pairwise(rows):
+        if fine["true"] <= true <= coarse["true"]:
+            a, b, t = (np.log(x) for x in (coarse["true"], fine["true"], max(true, 1e-300)))
+            fraction = (a - t) / (a - b)
+            return float(np.exp((1 - fraction) * np.log(coarse[key]) + fraction * np.log(fine[key])).round(9))
+    return float(rows[0][key]) if rows and rows[0]["true"] <= true else float("inf")
+
+
+def best(rows: Sequence[Row], name: str, true: float) -> Row:
+    """Return element, grading, time and unknowns of the fastest mesh made by hand at an error."""
+    mine = [row for row in rows if row["scene"] == name]
+    found = []
+    for kind, grading in dict.fromkeys((row["kind"], row["grading"]) for row in mine):
+        line = [row for row in mine if (row["kind"], row["grading"]) == (kind, grading)]
+        figures = {key: at_error(line, true, key) for key in ("seconds", "unknowns")}
+        found.append({"kind": kind, "grading": grading} | figures)
+    return min(found, key=lambda row: row["seconds"])
+
+
+def beside_hand(rows: Sequence[Row], hand: Sequence[Row]) -> str:
+    """Return the table of requested errors beside hand-made meshes."""
+    body = []
+    for row in rows:
+        cells = [row["scene"].replace("_", " "), f"{100 * row['goal']:.2g}"]
+        cells += [f"{100 * row['true']:.2g}" if row["true"] > EXACT else "exact"]
+        cells += [f"{100 * row['reported']:.2g}{'*' * bool(row['warnings'])}", f"{row['unknowns']}"]
+        cells += [f"{len(row['history'])}", f"{1e3 * row['seconds']:.0f} ms"]
+        other = best(hand, row["scene"], row["true"])
+        if np.isfinite(other["seconds"]):
+            cells += [f"{other['kind']}{' graded' * (other['grading'] > 1)}", f"{other['unknowns']:.0f}"]
+            cells += [f"{1e3 * other['seconds']:.0f} ms", f"{row['seconds'] / other['seconds']:.1f}"]
+        else:
+            cells += 4 * ["-"]
+        body.append(cells)
+    head = "scene | asked | true | reported | unknowns | meshes | time | by hand | unknowns | time | ratio"
+    return table(head, body)
+
+
+def adaptive(names: Sequence[str] | None, kinds: Sequence[str] | None) -> None:
+    """Measure the scenes and elements asked for, print them as they come, and write all rows."""
+    rows: list[Row] = []
+    hand: list[Row] = []
+    for name in names or ASKED:
+        here = [requested(name, goal) for goal in GOALS]
+        aim = min(row["true"] for row in here)
+        for kind in kinds or BY_HAND:
+            for grading in GRADINGS.get(name, (1.0,)):
+                hand += by_hand(name, kind, grading, aim)
+        print(beside_hand(here, hand).split("\n", 2)[2], end="", flush=True)
+        rows += here
+    save(RESULTS / "adaptive.json", {"set": "adaptive", "rows": rows, "hand": hand})
+    write_page()
+
+
+# ---- the page --------------------------------------------------------------------------------------
+
+
+def page() -> str:
+    """Return the section of the results kept."""
+    rows, found = load(RESULTS / "effectivity.json")["rows"], load(RESULTS / "adaptive.json")
+    smooth = [name for name in SCENES if name not in ("l_domain", "hole_incompressible")]
+    text = TEXT + across(rows, entry, SCENES) + STRESSES + across(rows, stress_entry, smooth)
+    if not found:
+        return text
+    return text + REQUESTED.format(kinds=", ".join(BY_HAND)) + beside_hand(found["rows"], found["hand"])
+
+
+def write_page() -> None:
+    """Write what was measured at the end of the page."""
+    written = PAGE.read_text(encoding="utf-8").partition(TEXT.splitlines()[0])[0]
+    PAGE.write_text(written + page(), encoding="utf-8")
