@@ -613,7 +613,7 @@ MUTATIONS = [
     ),
     Mutation("analysis/quantities.py", "nodes[:, : group.element.shape.corners]", "nodes[:, :2]", QUANTITIES),
     Mutation("ale/moving_part.py", "ALONG = 1e-6", "ALONG = 0.5", "tests/ale/test_parts.py -k glue"),
-    Mutation("solvers/plate_level.py", "or held > 0.5", "or held > 0.9", PLATE),
+    Mutation("solvers/plate_level.py", "or constrained > 0.5", "or constrained > 0.9", PLATE),
     Mutation("solvers/plate_level.py", "along <= 0.5", "along <= 0.9", PLATE),
     Mutation(
         "solvers/plate_level.py",
