@@ -58,7 +58,8 @@ def plate_level(
 
 def _frames(offsets: Array, line: Ints) -> Array:
     """Return the axes (m, 3, 3) of lines in columns, their directions first; NaN for lines of one node."""
-    order = np.argsort((offsets**2).sum(axis=1), kind="stable")
+    squares = (offsets**2).sum(axis=1)  # both ends are as far: the last one counts, whatever the rounding
+    order = np.argsort(np.round(squares / (squares.max() or 1.0), 6), kind="stable")
     far = np.zeros((line.max() + 1, 3))
     far[line[order]] = offsets[order]
     with np.errstate(invalid="ignore"):

@@ -209,16 +209,6 @@ def test_ties_along_the_flow_are_glue():
     assert not any("glue" in text for text in whole.transient().equations.warnings)
 
 
-@pytest.mark.parametrize("slope", [0.0, 1e-9, 1e-4, 0.2, -1.0])
-def test_oblique_ties_are_glue_and_those_with_the_slope_of_round_off_are_not(slope):
-    model, (upper, _), (lower, _) = wheel_on_rail("")
-    weights = {(int(upper), "y"): 1.0} | ({(int(upper), "x"): slope} if slope else {})
-    model.constrain((int(lower), "y"), weights)
-    model.add(Rotation("z", 1.0, part="wheel"))
-    warnings = model.transient().equations.warnings
-    assert any("1 constraints hold moving material" in text for text in warnings) == (abs(slope) > 1e-6)
-
-
 def test_a_rotor_that_travels_is_not_tied_to_what_rests():
     model, _, _ = wheel_on_rail("y")
     model.add(Rotation("z", 1.0, center_velocity=(1.0, 0, 0), part="wheel"))

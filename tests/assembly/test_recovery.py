@@ -8,7 +8,6 @@ from computing import compiled, same_on_all_threads
 
 import kratos_lite as kl
 from kratos_lite import voigt
-from kratos_lite.analysis.error_estimate import energy_error
 from kratos_lite.assembly import polynomial_fit, recovery
 from kratos_lite.assembly.patches import patches
 from kratos_lite.assembly.polynomial_fit import Lists, Samples, fit, lists
@@ -77,20 +76,6 @@ def test_a_linear_displacement_has_constant_recovered_strain_and_stress(kind):
     assert np.abs(result.stress("node") - strain @ STEEL.C).max() < 1e-12 * 210e9
     assert result.error().relative < 1e-9
     assert not result.error().warnings
-
-
-@pytest.mark.parametrize(
-    ("kind", "fraction"),
-    [("4N", 0.0), ("5N", 0.0), ("10N", 0.5), ("13N", 1.0), ("15N", 1.0), ("20N", 1.0), ("27N", 1.0)],
-)
-def test_a_fraction_of_linear_residuals_belongs_to_the_nodes(kind, fraction):
-    mesh = kl.box((1, 1, 1), (1, 1, 1), element(kind))
-    (group, *_) = kl.Model(mesh, STEEL).element_groups()
-    found, (nodes, *_) = sampling(group.element, group.rule), mesh.points[group.nodes]
-    residual = polynomial(1)
-    np.testing.assert_allclose(
-        found.to_nodes @ residual(found.N @ nodes), fraction * residual(nodes), rtol=0, atol=1e-13
-    )
 
 
 def test_bending_is_recovered_exactly_by_quadratic_elements():
@@ -377,29 +362,6 @@ def test_the_reported_error_is_between_the_true_one_and_twice_that(scene, low, h
     result = scene.model.solve()
     effectivity = result.error().relative / errors(scene, result.u)["energy"]
     assert low < effectivity < high
-
-
-@pytest.mark.parametrize(
-    ("ratio", "method", "coarse"),
-    [
-        (0.5, "recovery", False),
-        (1.09, "recovery", False),  # 1.7² · 1.09 < 1.8², but 1.7 · 1.09 > 1.8
-        (1.15, "averaging", False),
-        (2.5, "averaging", False),
-        (3.0, "averaging", True),  # 1.7² = 2.89
-    ],
-)
-def test_the_smaller_estimate_counts_beside_the_energy_of_both(ratio, method, coarse):
-    mesh = kl.box(cells=(2, 2, 2))
-    averaged = np.arange(1.0, 9.0) / 36
-    groups = kl.Model(mesh, STEEL).element_groups()
-    found = energy_error(ratio * averaged, averaged, 3.0, groups, mesh)
-    square = ratio if method == "recovery" else 1.0
-    assert (found.method, found.safety) == (method, {"recovery": 1.7, "averaging": 1.8}[method])
-    assert found.absolute == pytest.approx(found.safety * square**0.5)
-    assert found.relative == pytest.approx(found.absolute / (3.0 + square) ** 0.5)
-    assert np.linalg.norm(found.per_element) == pytest.approx(found.absolute)
-    assert ["too coarse" in text for text in found.warnings] == [True] * coarse
 
 
 def test_parts_of_the_elements_add_up_to_the_whole():

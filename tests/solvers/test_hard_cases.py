@@ -269,17 +269,6 @@ def test_modes_of_bending_have_the_energy_of_constant_curvature():
     np.testing.assert_allclose(np.abs(energy), want, rtol=0, atol=1e-6 * want.max())
 
 
-@pytest.mark.parametrize(("held", "is_thin"), [(0.3, True), (0.45, True), (0.55, False), (0.8, False)])
-def test_a_plate_most_of_which_is_held_along_its_normal_does_not_bend(held, is_thin):
-    mesh = kl.box((1.0, 1.0, 0.01), (20, 4, 1))
-    free = np.ones((mesh.n_nodes, 3), dtype=bool)
-    free[mesh.points[:, 0] < held, 2] = False
-    linear = coarse_level.p_coarse_level(mesh.points, kl.Model(mesh, STEEL).element_groups())
-    lines = np.unique(np.round(mesh.points[:, :2], 9), axis=0, return_inverse=True)[1].ravel()
-    assert (plate_axes(mesh.points, free.ravel()) is not None) == is_thin
-    assert (plate_level(mesh.points, free.ravel(), None, lines, linear) is not None) == is_thin
-
-
 @pytest.mark.parametrize("side", ["z", "thick"])
 def test_other_bodies_are_no_plates(side):
     points = kl.box((1.0, 0.7, 0.05 if side == "z" else 0.2), (6, 6, 1)).points
