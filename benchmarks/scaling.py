@@ -11,7 +11,7 @@ import numpy as np
 
 import kratos_lite as kl
 from benchmarks.driver import ROOT, Run, scratch
-from benchmarks.programs import ENGINES
+from benchmarks.programs import BACKENDS
 from benchmarks.tables import Row, error, table
 
 RESULTS = Path(__file__).with_name("results") / "distributed.json"
@@ -27,9 +27,9 @@ EFFICIENCY, MEMORY, SERIAL = 0.9, 2.5, 1.5
 PLANNED = (1e7, 1e8, 1e9)
 PER_RANK = 500_000
 """Unknowns of a rank in the plan."""
-WORDS = ("engine", "ranks", "cells", "threads")
+WORDS = ("backend", "ranks", "cells", "threads")
 NAMES = {
-    "own": "own engine",
+    "own": "own backend",
     "petsc": "over ranks",
     "whole": "over ranks, the mesh on rank 0",
     "plain": "PETSc, plain assembly",
@@ -40,30 +40,30 @@ NAMES = {
 
 
 def runs(sizes: Sequence[int] | None = None) -> list[Run]:
-    """Return the clamped block by every engine, and of 2 ranks twice as much."""
+    """Return the clamped block by every backend, and of 2 ranks twice as much."""
     return [
-        run(kind, n, engine, count, twice)
+        run(kind, n, backend, count, twice)
         for kind in CELLS
         for n in sizes or CELLS[kind]
-        for engine, count in ENGINES
-        for twice in ((False, True) if (engine, count) == ("petsc", MOST_RANKS) else (False,))
-        if engine != "plain" or n**3 * (8 if kind == "27N" else 1) <= PLAIN_LIMIT
+        for backend, count in BACKENDS
+        for twice in ((False, True) if (backend, count) == ("petsc", MOST_RANKS) else (False,))
+        if backend != "plain" or n**3 * (8 if kind == "27N" else 1) <= PLAIN_LIMIT
     ]
 
 
-def run(kind: str, n: int, engine: str, count: int, twice: bool) -> Run:
-    """Return the solution of a block by an engine on so many ranks, or threads of the own engine."""
-    ranks, threads = (1, count) if engine == "own" else (count, 1)
-    values = engine, ranks, tuple(cube(n, twice)), threads
+def run(kind: str, n: int, backend: str, count: int, twice: bool) -> Run:
+    """Return the solution of a block by an backend on so many ranks, or threads of the own backend."""
+    ranks, threads = (1, count) if backend == "own" else (count, 1)
+    values = backend, ranks, tuple(cube(n, twice)), threads
     options = (*zip(WORDS, values, strict=True), ("tolerance", TOLERANCE))
-    program = f"{engine} {count}"
+    program = f"{backend} {count}"
     return Run("distributed", program, "block", kind, n, "ranks", options, "twice" * twice, WORDS)
 
 
 def compared(rows: Sequence[Row]) -> Sequence[Row]:
-    """Return rows with the relative difference of the work of the loads to that of the own engine."""
+    """Return rows with the relative difference of the work of the loads to that of the own backend."""
     for row in (row for row in rows if "load work" in row):
-        alike = chosen(rows, engine="own", kind=row["kind"], cells=row["cells"])
+        alike = chosen(rows, backend="own", kind=row["kind"], cells=row["cells"])
         if alike and alike[0] is not row:
             row["difference"] = abs(row["load work"] / alike[0]["load work"] - 1)
     return rows
@@ -91,15 +91,15 @@ def text_files(sizes: Sequence[int] | None = None) -> list[Row]:
 def name_of(row: Row) -> str:
     """Return a row in words.
 
-    >>> name_of({"kind": "8N", "cells": [2, 1, 1], "engine": "own", "ranks": 1, "threads": 2})
+    >>> name_of({"kind": "8N", "cells": [2, 1, 1], "backend": "own", "ranks": 1, "threads": 2})
     '8N 2x1x1 own, 2 threads'
     """
-    return f"{row['kind']} {'x'.join(map(str, row['cells']))} {row['engine']}, {processors(row)}"
+    return f"{row['kind']} {'x'.join(map(str, row['cells']))} {row['backend']}, {processors(row)}"
 
 
 def processors(row: Row) -> str:
-    """Return the threads of the own engine, or the ranks of others, in words."""
-    count, word = (row["threads"], "thread") if row["engine"] == "own" else (row["ranks"], "rank")
+    """Return the threads of the own backend, or the ranks of others, in words."""
+    count, word = (row["threads"], "thread") if row["backend"] == "own" else (row["ranks"], "rank")
     return f"{count} {word}{'s' if count > 1 else ''}"
 
 
@@ -128,9 +128,9 @@ def scaling(rows: Sequence[Row]) -> str:
     """Return strong and weak scaling with efficiencies and memory."""
     lines = []
     for kind, n in places(rows):
-        own = chosen(rows, kind=kind, n=n, engine="own", threads=1)
-        ones = chosen(rows, kind=kind, n=n, engine="petsc", ranks=1)
-        for row in chosen(rows, kind=kind, n=n, engine="petsc"):
+        own = chosen(rows, kind=kind, n=n, backend="own", threads=1)
+        ones = chosen(rows, kind=kind, n=n, backend="petsc", ranks=1)
+        for row in chosen(rows, kind=kind, n=n, backend="petsc"):
             weak, efficiency, serial = row["cells"] != cube(n), "", ""
             if ones and row is not ones[0]:
                 fraction = time_of(ones[0]) / time_of(row) / (1 if weak else row["ranks"])
@@ -154,18 +154,18 @@ def times(row: Row) -> list[str]:
 
 
 def others(rows: Sequence[Row]) -> str:
-    """Return the engines beside each other on one block."""
+    """Return the backends beside each other on one block."""
     lines = [
         [
             f"{kind} n = {n}",
-            f"{NAMES[row['engine']]}, {processors(row)}",
+            f"{NAMES[row['backend']]}, {processors(row)}",
             *times(row),
             f"{per_unknown(row):.2f}",
         ]
         for kind, n in places(rows)
         for row in chosen(rows, kind=kind, n=n, cells=cube(n))
     ]
-    head = "block | engine | assembly s | set-up and solver s | solution s | iterations | kB per unknown"
+    head = "block | backend | assembly s | set-up and solver s | solution s | iterations | kB per unknown"
     return table(head, lines)
 
 
@@ -178,7 +178,7 @@ def plan(found: Row) -> str:
     """Return what 1e7, 1e8 and 1e9 unknowns need, from the growth of the rows measured."""
     lines = []
     for kind in dict.fromkeys(row["kind"] for row in found["rows"]):
-        two = chosen(found["rows"], kind=kind, engine="petsc", ranks=MOST_RANKS)
+        two = chosen(found["rows"], kind=kind, backend="petsc", ranks=MOST_RANKS)
         two = [row for row in two if row["iterations"]]
         if not two:
             continue
@@ -217,9 +217,9 @@ def goals(rows: Sequence[Row]) -> str:
     lines = []
     for kind in dict.fromkeys(row["kind"] for row in rows):
         n = max(row["n"] for row in rows if row["kind"] == kind)
-        here = {row["ranks"]: row for row in chosen(rows, kind=kind, n=n, engine="petsc", cells=cube(n))}
-        weak = chosen(rows, kind=kind, n=n, engine="petsc", cells=cube(n, True))
-        own = chosen(rows, kind=kind, n=n, engine="own", threads=1)
+        here = {row["ranks"]: row for row in chosen(rows, kind=kind, n=n, backend="petsc", cells=cube(n))}
+        weak = chosen(rows, kind=kind, n=n, backend="petsc", cells=cube(n, True))
+        own = chosen(rows, kind=kind, n=n, backend="own", threads=1)
         if not (1 in here and MOST_RANKS in here and weak and own):
             continue
         one, two = here[1], here[MOST_RANKS]
@@ -241,17 +241,17 @@ ratios, not seconds. Ranks of one machine share its memory, and say nothing abou
 {tables[goals]}
 Efficiency is that of mesh and solution; the weak one is the time for one share on one rank over that for two
 shares on two. Memory is the most that a rank holds above its imports, over its share of the unknowns. Serial
-is the own engine on one thread.
+is the own backend on one thread.
 
 ## Strong and weak
 
 On one rank and two: the same block, and for two ranks one of twice the cells. "Solution" is everything in
-`model.solve()`, checks included. The last column compares the work of the loads with the own engine.
+`model.solve()`, checks included. The last column compares the work of the loads with the own backend.
 
 {tables[scaling]}
-## Beside the own engine and a plain assembly
+## Beside the own backend and a plain assembly
 
-The own engine on one thread and on as many as there are ranks, and PETSc's GAMG with conjugate gradients fed
+The own backend on one thread and on as many as there are ranks, and PETSc's GAMG with conjugate gradients fed
 by an assembly in NumPy, with all element matrices at once and a sort of their entries, as finite-element
 libraries in Python do it.
 

@@ -327,10 +327,10 @@ def test_systems_of_files_are_those_of_the_models(name, tmp_path):
 # ---- over ranks ----------------------------------------------------------------------------------------
 
 
-def rank_row(n, engine, ranks, seconds, *, twice=False, threads=1, **words):
+def rank_row(n, backend, ranks, seconds, *, twice=False, threads=1, **words):
     cells = scaling.cube(n, twice)
     unknowns = 3 * cells[0] * n * n
-    plain = {"kind": "8N", "n": n, "engine": engine, "ranks": ranks, "cells": cells, "threads": threads}
+    plain = {"kind": "8N", "n": n, "backend": backend, "ranks": ranks, "cells": cells, "threads": threads}
     plain |= {"unknowns": unknowns, "iterations": 10 + n // 10, "mesh": 0.0, "seconds": seconds}
     plain |= {"phases": {"assemble": seconds / 4, "solve": seconds / 2}, "difference": 1e-12}
     return plain | {"memory": 2e3 * unknowns / ranks, "imports": 1e8, "bytes written": 100 * unknowns} | words
@@ -348,7 +348,7 @@ def test_page_of_scaling_has_efficiencies_goals_and_a_plan():
     assert "| 8N n = 100 | 1.00 | 0.96 | 2.00 | 1.25 |" in scaling.goals(rows)
     line = "| 8N 200×100×100 | 6000000 | 2 | 0.00 | 6.50 | 13.00 | 26.00 | 20 | 0.96 weak |  | 2.00 | 1e-12 |"
     assert line in scaling.scaling(rows)
-    assert "| 8N n = 100 | own engine, 1 thread | 5.00 | 10.00 | 20.00 | 20 | 2.00 |" in scaling.others(rows)
+    assert "| 8N n = 100 | own backend, 1 thread | 5.00 | 10.00 | 20.00 | 20 | 2.00 |" in scaling.others(rows)
     files = [{"kind": "8N", "bytes": 30, "unknowns": 3}]
     found = {"rows": rows, "files": files, "date": "", "machine": driver.machine(), "versions": {}}
     text = scaling.page(found | {"repeats": 1})
@@ -358,9 +358,10 @@ def test_page_of_scaling_has_efficiencies_goals_and_a_plan():
 
 
 @needs_mpi
-def test_engines_over_ranks_solve_the_same_block(tmp_path, monkeypatch, capsys):
+def test_backends_over_ranks_solve_the_same_block(tmp_path, monkeypatch, capsys):
     out = tmp_path / "distributed.json"
     monkeypatch.setattr(scaling, "PAGE", tmp_path / "scaling.md")
+    monkeypatch.delenv("KRATOS_LITE_BENCH_PYTHON", raising=False)
     assert command.main(["distributed", "--cells", "3", "--repeats", "1", "--out", str(out)]) == 0
     found = json.loads(out.read_text())
     assert [row.get("failed") for row in found["rows"]] == [None] * 16

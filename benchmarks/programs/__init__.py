@@ -83,14 +83,14 @@ SOLVERS = ("Kratos", "pyamg", "PETSc GAMG", "PETSc BoomerAMG", "PARDISO", "CHOLM
 """Programs that solve the linear system of a file."""
 
 
-def on_ranks(engine: str, count: int) -> Program:
-    """Return the program that solves a block by an engine, on so many ranks, or threads of one process."""
-    own = engine == "own"
+def on_ranks(backend: str, count: int) -> Program:
+    """Return the program that solves a block by an backend, on so many ranks, or threads of one process."""
+    own = backend == "own"
     environment = AS_ANYONE | SHARED | {"KRATOS_LITE_THREADS": str(count if own else 1)}
     return Program("ranks", environment=environment, launcher=() if own else ("mpirun", "-n", str(count)))
 
 
-ENGINES = (*(("own", n) for n in (1, 2)), *(("petsc", n) for n in (1, 2)), ("whole", 2),
+BACKENDS = (*(("own", n) for n in (1, 2)), *(("petsc", n) for n in (1, 2)), ("whole", 2),
            *(("plain", n) for n in (1, 2)))  # fmt: skip
-RANKS = {f"{engine} {count}": on_ranks(engine, count) for engine, count in ENGINES}
+RANKS = {f"{backend} {count}": on_ranks(backend, count) for backend, count in BACKENDS}
 """Programs of `scaling`."""

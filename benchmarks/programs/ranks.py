@@ -1,6 +1,6 @@
 """The clamped block over several ranks, each of which runs ``python -m benchmarks.programs ranks job.json``.
 
-The job names the engine: ``own`` (one process), ``petsc`` (each rank makes its part of the mesh), ``whole``
+The job names the backend: ``own`` (one process), ``petsc`` (each rank makes its part of the mesh), ``whole``
 (rank 0 has the mesh, all ranks assemble and solve), or ``plain``: PETSc's GAMG with what its manual advises
 for elasticity, fed by an assembly in NumPy of all own rows, one batch of all elements and one sort.
 """
@@ -40,11 +40,11 @@ def peak() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
 
 
-def model_of(engine: str, kind: str, cells: list[int]) -> tuple[kl.Model, Any]:
+def model_of(backend: str, kind: str, cells: list[int]) -> tuple[kl.Model, Any]:
     """Return the block, or the part of it that this rank makes, and the partition."""
     partition = None
     words = tuple(here / cells[-1] for here in cells), tuple(cells), f"KinematicLinear3D{kind}"
-    if engine in ("own", "whole"):
+    if backend in ("own", "whole"):
         mesh = kl.box(*words)
     else:
         from kratos_lite.distributed.box import box
@@ -60,13 +60,13 @@ def solved(model: kl.Model, partition: Any, job: Job) -> tuple[Array, Array]:
     """Return displacements and loads (n, 3) by kratos_lite."""
     if partition is None:
         result = model.solve(
-            engine="own" if job.given["engine"] == "own" else "petsc", tolerance=job.tolerance
+            backend="own" if job.given["backend"] == "own" else "petsc", tolerance=job.tolerance
         )
     else:
         result = kl.solve_part(model, partition, tolerance=job.tolerance)
     report = result.report
     job.answer |= {"phases": dict(report.seconds), "iterations": report.iterations, "solver": report.solver}
-    if job.given["engine"] == "petsc":
+    if job.given["backend"] == "petsc":
         with job.phase("write"):
             kl.write(Path(job.given["folder"]) / "block.pvtu", result)
     return result.u, result.loads
@@ -153,15 +153,15 @@ def assembled(part: Any, own: Array, n_all: int) -> tuple[Any, Array]:
 
 def work(job: Job) -> None:
     """Do the job; rank 0 answers."""
-    engine = job.given["engine"]
-    import_all(engine)
-    ranks = {"own": lambda: ALONE, "whole": start_ranks}.get(engine, world)()
-    every = engine != "whole"  # what rank 0 alone runs asks the others by a task
+    backend = job.given["backend"]
+    import_all(backend)
+    ranks = {"own": lambda: ALONE, "whole": start_ranks}.get(backend, world)()
+    every = backend != "whole"  # what rank 0 alone runs asks the others by a task
     before = _peaks(ranks) if every else ranks.run(_peaks)
     start = perf_counter()
-    model, partition = model_of(engine, job.kind, job.given["cells"])
+    model, partition = model_of(backend, job.kind, job.given["cells"])
     mesh, start = perf_counter() - start, perf_counter()
-    u, loads = (plain if engine == "plain" else solved)(model, partition, job)
+    u, loads = (plain if backend == "plain" else solved)(model, partition, job)
     seconds = perf_counter() - start - job.answer["phases"].get("write", 0.0)
     after = _peaks(ranks) if every else ranks.run(_peaks)
     own = np.ones(model.mesh.n_nodes, dtype=bool) if partition is None else partition.own
@@ -181,11 +181,11 @@ def _peaks(ranks: Any) -> list[int]:
     return found
 
 
-def import_all(engine: str) -> None:
+def import_all(backend: str) -> None:
     """Import before the clock starts and memory counts, as every program does at its start."""
-    for name in (*NEEDED, *(NEEDED_OVER_RANKS if engine != "own" else ())):
+    for name in (*NEEDED, *(NEEDED_OVER_RANKS if backend != "own" else ())):
         import_module(name)
-    if engine != "own":
+    if backend != "own":
         from kratos_lite.distributed.petsc import petsc
 
         petsc()

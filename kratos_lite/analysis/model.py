@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from kratos_lite.analysis.engines import check_own
+from kratos_lite.analysis.backends import check_own
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.static import StaticAnalysis
 from kratos_lite.errors import InputError
@@ -63,7 +63,7 @@ class Model(Structure):
         most_unknowns: int | None = None,
         geometry: Mapping[str, Callable[[Array], Array]] | None = None,
         quantity: Quantity | None = None,
-        engine: str | None = None,
+        backend: str | None = None,
         petsc: str | None = None,
     ) -> Result:
         """Check the model and solve it: statics, or the steady state of a motion at the time 0.
@@ -82,7 +82,7 @@ class Model(Structure):
         quantity : with `error`: the error is that of a quantity, such as ``kl.DisplacementAt(point, "z")``,
             as `Result.error` estimates it, in place of the energy norm.  Relative to its value, which must
             not be 0.
-        engine : ``own``, or ``petsc`` for statics by PETSc, which must be installed; if not given, that
+        backend : ``own``, or ``petsc`` for statics by PETSc, which must be installed; if not given, that
             of one process.
         petsc : options of PETSc, which win over what is chosen: ``"-ksp_type cg -pc_type hypre"``.
 
@@ -107,15 +107,15 @@ class Model(Structure):
             if error is not None:
                 from kratos_lite.analysis.adaptive import UNKNOWNS, solve_to  # a quick start without it
 
-                check_own(engine, petsc, "a requested error")
+                check_own(backend, petsc, "a requested error")
                 most = UNKNOWNS if most_unknowns is None else most_unknowns
                 return solve_to(self, error, solver, tolerance, shown, most, geometry, quantity)
             if self.motion is not None:
                 from kratos_lite.analysis.steady import solve_steady  # a quick start for statics
 
-                check_own(engine, petsc, "a motion of the material")
+                check_own(backend, petsc, "a motion of the material")
                 return solve_steady(self, solver, tolerance, shown)
-            analysis = StaticAnalysis(self, solver, tolerance, shown, engine=engine, petsc=petsc)
+            analysis = StaticAnalysis(self, solver, tolerance, shown, backend=backend, petsc=petsc)
             try:
                 return analysis.solve()
             finally:
@@ -127,7 +127,7 @@ class Model(Structure):
         tolerance: float = 1e-10,
         progress: Progress | None = None,
         *,
-        engine: str | None = None,
+        backend: str | None = None,
         petsc: str | None = None,
     ) -> StaticAnalysis:
         """Check the model and return its static analysis, ready for many sets of loads.
@@ -136,7 +136,7 @@ class Model(Structure):
 
         Parameters
         ----------
-        solver, tolerance, progress, engine, petsc : as for `solve`.  The analysis's
+        solver, tolerance, progress, backend, petsc : as for `solve`.  The analysis's
             ``release()`` releases what PETSc holds.
 
         Returns
@@ -159,7 +159,7 @@ class Model(Structure):
         >>> print(f"{pull.u[:, 2].max():.1e} m, {push.u[:, 2].min():.1e} m")
         1.0e-03 m, -2.0e-03 m
         """
-        return StaticAnalysis(self, solver, tolerance, progress, engine=engine, petsc=petsc)
+        return StaticAnalysis(self, solver, tolerance, progress, backend=backend, petsc=petsc)
 
     def solve_cases(
         self,
@@ -168,7 +168,7 @@ class Model(Structure):
         tolerance: float = 1e-10,
         progress: Progress | None = None,
         *,
-        engine: str | None = None,
+        backend: str | None = None,
         petsc: str | None = None,
     ) -> dict[str, Result]:
         """Solve the model for several load cases, with one matrix.
@@ -176,7 +176,7 @@ class Model(Structure):
         Parameters
         ----------
         cases : names and loads; each case has these loads, not those of the model.
-        solver, tolerance, progress, engine, petsc : as for `solve`.
+        solver, tolerance, progress, backend, petsc : as for `solve`.
 
         Returns
         -------
@@ -189,7 +189,7 @@ class Model(Structure):
             As for `solve`.
         """
         with watched(progress) as shown:
-            analysis = StaticAnalysis(self, solver, tolerance, shown, engine=engine, petsc=petsc)
+            analysis = StaticAnalysis(self, solver, tolerance, shown, backend=backend, petsc=petsc)
             try:
                 return analysis.solve_cases(cases)
             finally:

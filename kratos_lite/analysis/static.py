@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kratos_lite.analysis.engines import engine_of, system_of
+from kratos_lite.analysis.backends import backend_of, system_of
 from kratos_lite.analysis.nodal_loads import stress_load
 from kratos_lite.analysis.origin import Origin
 from kratos_lite.analysis.prepared import (
@@ -56,7 +56,7 @@ class StaticAnalysis:
     solver : ``auto``, ``dense``, ``direct`` or ``amg``.
     tolerance : relative residual at which the iterative solver stops.
     progress : called with the phase and the share done, 0 … 1.
-    engine, petsc : see `Model.solve`.
+    backend, petsc : see `Model.solve`.
 
     Attributes
     ----------
@@ -75,11 +75,11 @@ class StaticAnalysis:
         tolerance: float = 1e-10,
         progress: Progress | None = None,
         *,
-        engine: str | None = None,
+        backend: str | None = None,
         petsc: str | None = None,
     ) -> None:
         check_arguments(solver, tolerance)
-        self.engine, self.petsc = engine_of(engine, petsc), petsc
+        self.backend, self.petsc = backend_of(backend, petsc), petsc
         if model.motion is not None:
             raise ModelError("a model with a motion is solved by model.solve() or moves by model.transient()")
         self.model, self.solver, self.tolerance = model, solver, tolerance
@@ -202,7 +202,7 @@ class StaticAnalysis:
                 select(state.groups, nodes),
                 select(state.groups, nodes & ~self._dirichlet.at_rest),
             )
-            how = state.free.held, self.solver, self.tolerance, self.progress, self.engine, self.petsc
+            how = state.free.held, self.solver, self.tolerance, self.progress, self.backend, self.petsc
             system = system_of(self.model, groups, *how)  # which may be refused; the one before stays then
             self.release()
             self._equations = Equations(system, components, sum(map(len, every)) - sum(map(len, groups)))

@@ -74,12 +74,12 @@ def _run(words: Sequence[str]) -> int:
     from kratos_lite.cli import commands
     from kratos_lite.errors import InputError
 
-    if getattr(options, "engine", None) == "petsc":
+    if getattr(options, "backend", None) == "petsc":
         from kratos_lite.cli.apply_options import refuse_serial_options  # `info` does without it
 
         refuse_serial_options(options)
     elif getattr(options, "petsc", None) is not None:
-        raise InputError("--petsc belongs to --engine petsc; add that, too")
+        raise InputError("--petsc belongs to --backend petsc; add that, too")
     code = int(getattr(commands, options.command)(options))
     if sys.stdout:
         sys.stdout.flush()  # a full disk shows here rather than after the end of the program

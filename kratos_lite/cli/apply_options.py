@@ -43,7 +43,7 @@ OF_MODELS = (
     *("integrator", "rayleigh", "lumped"),
 )
 """Options that bodies do not have."""
-NO_STATICS = "does not go with --engine petsc, which solves statics; leave one out"
+NO_STATICS = "does not go with --backend petsc, which solves statics; leave one out"
 OWNERS = {
     **dict.fromkeys(("center", "center_velocity", "center_acceleration", "stiffening"), ("rotation",)),
     "boundaries": ("translation",),
@@ -66,7 +66,7 @@ def case_of(options: Namespace, part: int | None = None) -> Case:
         initial_displacement=not options.ignore_initial_displacement,
         part=part,
     )
-    case.engine, case.petsc = options.engine or case.engine, options.petsc
+    case.backend, case.petsc = options.backend or case.backend, options.petsc
     if case.is_of_model:
         apply(case.model, options, materials)
         if options.solver:
@@ -98,9 +98,9 @@ def refuse_serial_options(options: Namespace) -> None:
     from kratos_lite.distributed.petsc import parsed, petsc
 
     refuse(options, ("modes", "time", "restart", "state", *OF_TIME, "rotation", "translation"), NO_STATICS)
-    refuse(options, ("error",), "is for one process; leave it out, or --engine petsc")
+    refuse(options, ("error",), "is for one process; leave it out, or --backend petsc")
     if Path(options.input).suffix.lower() == ".py":
-        raise InputError(f"{options.input}: scripts are for one process; leave --engine petsc out")
+        raise InputError(f"{options.input}: scripts are for one process; leave --backend petsc out")
     parsed(options.petsc)
     petsc()
 

@@ -29,13 +29,13 @@ EXAMPLES = {
   kratos-lite solve tower.mdpa --fix z-:xyz --traction z+:1e4,0,0 --time 1e-3:500:10 -o swing.pvd
   kratos-lite solve examples/bodies/thrown_box.py -o out/box.pvd -o out/box.csv --picture out/box.png
   kratos-lite solve box.py --steps 500 -o second.csv --restart half.npz
-  mpirun -n 4 kratos-lite solve bridge.mdpa --engine petsc -o bridge.pvtu
+  mpirun -n 4 kratos-lite solve bridge.mdpa --backend petsc -o bridge.pvtu
   kratos-lite solve part.msh --material E=210e9,nu=0.3,density=7850 \\
       --fix bottom:xyz --gravity 0,0,-9.81 --traction top:0,0,-1e5 --picture part.png""",
     "info": "kratos-lite info beam.mdpa\n  kratos-lite info examples/bodies/pendulum.py",
     "check": "kratos-lite check beam.mdpa\n  kratos-lite check examples/bodies/thrown_box.py\n"
     "  kratos-lite check part.msh --material E=210e9,nu=0.3 --fix bottom:xyz --pressure top:1e5\n"
-    "  mpirun -n 4 kratos-lite check bridge.mdpa --engine petsc\n"
+    "  mpirun -n 4 kratos-lite check bridge.mdpa --backend petsc\n"
     "  kratos-lite check my_element.py",
     "verify": "kratos-lite verify\n  kratos-lite verify patch macneal_harder --element 3D8N --element 3D20N\n"
     "  kratos-lite verify my_element.py -o my_element.md",
@@ -49,7 +49,7 @@ MODES = (
     "find the N lowest natural frequencies instead; their modes go to -o OUT.pvd or OUT.html, the first of "
     "them to --picture"
 )
-ENGINE = "petsc: statics, by PETSc over all processes that mpirun or srun has started (own, on one)"
+BACKEND = "petsc: statics, by PETSc over all processes that mpirun or srun has started (own, on one)"
 ERROR = "relative error of the energy norm, such as 1%% or 0.01: statics, the mesh made finer"
 FORMULATION = (
     "of the elements, in place of what their names in the file say: standard, enhanced, b_bar, reduced, or "
@@ -159,7 +159,7 @@ def _add_case(command: argparse.ArgumentParser) -> None:
     _add_options(how, ("--modes", "N", MODES), type=int)
     _add_options(how, ("--solver", "", "auto chooses by size"), choices=("auto", "dense", "direct", "amg"))
     _add_options(how, ("--error", "FRACTION", ERROR))
-    _add_options(how, ("--engine", "", ENGINE), choices=("own", "petsc"))
+    _add_options(how, ("--backend", "", BACKEND), choices=("own", "petsc"))
     _add_options(how, ("--petsc", "OPTIONS", "options of PETSc, such as '-pc_type hypre'"))
     _add_options(how, ("--tolerance", "", "relative residual of the iterative solver (1e-10)"), type=float)
     _add_options(how, ("--threads", "N", "threads of the compiled kernels (all cores)"), type=int)

@@ -44,7 +44,7 @@ def launched(environment: Mapping[str, str] | None = None) -> tuple[int, int, in
 
 
 def share(words: Sequence[str]) -> bool:
-    """Let ranks that were started with ``--engine petsc`` share a command; return whether this one runs it.
+    """Let ranks that were started with ``--backend petsc`` share a command; return whether this one runs it.
 
     Raises
     ------
@@ -54,19 +54,19 @@ def share(words: Sequence[str]) -> bool:
     rank, size, local = launched()
     if size == 1 or not words or words[0] not in COMMANDS:
         return True
-    engine = _engine(words)
-    if engine == "petsc":
+    backend = _backend(words)
+    if backend == "petsc":
         from kratos_lite.distributed.communicator import start
 
         _share_cores(local)
         start(words, size)
-    elif not engine:
+    elif not backend:
         if rank:
             return False
         raise InputError(
             f"{size} copies of this command have been started, which would all {' '.join(words[:2])} and "
-            "write the same files; add --engine petsc to share it among them, start it without mpirun or "
-            "srun, or add --engine own if each has an input of its own"
+            "write the same files; add --backend petsc to share it among them, start it without mpirun or "
+            "srun, or add --backend own if each has an input of its own"
         )
     return True
 
@@ -81,10 +81,10 @@ def _share_cores(local: int) -> None:
         os.environ.setdefault(name, os.environ.get("OMP_NUM_THREADS", threads))
 
 
-def _engine(words: Sequence[str]) -> str:
-    """Return what follows ``--engine``, before the words are parsed."""
-    joined = " ".join(words).replace("--engine=", "--engine ").split()
-    after = [joined[at + 1 : at + 2] for at, word in enumerate(joined) if word == "--engine"]
+def _backend(words: Sequence[str]) -> str:
+    """Return what follows ``--backend``, before the words are parsed."""
+    joined = " ".join(words).replace("--backend=", "--backend ").split()
+    after = [joined[at + 1 : at + 2] for at, word in enumerate(joined) if word == "--backend"]
     return "".join(after[-1]) if after else ""
 
 
@@ -93,7 +93,7 @@ def _engine(words: Sequence[str]) -> str:
 
 def part_files_of(options: Namespace) -> dict[int, Path]:
     """Return the part files that an input stands for, by number; none where one file holds the mesh."""
-    if getattr(options, "engine", None) != "petsc":
+    if getattr(options, "backend", None) != "petsc":
         return {}
     from kratos_lite.io.formats import ending, input_file
     from kratos_lite.io.formats.part_files import check_part_files, part_files

@@ -254,7 +254,7 @@ def start(words: Sequence[str] = (), launched: int = 1) -> Alone:
 
     A script that ``mpirun`` starts calls this before anything else but the definition of its own elements and
     materials.  Rank 0 goes on with the script; the others assemble and solve their parts whenever a model is
-    solved with ``engine="petsc"``.
+    solved with ``backend="petsc"``.
 
     Parameters
     ----------

@@ -55,7 +55,7 @@ def petsc() -> Any:
         from petsc4py import PETSc
     except (ImportError, ValueError, RuntimeError) as error:
         raise InputError(
-            f"engine='petsc' needs petsc4py, which does not load ({error}); {_cure(error)}"
+            f"backend='petsc' needs petsc4py, which does not load ({error}); {_cure(error)}"
         ) from None
     if PETSc.ScalarType().dtype.kind != "f":
         raise InputError("petsc4py is one for complex numbers; install one for real numbers")

@@ -142,7 +142,7 @@ class Case:
     subject : the model, whose `notes` tell what was not used; or the body, which may hold many.
     time : how it moves through time, or None where it rests.
     modes : number of requested natural frequencies, or 0.
-    solver, tolerance, error, engine, petsc : of a model at rest, as for `Model.solve`.
+    solver, tolerance, error, backend, petsc : of a model at rest, as for `Model.solve`.
     outputs : files to write.
     expected : comparisons of the end of a model with expected values; each returns a line.
     files : files that were read.
@@ -154,7 +154,7 @@ class Case:
     solver: str = "auto"
     tolerance: float = 1e-10
     error: float | None = None
-    engine: str | None = None
+    backend: str | None = None
     petsc: str | None = None
     outputs: Outputs = field(default_factory=Outputs)
     expected: list[Callable[[Result], str]] = field(default_factory=list)

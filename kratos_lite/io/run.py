@@ -29,7 +29,7 @@ NOT_OF_PETSC = {
     "transient": "an integration in time",
     "modal": "natural frequencies",
 }
-"""What cases are that the engine PETSc does not solve."""
+"""What cases are that the backend PETSc does not solve."""
 
 
 def run(case: Case, progress: Progress | None = None) -> Outcome:
@@ -85,7 +85,7 @@ def check_case(case: Case) -> None:
         raise InputError(f"the results of a case are a list of paths; got {case.outputs.results!r}")
     if case.modes and case.time is not None:
         raise InputError("a case has natural frequencies or a time integration; give one of them")
-    if case.engine == "petsc":
+    if case.backend == "petsc":
         _check_statics(case)
     if isinstance(case.subject, Structure):
         return
@@ -105,10 +105,10 @@ def _check_statics(case: Case) -> None:
     """Raise InputError for a case that PETSc does not solve."""
     if case.analysis in NOT_OF_PETSC:
         raise InputError(
-            f"engine='petsc' solves statics; this case has {NOT_OF_PETSC[case.analysis]}; leave it out"
+            f"backend='petsc' solves statics; this case has {NOT_OF_PETSC[case.analysis]}; leave it out"
         )
     if case.error is not None:
-        raise InputError("engine='petsc' solves on the mesh as it is; leave the requested error out")
+        raise InputError("backend='petsc' solves on the mesh as it is; leave the requested error out")
 
 
 def prepare(case: Case, progress: Progress | None = None) -> tuple[Any, Iterator[Any]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -135,13 +135,9 @@ class ConstrainedSystem:
 
     @cached_property
     def _equations(self) -> LinearSolver:
-        return LinearSolver(self.K, self.constraint_map, self.points, self.plan, self._p_coarse_level)
-
-    def _p_coarse_level(self) -> PCoarseLevel | None:
-        from kratos_lite.solvers.coarse_level import p_coarse_level  # a quick start for small models
-
         groups = getattr(self.K, "groups", self.groups)  # those of a split matrix have other materials
-        return p_coarse_level(self.points, groups, self._hanging)
+        level = partial(_p_coarse_level, self.points, groups, self._hanging)
+        return LinearSolver(self.K, self.constraint_map, self.points, self.plan, level)
 
     def solve(
         self,
@@ -217,6 +213,15 @@ def renumber(n_nodes: int, groups: Sequence[ElementGroup]) -> tuple[Ints, list[E
         return nodes, list(groups)
     local = (np.cumsum(used) - 1).astype(np.int32)
     return nodes, [replace(group, nodes=local[group.nodes]) for group in groups]
+
+
+def _p_coarse_level(
+    points: Array, groups: Sequence[ElementGroup], hanging: HangingNodes | None
+) -> PCoarseLevel | None:
+    """Return the coarse level, whose module small models do not import."""
+    from kratos_lite.solvers.coarse_level import p_coarse_level
+
+    return p_coarse_level(points, groups, hanging)
 
 
 def select(groups: Sequence[ElementGroup], moving: NDArray[np.bool_]) -> list[ElementGroup]:

@@ -14,7 +14,7 @@ NONE3, NONE6, NONE12 = np.zeros(3), np.zeros(6), np.zeros(12)
 
 
 @pytest.fixture(params=EITHER)
-def engine(request, monkeypatch):
+def backend(request, monkeypatch):
     """Run a test with the compiled kernel and without it."""
     if request.param == "numpy":
         monkeypatch.setattr(native, "kernels", lambda name: None)
@@ -116,7 +116,7 @@ def test_free_top_has_the_errors_of_its_integrator(h, integrator, error, drift, 
 
 
 @pytest.mark.parametrize("integrator", ["momentum_conserving", "implicit"])
-def test_spatial_momentum_is_that_of_the_impulse(engine, integrator):
+def test_spatial_momentum_is_that_of_the_impulse(backend, integrator):
     q, u, (J, inverse, mass) = rigid_bodies(20)
     torque, force, gravity = np.array([3.0, -2, 1]), np.array([1.0, 2, 3]), np.array([0, 0, -9.81])
 
@@ -131,7 +131,7 @@ def test_spatial_momentum_is_that_of_the_impulse(engine, integrator):
     np.testing.assert_allclose(after[1], linear + force + mass[:, None] * gravity, rtol=0, atol=1e-12)
 
 
-def test_heavy_top_keeps_its_vertical_momentum_and_loses_as_little_energy_as_it_should(engine):
+def test_heavy_top_keeps_its_vertical_momentum_and_loses_as_little_energy_as_it_should(backend):
     J, h = np.diag([5.0, 5, 1]), 0.009
     q, u = np.zeros(12), np.array([0, 0, 50.0, 0, 0, 0])
     q[:9] = exp([0.05, 0, 0]).T.ravel()
@@ -150,7 +150,7 @@ def test_heavy_top_keeps_its_vertical_momentum_and_loses_as_little_energy_as_it_
     assert (q[:9].reshape(3, 3).T @ J @ u[:3])[2] == pytest.approx(vertical, rel=1e-12)
 
 
-def test_work_of_a_constant_force_is_force_times_way(engine):
+def test_work_of_a_constant_force_is_force_times_way(backend):
     q, u, constant = rigid_bodies(5)
     start, work, force = q[:, 9:].copy(), np.ones(5), np.array([0, 0, 0, 1.0, -2, 3])
     rigid.steps(q, u, *constant, NONE3, force, NONE6, 0.01, 50, "momentum_conserving", work=work)
@@ -161,7 +161,7 @@ def test_work_of_a_constant_force_is_force_times_way(engine):
     np.testing.assert_allclose(work, 1 + (q - start) @ load, rtol=1e-13)
 
 
-def test_follower_loads_turn_with_the_body(engine):
+def test_follower_loads_turn_with_the_body(backend):
     """A force along a body axis about which nothing turns it, and a torque about a principal axis."""
     q, u = np.zeros(12), np.zeros(6)
     q[:9] = exp([0, 0, 1.0]).T.ravel()
@@ -179,7 +179,7 @@ STIFF = [(2e11, 1e-4), (2e11, 1e-3), (2e11, 5e-2)]
 
 
 @pytest.mark.parametrize(("young", "h"), CONSERVING + STIFF)
-def test_energy_momentum_conserves_at_any_step(engine, young, h):
+def test_energy_momentum_conserves_at_any_step(backend, young, h):
     q, u, constant = spinning_box(young)
     energy, L = energy_and_momentum(q, u, constant)
     for _ in range(5):
@@ -200,7 +200,7 @@ def test_a_stiff_body_conserves_over_long_times(young, h):
     np.testing.assert_allclose(momentum, L, rtol=0, atol=1e-11 * np.linalg.norm(L))
 
 
-def test_explicit_steps_keep_momentum_and_err_as_they_should(engine):
+def test_explicit_steps_keep_momentum_and_err_as_they_should(backend):
     q, u, constant = spinning_box(1e6)
     energy, L = energy_and_momentum(q, u, constant)
     worst = 0
@@ -239,7 +239,7 @@ def test_spinning_box_has_the_errors_of_its_integrator(integrator, h, error):
 
 
 @pytest.mark.parametrize("integrator", ["linearly_implicit", "energy_momentum"])
-def test_small_vibration_has_the_frequency_of_the_midpoint_rule(engine, integrator):
+def test_small_vibration_has_the_frequency_of_the_midpoint_rule(backend, integrator):
     """Breathing of a cube of 0.5 m: tan(w_d h/2) = w h/2."""
     omega, h, amplitude = 346.4101615137754, 2e-3, 1e-7
     q, u = np.zeros(12), np.zeros(12)
@@ -252,7 +252,7 @@ def test_small_vibration_has_the_frequency_of_the_midpoint_rule(engine, integrat
 
 
 @pytest.mark.parametrize("integrator", pseudo_rigid.METHODS)
-def test_damping_stops_vibration_and_nothing_else(engine, integrator):
+def test_damping_stops_vibration_and_nothing_else(backend, integrator):
     q, u, constant = spinning_box(1e6)
     constant = (*constant[:4], np.array(1e-3))
     q[:9] *= 1.01
@@ -271,7 +271,7 @@ def test_damping_stops_vibration_and_nothing_else(engine, integrator):
 
 
 @pytest.mark.parametrize("integrator", pseudo_rigid.METHODS)
-def test_free_fall_of_a_deformable_body_is_exact(engine, integrator):
+def test_free_fall_of_a_deformable_body_is_exact(backend, integrator):
     q, u, constant = pseudo_bodies(3)
     x, v, g = q[:, 9:].copy(), u[:, 9:].copy(), np.array([0, 1.0, -9.81])
     pseudo_rigid.steps(q, u, *constant, g, NONE12, 1e-3, 100, integrator)
@@ -351,7 +351,7 @@ def test_one_deformable_body_moves_as_in_a_crowd(integrator):
 
 
 @pytest.mark.parametrize("integrator", rigid.METHODS)
-def test_two_halves_are_a_step(engine, integrator):
+def test_two_halves_are_a_step(backend, integrator):
     q, u, constant = rigid_bodies(21)
     q2, u2 = q.copy(), u.copy()
     load = np.array([1.0, 2, 3, 4, 5, 6])
@@ -365,7 +365,7 @@ def test_two_halves_are_a_step(engine, integrator):
 
 
 @pytest.mark.parametrize("integrator", pseudo_rigid.METHODS)
-def test_one_step_is_the_first_of_many(engine, integrator):
+def test_one_step_is_the_first_of_many(backend, integrator):
     q, u, constant = pseudo_bodies(21)
     q2, u2, load = q.copy(), u.copy(), np.arange(12.0)
     pseudo_rigid.steps(q, u, *constant, NONE3, load, 0.01, 2, integrator)
@@ -375,7 +375,7 @@ def test_one_step_is_the_first_of_many(engine, integrator):
     np.testing.assert_array_equal(u, u2)
 
 
-def test_what_bodies_share_is_given_once(engine):
+def test_what_bodies_share_is_given_once(backend):
     q, u, constant = rigid_bodies(9)
     first = tuple(value[0].copy() for value in constant)
     every = tuple(np.repeat(value[:1], 9, axis=0) for value in constant)
@@ -409,7 +409,7 @@ def test_wrong_shapes_are_refused():
 # what cannot be computed
 
 
-def test_a_body_without_a_velocity_is_named(engine):
+def test_a_body_without_a_velocity_is_named(backend):
     q, u, constant = pseudo_bodies(30, young=1e8)
     u[:] = 0
     q[:, :9] = np.eye(3).ravel()
@@ -420,7 +420,7 @@ def test_a_body_without_a_velocity_is_named(engine):
         pseudo_rigid.steps(q, u, *constant, NONE3, NONE12, 1.0, 20, "energy_momentum")
 
 
-def test_a_motion_without_bounds_is_named(engine):
+def test_a_motion_without_bounds_is_named(backend):
     q, u, constant = spinning_box(1e8)
     with pytest.raises(
         SolveError, match=r"explicit: step number \d+, h = 0.1 s, failed: its velocity grew .* shorter"
@@ -428,7 +428,7 @@ def test_a_motion_without_bounds_is_named(engine):
         pseudo_rigid.steps(q, u, *constant, NONE3, NONE12, 0.1, 200, "explicit")
 
 
-def test_an_implicit_rotation_without_a_velocity_is_named(engine):
+def test_an_implicit_rotation_without_a_velocity_is_named(backend):
     q, u, constant = rigid_bodies(12)
     u[5, :3] = np.nan
     with pytest.raises(SolveError, match=r"implicit: step of body 5, h = 0.1 s, failed: Newton's method"):

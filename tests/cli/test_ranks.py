@@ -37,12 +37,12 @@ def test_one_of_many_copies_speaks(beam, run, monkeypatch, command):
     for name, value in OPEN_MPI.items():
         monkeypatch.setenv(name, value)
     monkeypatch.setenv("OMPI_COMM_WORLD_RANK", "0")
-    assert run(command, "beam.mdpa").refuses("8 copies", "--engine petsc", "--engine own")
+    assert run(command, "beam.mdpa").refuses("8 copies", "--backend petsc", "--backend own")
     monkeypatch.setenv("OMPI_COMM_WORLD_RANK", "5")
     done = run(command, "beam.mdpa")  # with an error, mpirun would end the others before they speak
     assert (done.code, done.out, done.err) == (0, "", "")
-    assert run(command, "beam.mdpa", "--engine", "own").code == 0
-    assert run(command, "beam.mdpa", "--engine=own").out
+    assert run(command, "beam.mdpa", "--backend", "own").code == 0
+    assert run(command, "beam.mdpa", "--backend=own").out
 
 
 def test_other_commands_do_not_mind_copies(beam, run, monkeypatch):
@@ -51,17 +51,17 @@ def test_other_commands_do_not_mind_copies(beam, run, monkeypatch):
     assert "nodes       20" in run("info", "beam.mdpa").out
 
 
-def test_options_of_petsc_belong_to_the_engine(beam, run):
-    assert run("solve", "beam.mdpa", "--petsc", "-ksp_view").refuses("--petsc belongs to --engine petsc")
+def test_options_of_petsc_belong_to_the_backend(beam, run):
+    assert run("solve", "beam.mdpa", "--petsc", "-ksp_view").refuses("--petsc belongs to --backend petsc")
 
 
 @pytest.mark.parametrize(
     ("words", "text"),
     [
-        (["--modes", "3"], "--modes does not go with --engine petsc"),
-        (["--time", "1e-3:5"], "--time does not go with --engine petsc"),
-        (["--lumped"], "--lumped does not go with --engine petsc"),
-        (["--rotation", "z:3"], "--rotation does not go with --engine petsc"),
+        (["--modes", "3"], "--modes does not go with --backend petsc"),
+        (["--time", "1e-3:5"], "--time does not go with --backend petsc"),
+        (["--lumped"], "--lumped does not go with --backend petsc"),
+        (["--rotation", "z:3"], "--rotation does not go with --backend petsc"),
         (["--error", "1%"], "--error is for one process"),
         (["--petsc", "-ksp_type cg gmres"], "'gmres' is no option and the value of none"),
         (["--petsc", "ksp_view"], "'ksp_view' is no option"),
@@ -69,12 +69,12 @@ def test_options_of_petsc_belong_to_the_engine(beam, run):
     ],
 )
 def test_what_petsc_does_not_do_is_refused_before_anything_is_read(run, words, text):
-    assert run("solve", "no.mdpa", "--engine", "petsc", *words).refuses(text)
+    assert run("solve", "no.mdpa", "--backend", "petsc", *words).refuses(text)
 
 
 def test_a_body_is_not_solved_by_petsc(run, tmp_path):
     (tmp_path / "body.py").write_text("raise SystemError('is not run')")
-    assert run("solve", tmp_path / "body.py", "--engine", "petsc").refuses("scripts are for one process")
+    assert run("solve", tmp_path / "body.py", "--backend", "petsc").refuses("scripts are for one process")
 
 
 def test_without_petsc_the_cure_is_named(beam):
@@ -82,7 +82,7 @@ def test_without_petsc_the_cure_is_named(beam):
         "import sys\nsys.modules['mpi4py'] = sys.modules['petsc4py'] = None\n"
         "from kratos_lite.cli import main\nsys.exit(main(sys.argv[1:]))"
     )
-    words = [sys.executable, "-c", text, "solve", "beam.mdpa", "--engine", "petsc"]
+    words = [sys.executable, "-c", text, "solve", "beam.mdpa", "--backend", "petsc"]
     run = subprocess.run(words, capture_output=True, text=True, timeout=FOREVER, check=False)
     assert run.returncode == 2
     assert "needs petsc4py" in run.stderr

@@ -213,7 +213,7 @@ CASES = (
 def test_same_as_one_process(build, make, way, solver, monkeypatch):
     monkeypatch.setattr(cut, "parts_of", way)
     model = build(make())
-    same(model.solve(solver, 1e-12, engine="petsc"), model.solve(tolerance=1e-12))
+    same(model.solve(solver, 1e-12, backend="petsc"), model.solve(tolerance=1e-12))
 
 
 @pytest.mark.parametrize("build", [clamped, tied])
@@ -225,7 +225,7 @@ def test_multigrid_of_petsc(build):
 
 
 def test_gravity_cube():
-    found = cube(box()).solve(engine="petsc")
+    found = cube(box()).solve(backend="petsc")
     assert np.allclose(found.u[np.isclose(found.mesh.points[:, 2], 1.0), 2], EXACT, rtol=1e-12, atol=0)
     assert found.report.solver == "mumps (PETSc)"
 
@@ -236,14 +236,14 @@ def test_load_cases_and_one_matrix():
         "pull": [kl.Traction("z+", (0.0, 1.0, 50.0)), kl.PointLoad("x+", (1.0, 0.0, 0.0))],
     }
     model = clamped(box())
-    expected, found = model.solve_cases(cases), model.solve_cases(cases, engine="petsc")
+    expected, found = model.solve_cases(cases), model.solve_cases(cases, backend="petsc")
     for name in cases:
         same(found[name], expected[name])
 
 
 def test_new_values_of_supports_and_another_start():
     model = tied_to_supports(box())
-    serial, shared = model.static(tolerance=1e-12), model.static("amg", 1e-12, engine="petsc")
+    serial, shared = model.static(tolerance=1e-12), model.static("amg", 1e-12, backend="petsc")
     first = shared.solve()
     system = shared.system
     model.fix(lambda x: (x[:, 0] == 1) & (x[:, 2] > 0), "y", 3e-3, override=True)
@@ -275,13 +275,13 @@ def test_a_matrix_that_is_singular(solver, monkeypatch):
     model = kl.Model(box(), STEEL)
     model.add(kl.Gravity((0.0, 0.0, -9.81)))
     with pytest.raises(SolveError, match="singular"):
-        model.solve(solver, engine="petsc")
+        model.solve(solver, backend="petsc")
 
 
 def test_progress_and_an_error_in_it():
     said = []
     model = clamped(box())
-    model.solve("amg", engine="petsc", progress=lambda phase, share: said.append((phase, share)))
+    model.solve("amg", backend="petsc", progress=lambda phase, share: said.append((phase, share)))
     assert [phase for phase, share in said if share == 1.0][-3:] == ["solve", "solve", "verify"]
     assert ("set up", 1.0) in said
 
@@ -290,7 +290,7 @@ def test_progress_and_an_error_in_it():
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        model.solve("amg", engine="petsc", progress=stop)
+        model.solve("amg", backend="petsc", progress=stop)
     assert started().run(count) == started().size
 
 
@@ -300,8 +300,8 @@ def count(ranks):
 
 def test_what_does_not_move_together_is_refused():
     model = clamped(box())
-    with pytest.raises(InputError, match="own engine alone"):
-        model.solve(error=0.1, engine="petsc")
+    with pytest.raises(InputError, match="own backend alone"):
+        model.solve(error=0.1, backend="petsc")
 
 
 def test_a_material_that_cannot_be_sent():
@@ -311,8 +311,8 @@ def test_a_material_that_cannot_be_sent():
     model = clamped(box())
     model.assign(Local(E=1e9, nu=0.3, density=1e3))
     if started().size == 1:
-        assert model.solve(engine="petsc").u.any()
+        assert model.solve(backend="petsc").u.any()
         return
     with pytest.raises(InputError, match=r"cannot be sent to other ranks: .* a module that all"):
-        model.solve(engine="petsc")
-    same(clamped(box()).solve(engine="petsc"), clamped(box()).solve())
+        model.solve(backend="petsc")
+    same(clamped(box()).solve(backend="petsc"), clamped(box()).solve())

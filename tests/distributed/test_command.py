@@ -1,4 +1,4 @@
-"""`mpirun -n P kratos-lite … --engine petsc`: one command over many processes, and what goes wrong in it."""
+"""`mpirun -n P kratos-lite … --backend petsc`: one command over many processes, and what goes wrong in it."""
 
 import json
 import os
@@ -69,12 +69,12 @@ def files_of(folder):
 @pytest.mark.parametrize("ranks", [2, 3])
 def test_copies_of_a_serial_command_are_refused_once(beam, ranks):
     run = command(ranks, "solve", beam, "--json", "out.json", cwd=beam.parent)
-    assert_refused(run, f"{ranks} copies", "--engine petsc", "--engine own")
+    assert_refused(run, f"{ranks} copies", "--backend petsc", "--backend own")
     assert files_of(beam.parent) == ["beam.mdpa"]
 
 
 def test_copies_that_are_wanted_each_solve(beam):
-    run = command(2, "solve", beam, "--engine", "own", cwd=beam.parent)
+    run = command(2, "solve", beam, "--backend", "own", cwd=beam.parent)
     assert run.returncode == 0, run.stderr
     assert run.stdout.count("largest displacement") == 2
 
@@ -83,7 +83,7 @@ def test_processes_that_another_mpi_has_started(beam):
     """Each would be alone, and take itself for rank 0."""
     environment = {**os.environ, "PMI_RANK": "0", "PMI_SIZE": "2", "PYTHONPATH": str(ROOT)}
     run = subprocess.run(
-        [PYTHON, "-m", "kratos_lite", "solve", str(beam), "--engine", "petsc"],
+        [PYTHON, "-m", "kratos_lite", "solve", str(beam), "--backend", "petsc"],
         capture_output=True,
         text=True,
         timeout=LIMIT,
@@ -100,19 +100,19 @@ def test_processes_that_another_mpi_has_started(beam):
 @pytest.mark.parametrize(
     ("words", "text"),
     [
-        (["--modes", "3"], "--modes does not go with --engine petsc"),
+        (["--modes", "3"], "--modes does not go with --backend petsc"),
         (["--error", "1%"], "--error is for one process"),
         (["--nonsense"], "--nonsense: there is no such option"),
     ],
 )
 def test_options_that_do_not_carry_over(tmp_path, words, text):
     """The input does not exist: nobody looks for it."""
-    run = command(2, "solve", "no.mdpa", "--engine", "petsc", *words, cwd=tmp_path)
+    run = command(2, "solve", "no.mdpa", "--backend", "petsc", *words, cwd=tmp_path)
     assert_refused(run, text)
 
 
 def test_a_missing_input(tmp_path):
-    run = command(2, "solve", "no.mdpa", "--engine", "petsc", cwd=tmp_path)
+    run = command(2, "solve", "no.mdpa", "--backend", "petsc", cwd=tmp_path)
     assert_refused(run, "error: no.mdpa: there is no such file")
 
 
@@ -146,20 +146,20 @@ def in_equations(what):
     ],
 )
 def test_a_defect_on_one_rank_ends_all(beam, what, text):
-    run = script(3, in_equations(what), "solve", beam, "--engine", "petsc")
+    run = script(3, in_equations(what), "solve", beam, "--backend", "petsc")
     assert_refused(run, text)
 
 
 def test_an_error_of_the_user_on_all_ranks_is_told_once(beam):
     text = "from kratos_lite.errors import MeshError; raise MeshError('torn in two')"
-    run = script(3, in_equations(text), "solve", beam, "--engine", "petsc")
+    run = script(3, in_equations(text), "solve", beam, "--backend", "petsc")
     assert_refused(run, "error: torn in two")
 
 
 @pytest.mark.parametrize("signal", ["SIGKILL", "SIGTERM"])
 def test_a_rank_that_is_killed_ends_all(beam, signal):
     text = in_equations(f"if rank == 1: import signal; os.kill(os.getpid(), signal.{signal})")
-    words = ["solve", beam, "--engine", "petsc", "-o", "out.pvtu", "--json", "out.json"]
+    words = ["solve", beam, "--backend", "petsc", "-o", "out.pvtu", "--json", "out.json"]
     run = script(3, text, *words, cwd=beam.parent)
     assert run.returncode != 0
     assert files_of(beam.parent) == ["beam.mdpa"]
@@ -175,7 +175,7 @@ def test_a_package_that_one_rank_lacks(beam, package):
         "from kratos_lite.distributed import petsc as module; module.DEBIAN = '/nowhere'\n"
         + LACKS.format(package)
     )
-    run = script(2, text, "solve", beam, "--engine", "petsc")
+    run = script(2, text, "solve", beam, "--backend", "petsc")
     assert run.returncode != 0
     assert package in run.stderr
     assert run.stderr.count("error:") == 1
@@ -187,7 +187,7 @@ def test_words_that_one_rank_alone_gets(beam):
         "from kratos_lite.cli.ranks import launched\n"
         "if launched()[0] == 1: sys.argv += ['--tolerance', '1e-6']"
     )
-    run = script(3, text, "solve", beam, "--engine", "petsc")
+    run = script(3, text, "solve", beam, "--backend", "petsc")
     assert_refused(run, "ranks share one command", "rank 1", "--tolerance 1e-6")
 
 
@@ -201,7 +201,7 @@ def test_a_rank_that_leaves_early(beam, begun):
         + "from mpi4py import MPI\n" * begun
         + "if launched()[0] == 1: sys.exit(0)"
     )
-    run = script(3, text, "solve", beam, "--engine", "petsc")
+    run = script(3, text, "solve", beam, "--backend", "petsc")
     assert run.returncode != 0
     assert run.stdout == ""
 
@@ -212,16 +212,16 @@ def test_an_inverted_element_that_one_rank_holds(beam):
     nodes = re.search(r"(?m)^\s*1 1 (\d+ \d+ \d+ \d+) (\d+ \d+ \d+ \d+)(.*)$", text)
     beam.write_text(text.replace(nodes[0], f"1 1 {nodes[2]} {nodes[1]}{nodes[3]}"))
     for words in (("solve", beam), ("check", beam)):
-        run = command(3, *words, "--engine", "petsc")
+        run = command(3, *words, "--backend", "petsc")
         assert run.returncode == 2
         assert (run.stderr + run.stdout).count("element 1 (") == 1
 
 
 def test_a_folder_that_is_not_there_or_may_not_be_written(beam):
-    run = command(2, "solve", beam, "--engine", "petsc", "-o", "none/out.pvtu", cwd=beam.parent)
+    run = command(2, "solve", beam, "--backend", "petsc", "-o", "none/out.pvtu", cwd=beam.parent)
     assert_refused(run, "error: none/out.pvtu: the folder none does not exist")
     (beam.parent / "out.pvtu").mkdir()
-    run = command(2, "solve", beam, "--engine", "petsc", "-o", "out.pvtu", cwd=beam.parent)
+    run = command(2, "solve", beam, "--backend", "petsc", "-o", "out.pvtu", cwd=beam.parent)
     assert_refused(run, "error: out.pvtu: cannot be written: it is a folder or a device")
 
 
@@ -244,9 +244,9 @@ def test_a_part_file_that_is_missing_or_cut(parts):
     last = parts / "beam_partitioned" / "beam_1.mdpa"
     text = last.read_text()
     last.write_text(text[: len(text) // 2])
-    assert_refused(command(2, "solve", parts / "beam.mdpa", "--engine", "petsc"), "beam_1.mdpa:")
+    assert_refused(command(2, "solve", parts / "beam.mdpa", "--backend", "petsc"), "beam_1.mdpa:")
     last.unlink()
-    assert_refused(command(2, "solve", parts / "beam.mdpa", "--engine", "petsc"), "error: ", "part file")
+    assert_refused(command(2, "solve", parts / "beam.mdpa", "--backend", "petsc"), "error: ", "part file")
 
 
 def test_part_files_that_disagree_on_the_place_of_a_node(parts):
@@ -254,7 +254,7 @@ def test_part_files_that_disagree_on_the_place_of_a_node(parts):
     text = last.read_text()
     first = re.search(r"Begin Nodes\n (\d+) (\S+) ", text)
     last.write_text(text.replace(first[0], f"Begin Nodes\n {first[1]} {float(first[2]) + 0.01} "))
-    assert_refused(command(2, "solve", parts / "beam.mdpa", "--engine", "petsc"), f"node {first[1]}")
+    assert_refused(command(2, "solve", parts / "beam.mdpa", "--backend", "petsc"), f"node {first[1]}")
 
 
 # ---- what is solved and written -------------------------------------------------------------------
@@ -273,7 +273,7 @@ EQUAL = ("nodes", "elements", "unknowns", "total load", "strain energy", "estima
 def test_the_summary_is_that_of_one_process_and_printed_once(beam):
     serial = rows_of(command(1, "solve", beam))
     for ranks in (2, 3):
-        run = command(ranks, "solve", beam, "--engine", "petsc")
+        run = command(ranks, "solve", beam, "--backend", "petsc")
         shared = rows_of(run)
         assert said(run) == []
         assert run.stdout.count("largest displacement") == 1
@@ -285,7 +285,7 @@ def test_the_summary_is_that_of_one_process_and_printed_once(beam):
 
 
 def test_files_are_those_of_one_process(beam):
-    words = ["solve", beam, "--engine", "petsc", "-o", "a.vtu", "-o", "a.csv", "--json", "a.json"]
+    words = ["solve", beam, "--backend", "petsc", "-o", "a.vtu", "-o", "a.csv", "--json", "a.json"]
     run = command(3, *words, cwd=beam.parent)
     assert "written               a.vtu\nwritten               a.csv\nwritten" in run.stdout
     assert files_of(beam.parent) == ["a.csv", "a.json", "a.vtu", "beam.mdpa"]
@@ -300,16 +300,16 @@ def test_files_are_those_of_one_process(beam):
 
 def test_part_files_are_solved_as_the_whole(parts):
     serial = rows_of(command(1, "solve", parts.parent / "beam.mdpa"))
-    run = command(2, "solve", parts / "beam.mdpa", "--engine", "petsc", "-o", "a.pvtu", cwd=parts)
+    run = command(2, "solve", parts / "beam.mdpa", "--backend", "petsc", "-o", "a.pvtu", cwd=parts)
     shared = rows_of(run)
     for name in ("nodes", "elements", "unknowns", "total load", "strain energy"):
         assert shared[name] == serial[name]
     for name in ("largest displacement", "largest von Mises"):
         assert shared[name].split()[0] == serial[name].split()[0]
     assert files_of(parts) == ["a.pvtu", "a_0.vtu", "a_1.vtu", "beam_partitioned"]
-    run = command(3, "solve", parts / "beam.mdpa", "--engine", "petsc")
+    run = command(3, "solve", parts / "beam.mdpa", "--backend", "petsc")
     assert_refused(run, "there are 2 part files", "mpirun -n 2")
-    run = command(2, "solve", parts / "beam.mdpa", "--engine", "petsc", "-o", "a.vtu", cwd=parts)
+    run = command(2, "solve", parts / "beam.mdpa", "--backend", "petsc", "-o", "a.vtu", cwd=parts)
     assert_refused(run, "a.vtu: no process has the whole of a mesh in part files; write -o OUT.pvtu")
 
 
@@ -318,7 +318,7 @@ def test_more_ranks_than_elements(tmp_path):
     model.fix("x-")
     model.add(kl.Traction("x+", (1e6, 0, 0)))
     kl.write(tmp_path / "two.mdpa", model)
-    words = ["solve", "two.mdpa", "--engine", "petsc", "--json", "two.json"]
+    words = ["solve", "two.mdpa", "--backend", "petsc", "--json", "two.json"]
     serial = rows_of(command(1, "solve", "two.mdpa", cwd=tmp_path))
     shared = rows_of(command(4, *words, cwd=tmp_path))
     for name in EQUAL[:-1]:  # the error is rounding
@@ -327,7 +327,7 @@ def test_more_ranks_than_elements(tmp_path):
 
 def test_one_rank_writes_as_one_process_does(beam):
     """Also without mpirun."""
-    words = ["solve", beam, "--engine", "petsc", "-o", "a.vtu", "-o", "a.csv", "--json", "a.json"]
+    words = ["solve", beam, "--backend", "petsc", "-o", "a.vtu", "-o", "a.csv", "--json", "a.json"]
     run = command(1, *words, cwd=beam.parent)
     assert "written" in rows_of(run)
     assert files_of(beam.parent) == ["a.csv", "a.json", "a.vtu", "beam.mdpa"]
@@ -335,9 +335,9 @@ def test_one_rank_writes_as_one_process_does(beam):
 
 
 def test_options_that_petsc_does_not_know(beam):
-    run = command(2, "solve", beam, "--engine", "petsc", "--petsc", "-pc_type nonsense")
+    run = command(2, "solve", beam, "--backend", "petsc", "--petsc", "-pc_type nonsense")
     assert_refused(run, "nonsense")
-    run = command(2, "solve", beam, "--engine", "petsc", "--petsc=-pc_typo 3")
+    run = command(2, "solve", beam, "--backend", "petsc", "--petsc=-pc_typo 3")
     assert run.stdout.count("pc_typo") == 1
 
 
@@ -351,7 +351,7 @@ def test_expected_values_are_told_once_and_give_the_exit_code(tmp_path):
     ]
     write(tmp_path, run_file([CLAMP], [GRAVITY, push(1e6)], checks=checks))
     serial = command(1, "solve", tmp_path)
-    run = command(3, "solve", tmp_path, "--engine", "petsc")
+    run = command(3, "solve", tmp_path, "--backend", "petsc")
     assert serial.returncode == run.returncode == 3
     said_of = [
         [line for line in one.stdout.splitlines() if line.startswith("check ")] for one in (serial, run)

@@ -44,7 +44,7 @@ def test_options_are_taken(words, tmp_path):
         "kratos_lite",
         "solve",
         cube,
-        "--engine",
+        "--backend",
         "petsc",
         *shlex.split(words),
         seconds=120,

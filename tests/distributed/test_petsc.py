@@ -1,4 +1,4 @@
-"""Options of PETSc, and engines where it is not installed."""
+"""Options of PETSc, and backends where it is not installed."""
 
 import sys
 
@@ -54,25 +54,25 @@ def absent(monkeypatch):
     module.petsc.cache_clear()
 
 
-@pytest.mark.parametrize("ask", [{"engine": "petsc"}, {"petsc": "-ksp_view"}])
+@pytest.mark.parametrize("ask", [{"backend": "petsc"}, {"petsc": "-ksp_view"}])
 def test_the_cure_where_petsc_is_absent(absent, ask, monkeypatch):
     with pytest.raises(InputError, match=r"(?s)petsc4py.*does not load.*apt-get install python3-petsc4py"):
         model().solve(**ask)
 
 
-def test_engines():
-    assert model().solve(engine="own").report.solver != "mumps (PETSc)"
-    with pytest.raises(InputError, match=r"engine.*petsc"):
-        model().solve(engine="trilinos")
-    with pytest.raises(InputError, match="PETSc options are for engine='petsc'"):
-        model().solve(engine="own", petsc="-ksp_view")
+def test_backends():
+    assert model().solve(backend="own").report.solver != "mumps (PETSc)"
+    with pytest.raises(InputError, match=r"backend.*petsc"):
+        model().solve(backend="trilinos")
+    with pytest.raises(InputError, match="PETSc options are for backend='petsc'"):
+        model().solve(backend="own", petsc="-ksp_view")
 
 
-def test_what_the_own_engine_alone_solves(monkeypatch):
-    monkeypatch.setattr("kratos_lite.analysis.engines.engine_of", lambda engine, petsc: engine or "own")
-    with pytest.raises(InputError, match="a requested error is solved by the own engine alone"):
-        model().solve(engine="petsc", error=0.1)
+def test_what_the_own_backend_alone_solves(monkeypatch):
+    monkeypatch.setattr("kratos_lite.analysis.backends.backend_of", lambda backend, petsc: backend or "own")
+    with pytest.raises(InputError, match="a requested error is solved by the own backend alone"):
+        model().solve(backend="petsc", error=0.1)
     spinning = model()
     spinning.add(kl.ale.Translation("x", rate=1.0, boundaries="natural"))
-    with pytest.raises((InputError, ModelError), match="own engine alone"):
-        spinning.solve(engine="petsc")
+    with pytest.raises((InputError, ModelError), match="own backend alone"):
+        spinning.solve(backend="petsc")

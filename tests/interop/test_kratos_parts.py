@@ -61,7 +61,7 @@ def solved(ranks, what, folder):
         "kratos_lite",
         "solve",
         what,
-        "--engine",
+        "--backend",
         "petsc",
         "-o",
         "out.pvtu",
@@ -123,7 +123,7 @@ def test_as_many_ranks_as_parts_are_asked_for(tmp_path):
     kl.write(tmp_path / "beam.mdpa", beam(8))
     divided(tmp_path / "beam.mdpa", 2)
     run = mpirun(
-        3, "-m", "kratos_lite", "solve", "beam_partitioned", "--engine", "petsc", cwd=tmp_path, seconds=120
+        3, "-m", "kratos_lite", "solve", "beam_partitioned", "--backend", "petsc", cwd=tmp_path, seconds=120
     )
     assert run.returncode == 2
     assert re.search("there are 2 part files, .*, and 3 ranks; start `mpirun -n 2`", run.stderr)

@@ -1,6 +1,7 @@
 """Factorizations: every backend gives the same answer, singular matrices are refused, factors are kept."""
 
 import gc
+import weakref
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import assemble_stiffness
 from kratos_lite.errors import SolveError
 from kratos_lite.solvers import direct
+from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.linear_solver import LinearSolver
 from kratos_lite.solvers.plan import Plan
 
@@ -158,3 +160,18 @@ def test_factors_are_given_back(monkeypatch):
     del factors
     gc.collect()
     assert freed == [True]
+
+
+def test_a_system_that_nobody_needs_is_gone_with_its_factors():
+    model = kl.Model(kl.box((1, 1, 1), (2, 2, 2)), kl.Isotropic3D(E=1.0, nu=0.3))
+    model.fix("z-")
+    mesh, supports = model.mesh, model.supports.constraint_map
+    system = ConstrainedSystem(mesh.points, model.element_groups(), supports, solver="direct")
+    system.solve(np.ones((mesh.n_nodes, 3)))
+    factors = weakref.ref(system._equations.factors)
+    gc.disable()
+    try:
+        del system
+        assert factors() is None
+    finally:
+        gc.enable()

@@ -85,7 +85,7 @@ def _refuse_part_files(path: Path) -> None:
     if files := part_files(path):
         raise InputError(
             f"{path}: there are {len(files)} part files; solve them by "
-            f"`mpirun -n {len(files)} kratos-lite solve {path} --engine petsc`"
+            f"`mpirun -n {len(files)} kratos-lite solve {path} --backend petsc`"
         )
 
 

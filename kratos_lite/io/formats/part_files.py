@@ -52,7 +52,7 @@ def check_part_files(path: Path, files: dict[int, Path], size: int) -> None:
     if len(files) != size:
         raise InputError(
             f"{path}: there are {len(files)} part files, {_listed(files)}, and {size} rank"
-            f"{'s' if size > 1 else ''}; start `mpirun -n {len(files)}` with --engine petsc, or make "
+            f"{'s' if size > 1 else ''}; start `mpirun -n {len(files)}` with --backend petsc, or make "
             f"{size} parts"
         )
 

@@ -13,13 +13,13 @@ def check(case: Case) -> list[str]:
     model = case.model
     if model.motion is not None:
         return model.check()
-    analysis = StaticAnalysis(model, case.solver, case.tolerance, engine=case.engine, petsc=case.petsc)
+    analysis = StaticAnalysis(model, case.solver, case.tolerance, backend=case.backend, petsc=case.petsc)
     return analysis.check()
 
 
 def run(case: Case, progress: Progress | None = None) -> Outcome:
     """Solve the model."""
     result = case.model.solve(
-        case.solver, case.tolerance, progress, error=case.error, engine=case.engine, petsc=case.petsc
+        case.solver, case.tolerance, progress, error=case.error, backend=case.backend, petsc=case.petsc
     )
     return Outcome(case, [], result)

@@ -1,4 +1,4 @@
-"""Engines: what makes and solves the equations, the own solvers of one process or PETSc over many."""
+"""Backends: what makes and solves the equations, our own solvers on one process or PETSc over many."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from kratos_lite.validation import choice
 if TYPE_CHECKING:
     from kratos_lite.solvers.constraint_map import ConstraintMap
 
-ENGINES = ("own", "petsc")
+BACKENDS = ("own", "petsc")
 
 
-def engine_of(engine: str | None, petsc: str | None) -> str:
-    """Return the engine: ``own`` if none is named and no PETSc options are given."""
-    chosen = ("own" if petsc is None else "petsc") if engine is None else engine
-    if choice(chosen, "engine", ENGINES) == "own":
+def backend_of(backend: str | None, petsc: str | None) -> str:
+    """Return the backend: ``own`` if none is named and no PETSc options are given."""
+    chosen = ("own" if petsc is None else "petsc") if backend is None else backend
+    if choice(chosen, "backend", BACKENDS) == "own":
         if petsc is not None:
-            raise InputError("PETSc options are for engine='petsc'; leave them out, or take that engine")
+            raise InputError("PETSc options are for backend='petsc'; leave them out, or take that backend")
         return chosen
     from kratos_lite.distributed.communicator import started
     from kratos_lite.distributed.petsc import parsed
@@ -35,10 +35,10 @@ def engine_of(engine: str | None, petsc: str | None) -> str:
     return chosen
 
 
-def check_own(engine: str | None, petsc: str | None, what: str) -> None:
-    """Raise InputError where another engine is asked for than the own one, which something needs."""
-    if engine_of(engine, petsc) != "own":
-        raise InputError(f"{what} is solved by the own engine alone; leave engine and PETSc options out")
+def check_own(backend: str | None, petsc: str | None, what: str) -> None:
+    """Raise InputError where another backend is asked for than the own one, which something needs."""
+    if backend_of(backend, petsc) != "own":
+        raise InputError(f"{what} is solved by the own backend alone; leave backend and PETSc options out")
 
 
 def system_of(
@@ -48,10 +48,10 @@ def system_of(
     solver: str,
     tolerance: float,
     progress: Progress | None,
-    engine: str,
+    backend: str,
     petsc: str | None,
 ) -> ConstrainedSystem:
-    """Return the constrained system of some elements of a model, for an engine.
+    """Return the constrained system of some elements of a model, for an backend.
 
     Components `held` (n, 3) of what supports leave free are 0, too.
     """
@@ -59,7 +59,7 @@ def system_of(
     def constraints(nodes: Ints) -> ConstraintMap:
         return model.supports.constraint_map(nodes).holding(held[nodes])
 
-    if engine == "own":
+    if backend == "own":
         return ConstrainedSystem(
             model.mesh.points,
             groups,
