@@ -43,7 +43,7 @@ def check_ties(
     """Return a warning of ties of moving to other material along its flow; ModelError if it travels."""
     glued = []
     for constraint in structure.supports.constraints:
-        dofs = np.array([constraint.slave, *constraint.masters])
+        dofs = np.array([constraint.dependent, *constraint.independents])
         nodes, axes = dofs // 3, dofs % 3
         if moving[nodes].all() or not moving[nodes].any():
             continue

@@ -94,9 +94,9 @@ class Translation(Motion):
                 structure.supports.apply(Fixing(None, nodes, "xyz", 0.0, None, False))
         elif self.boundaries == "periodic":
             mesh = structure.mesh
-            slaves, masters = periodic_pairs(mesh, self.direction, self.moving(mesh))
+            dependents, independents = periodic_pairs(mesh, self.direction, self.moving(mesh))
             structure.supports.constraints += tuple(
                 MultiPointConstraint(3 * a + axis, (3 * b + axis,), (1.0,), symmetric=True)
-                for a, b in zip(slaves.tolist(), masters.tolist(), strict=True)
+                for a, b in zip(dependents.tolist(), independents.tolist(), strict=True)
                 for axis in range(3)
             )

@@ -75,9 +75,9 @@ class DirichletConditions:
 
 def dirichlet_conditions(supports: Supports, used: Mask) -> DirichletConditions:
     """Return what supports prescribe; ModelError where their constraints contradict one another."""
-    slaves = supports.slaves()
+    dependents = supports.dependents()
     moved = supports.fixed & (supports.values != 0)
-    moved.flat[[slave for slave, (_, constant) in slaves.items() if constant]] = True
+    moved.flat[[dependent for dependent, (_, constant) in dependents.items() if constant]] = True
     displaced = any_axis(moved)
     at_rest = ~any_axis(~supports.fixed) & ~displaced
     return DirichletConditions(supports.value_version, displaced, at_rest, int(supports.fixed[used].sum()))
@@ -123,7 +123,7 @@ def load_set(
             raise InputError(f"a load such as Gravity or Traction is needed; got {type(load).__name__}")
     mesh, supports = model.mesh, model.supports
     with phase("load"):
-        external = supports.on_masters(external_loads(mesh, state.groups, loads))
+        external = supports.on_independents(external_loads(mesh, state.groups, loads))
         forces = external if state.initial is None else external - state.initial
         checks.check_carried(mesh, forces, state.used)
         pushed = any_axis((forces != 0) & ~supports.fixed)

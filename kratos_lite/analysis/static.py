@@ -233,7 +233,7 @@ class StaticAnalysis:
             if case.moving.any():
                 reactions = system.residual(u, case.forces)
             reactions = model.supports.supported(reactions)
-            inner = model.supports.on_masters(stress_load(model, state.groups, u))
+            inner = model.supports.on_independents(stress_load(model, state.groups, u))
             if state.initial is not None and self.system is not None:
                 rounding = initial_noise(model, self.system.norm, self.tolerance, case.forces)
             else:
@@ -296,7 +296,7 @@ class StaticAnalysis:
         model, state = self.model, self._state
         n_equations = 3 * int(state.used.sum()) - self._dirichlet.count
         return Report(
-            unknowns=n_equations - len(model.supports.slaves()),
+            unknowns=n_equations - len(model.supports.dependents()),
             total_load=case.external.sum(axis=0),
             total_reaction=reactions.sum(axis=0),
             **quality(solution, balance),

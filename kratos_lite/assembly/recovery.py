@@ -170,7 +170,7 @@ def _patches(mesh: Mesh, groups: list[ElementGroup], outer: Ints) -> tuple[Ints,
     if mesh.hanging is not None:
         here = used[mesh.hanging.nodes]
         hanging = number[mesh.hanging.nodes[here]]
-        every = Lists(mesh.hanging.start, mesh.hanging.masters).take(np.flatnonzero(here))
+        every = Lists(mesh.hanging.start, mesh.hanging.independents).take(np.flatnonzero(here))
         kept = used[every.entries]
         leaders = lists(every.owner[kept], number[every.entries[kept]], len(hanging))
     return nodes, patches(blocks, mesh.points[nodes], on_surface[nodes], hanging, leaders)

@@ -118,33 +118,33 @@ def largest_row_sum(K: BlockMatrix, rows: Ints) -> float:
     return largest
 
 
-def transformation(A: Any, slaves: Mapping[int, Mapping[int, float]]) -> Any:
-    """Return T of u = T q, as a matrix of PETSc: 1 on its diagonal, but for the slaves."""
+def transformation(A: Any, dependents: Mapping[int, Mapping[int, float]]) -> Any:
+    """Return T of u = T q, as a matrix of PETSc: 1 on its diagonal, but for the dependents."""
     first, last = A.getOwnershipRange()
     lengths = np.ones(last - first, dtype=np.int32)
-    for row, terms in slaves.items():
+    for row, terms in dependents.items():
         lengths[row - first] = len(terms)
     pointers = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int32)
     columns, weights = np.zeros(pointers[-1], dtype=np.int32), np.ones(pointers[-1])
     plain = np.ones(last - first, dtype=bool)
-    plain[[row - first for row in slaves]] = False
+    plain[[row - first for row in dependents]] = False
     columns[pointers[:-1][plain]] = first + np.flatnonzero(plain)
-    for row, terms in slaves.items():
+    for row, terms in dependents.items():
         at = slice(pointers[row - first], pointers[row - first + 1])
         columns[at], weights[at] = sorted(terms), [terms[one] for one in sorted(terms)]
     size = (A.getSizes()[0], A.getSizes()[1])
     return petsc().Mat().createAIJ(size, bsize=3, csr=(pointers, columns, weights), comm=A.comm)
 
 
-def eliminated(A: Any, T: Any, slaves: Ints) -> Any:
-    """Return T^T A T, with the diagonal of A at the slaves, its own rows; A is destroyed."""
+def eliminated(A: Any, T: Any, dependents: Ints) -> Any:
+    """Return T^T A T, with the diagonal of A at the dependents, its own rows; A is destroyed."""
     PETSc = petsc()
     diagonal = A.getDiagonal()
     first, last = A.getOwnershipRange()
     lengths = np.zeros(last - first, dtype=np.int32)
-    lengths[slaves - first] = 1
+    lengths[dependents - first] = 1
     pointers = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int32)
-    at = np.sort(slaves)
+    at = np.sort(dependents)
     entries = (pointers, at.astype(np.int32), diagonal.getArray()[at - first])
     left = PETSc.Mat().createAIJ(A.getSizes(), bsize=3, csr=entries, comm=A.comm)
     reduced = A.ptap(T)

@@ -46,7 +46,7 @@ class Finer:
     def onto(self, geometry: Mapping[str, Callable[[Array], Array]]) -> Finer:
         """Return the same with the new nodes of parts moved onto the true surfaces.
 
-        Hanging nodes stay on the edges and faces of their masters.
+        Hanging nodes stay on the edges and faces of those they depend on.
         """
         points, old = self.mesh.points.copy(), self.coarse.n_nodes
         for part, function in geometry.items():

@@ -1,7 +1,7 @@
 """Hanging nodes: nodes of small elements that lie inside an edge or face of a larger neighbor.
 
 The field stays continuous if it has there the value that the larger edge or face interpolates:
-u_h = Σ N_a(ξ_h) u_a.  A master may hang itself, on an edge or face that is larger still.
+u_h = Σ N_a(ξ_h) u_a.  An independent node may hang itself, on an edge or face that is larger still.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ class HangingNodes:
     Attributes
     ----------
     nodes : (h,) int, rows of the hanging nodes.
-    start : (h + 1,) int, where the masters of each begin.
-    masters : (k,) int, rows of the nodes of the larger edge or face, corners first.
+    start : (h + 1,) int, where the independents of each begin.
+    independents : (k,) int, rows of the nodes of the larger edge or face, corners first.
     weights : (k,) float, their shape functions at the hanging node.
     around : (h,) int, how many corners the hanging node is in the very middle of, or 0.
     large, small : keys of faces (`kratos_lite.mesh.centers.keys_of`): one large face for each small one.
@@ -37,7 +37,7 @@ class HangingNodes:
 
     nodes: Ints
     start: Ints
-    masters: Ints
+    independents: Ints
     weights: Array
     around: Ints
     large: Keys
@@ -48,56 +48,56 @@ class HangingNodes:
 
     def __iter__(self) -> Iterator[tuple[int, Ints, Array]]:
         for node, first, last in zip(self.nodes.tolist(), self.start, self.start[1:], strict=False):
-            yield node, self.masters[first:last], self.weights[first:last]
+            yield node, self.independents[first:last], self.weights[first:last]
 
     def among(self, nodes: Ints, n_nodes: int) -> HangingNodes:
-        """Return those among some nodes (a,) of all, numbered by these; other masters are left out."""
+        """Return those among some nodes (a,) of all, numbered by these; other independents are left out."""
         if len(nodes) == n_nodes:
             return self
         number = np.full(n_nodes, -1)
         number[nodes] = np.arange(len(nodes))
         owner = np.repeat(np.arange(len(self)), np.diff(self.start))
         there = number[self.nodes] >= 0
-        kept = there[owner] & (number[self.masters] >= 0)
+        kept = there[owner] & (number[self.independents] >= 0)
         counts = np.bincount(owner[kept], minlength=len(self))[there]
         return replace(
             self,
             nodes=number[self.nodes[there]],
             start=np.concatenate([[0], np.cumsum(counts)]),
-            masters=number[self.masters[kept]],
+            independents=number[self.independents[kept]],
             weights=self.weights[kept],
             around=self.around[there],
         )
 
     def interpolate(self, values: Array) -> Array:
-        """Return nodal values (n, ...) in which hanging nodes take what their masters give them."""
+        """Return nodal values (n, ...) in which hanging nodes take what their independents give them."""
         values = values.copy()
         for mine in self._levels(len(values)):
             first, take = self._rows(mine)
             weights = self.weights[take].reshape(-1, *[1] * (values.ndim - 1))
-            values[self.nodes[mine]] = np.add.reduceat(weights * values[self.masters[take]], first)
+            values[self.nodes[mine]] = np.add.reduceat(weights * values[self.independents[take]], first)
         return values
 
     def gather(self, forces: Array) -> Array:
-        """Return nodal forces (n, ...) with those on hanging nodes passed on to their masters."""
+        """Return nodal forces (n, ...) with those on hanging nodes passed on to their independents."""
         forces = forces.copy()
         for mine in reversed(self._levels(len(forces))):
             first, take = self._rows(mine)
             count = np.diff(np.append(first, len(take)))
             weights = self.weights[take].reshape(-1, *[1] * (forces.ndim - 1))
             np.add.at(
-                forces, self.masters[take], weights * np.repeat(forces[self.nodes[mine]], count, axis=0)
+                forces, self.independents[take], weights * np.repeat(forces[self.nodes[mine]], count, axis=0)
             )
             forces[self.nodes[mine]] = 0.0
         return forces
 
     def _levels(self, n: int) -> list[Ints]:
-        """Return the hanging nodes whose masters do not hang, then those that hang on these, and so on."""
+        """Return the hanging nodes that depend on none, then those that hang on these, and so on."""
         owner = np.repeat(np.arange(len(self)), np.diff(self.start))
         hangs, waiting, levels = np.zeros(n, dtype=bool), np.arange(len(self)), []
         hangs[self.nodes] = True
         while len(waiting):
-            held = np.bincount(owner[hangs[self.masters]], minlength=len(self))[waiting] > 0
+            held = np.bincount(owner[hangs[self.independents]], minlength=len(self))[waiting] > 0
             if held.all():
                 raise MeshError("hanging nodes hang on each other in a circle; a mesh has them from `refine`")
             levels.append(waiting[~held])
@@ -106,7 +106,7 @@ class HangingNodes:
         return levels
 
     def _rows(self, mine: Ints) -> tuple[Ints, Ints]:
-        """Return where the masters of some hanging nodes begin, one after the other, and these."""
+        """Return where the independents of some hanging nodes begin, one after the other, and these."""
         count = np.diff(self.start)[mine]
         first = np.cumsum(count) - count
         take = np.repeat(self.start[mine] - first, count) + np.arange(int(count.sum()))
@@ -118,17 +118,17 @@ class _Found:
 
     def __init__(self) -> None:
         self.nodes: list[Ints] = [NO_ROWS]
-        self.masters: list[Ints] = [NO_ROWS]
+        self.independents: list[Ints] = [NO_ROWS]
         self.weights: list[Array] = [NO_WEIGHTS]
         self.counts: list[Ints] = [NO_ROWS]
         self.around: list[Ints] = [NO_ROWS]
 
-    def add(self, nodes: Ints, masters: Ints | Rows, weights: Array, around: int = 0) -> None:
-        """Take up nodes (h,), -1 for none, with masters (h, k) and weights (k,)."""
+    def add(self, nodes: Ints, independents: Ints | Rows, weights: Array, around: int = 0) -> None:
+        """Take up nodes (h,), -1 for none, with independents (h, k) and weights (k,)."""
         there = nodes >= 0
         count = int(there.sum())
         self.nodes.append(nodes[there])
-        self.masters.append(masters[there].ravel().astype(np.int64))
+        self.independents.append(independents[there].ravel().astype(np.int64))
         self.weights.append(np.tile(weights, count))
         self.counts.append(np.full(count, len(weights)))
         self.around.append(np.full(count, around))
@@ -255,7 +255,7 @@ def _gathered(found: _Found, large: list[Keys], small: list[Keys]) -> HangingNod
     every = HangingNodes(
         nodes,
         np.concatenate([[0], np.cumsum(counts)]),
-        np.concatenate(found.masters),
+        np.concatenate(found.independents),
         np.concatenate(found.weights),
         np.concatenate(found.around),
         np.concatenate([none, *large]),
@@ -267,7 +267,7 @@ def _gathered(found: _Found, large: list[Keys], small: list[Keys]) -> HangingNod
         every,
         nodes=nodes[once],
         start=np.append(start, len(take)),
-        masters=every.masters[take],
+        independents=every.independents[take],
         weights=every.weights[take],
         around=every.around[once],
     )
@@ -318,7 +318,7 @@ def known_centers(blocks: Sequence[Block], hanging: HangingNodes | None) -> Cent
     if hanging is not None:
         for around in (2, 4):
             mine = np.flatnonzero(hanging.around == around)
-            corners = hanging.masters[hanging.start[mine][:, None] + np.arange(around)]
+            corners = hanging.independents[hanging.start[mine][:, None] + np.arange(around)]
             centers.add(keys_of(corners), hanging.nodes[mine])
         centers.sort()
     return centers

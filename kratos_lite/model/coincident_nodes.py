@@ -25,7 +25,11 @@ def check_coincident(mesh: Mesh, constraints: Sequence[MultiPointConstraint] = (
     size = max(float(np.ptp(x)) for x in X.T)  # by columns, which is faster
     found = _pairs(X, ids, 1e-8 * size / len(rows) ** (1 / 3))
     if found and constraints:
-        pairs = {frozenset((c.slave // 3, master // 3)) for c in constraints for master in c.masters}
+        pairs = {
+            frozenset((c.dependent // 3, independent // 3))
+            for c in constraints
+            for independent in c.independents
+        }
         tied = {frozenset(mesh.node_ids[list(pair)].tolist()) for pair in pairs}
         found = [pair for pair in found if frozenset(pair) not in tied]
     if not found:

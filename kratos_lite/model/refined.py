@@ -87,7 +87,7 @@ def _carry_constraints(structure: Structure, new: Structure, finer: Finer) -> No
     own = [c for c in structure.supports.constraints if id(c) not in hanging]
     if not own:
         return
-    tied = np.unique([c.slave // 3 for c in own])
+    tied = np.unique([c.dependent // 3 for c in own])
     if len(finer.grown(tied)) > len(tied):
         raise ModelError(
             f"{len(own)} constraints tie nodes of edges that are cut, but not their new nodes; constrain "

@@ -148,16 +148,16 @@ class SupportedSolid(Solid):
 
     def constrain(
         self,
-        slave: tuple[int, str],
-        masters: Mapping[tuple[int, str], float],
+        dependent: tuple[int, str],
+        independents: Mapping[tuple[int, str], float],
         constant: float = 0.0,
     ) -> None:
-        """Tie a degree of freedom to others: u[slave] = Σ weight · u[master] + constant.
+        """Tie a degree of freedom to others: u[dependent] = Σ weight · u[independent] + constant.
 
         Parameters
         ----------
-        slave : (node row, axis letter).
-        masters : weights by (node row, axis letter).
+        dependent : (node row, axis letter).
+        independents : weights by (node row, axis letter).
         constant : m.
 
         Raises
@@ -165,12 +165,14 @@ class SupportedSolid(Solid):
         InputError
             A degree of freedom, weight or constant is invalid.
         """
-        if not isinstance(masters, Mapping):
-            raise InputError(f"masters must map (node row, axis letter) to a weight; got {masters!r}")
-        weights = finite(list(masters.values()), "weights of a constraint").tolist()
+        if not isinstance(independents, Mapping):
+            raise InputError(
+                f"independents must map (node row, axis letter) to a weight; got {independents!r}"
+            )
+        weights = finite(list(independents.values()), "weights of a constraint").tolist()
         offset = float(finite(constant, "the constant of a constraint"))
         constraint = MultiPointConstraint(
-            self._dof(slave), tuple(map(self._dof, masters)), tuple(weights), offset
+            self._dof(dependent), tuple(map(self._dof, independents)), tuple(weights), offset
         )
         self.supports.constraints = (*self.supports.constraints, constraint)
 

@@ -13,8 +13,8 @@ from kratos_lite.mesh import Mesh
 from kratos_lite.model.fixing import AXES, Fixing, PrescribedMotion, Selected, axis_numbers
 from kratos_lite.solvers.constraint_map import (
     ConstraintMap,
+    Dependents,
     MultiPointConstraint,
-    Slaves,
     constraint_map,
     eliminate,
 )
@@ -56,7 +56,7 @@ class Supports:
         self.fixings: list[Fixing] = []
         self.motions: tuple[PrescribedMotion, ...] = ()
         self.version = self.value_version = 0
-        self._slaves: tuple[int, Slaves] = (-1, {})
+        self._dependents: tuple[int, Dependents] = (-1, {})
 
     def name(self, dof: int) -> str:
         """Return the readable name of a degree of freedom, 3·node + axis."""
@@ -65,7 +65,7 @@ class Supports:
     # ---- prescribed displacements ------------------------------------------------------------------------
 
     def apply(self, fixing: Fixing) -> None:
-        """Prescribe or release what a call of `Structure` asks for; hanging nodes follow their masters."""
+        """Prescribe or release what a call of `Structure` asks for; hanging nodes follow others."""
         rows, value = fixing.rows, fixing.value
         if fixing.released:
             self._free(rows, fixing.axes)
@@ -201,18 +201,18 @@ class Supports:
         self.version += 1
         self.value_version += 1
 
-    def slaves(self) -> Slaves:
-        """Return the slaves of all constraints by free degrees of freedom."""
-        if self._slaves[0] != self.value_version:
-            self._slaves = self.value_version, self._eliminated(self.values, agree=True)
-        return self._slaves[1]
+    def dependents(self) -> Dependents:
+        """Return the dependents of all constraints by free degrees of freedom."""
+        if self._dependents[0] != self.value_version:
+            self._dependents = self.value_version, self._eliminated(self.values, agree=True)
+        return self._dependents[1]
 
-    def _eliminated(self, values: Array, agree: bool) -> Slaves:
-        """Return the slaves for some prescribed values; those of symmetric ties must agree if asked for."""
+    def _eliminated(self, values: Array, agree: bool) -> Dependents:
+        """Return the dependents for prescribed values; those of symmetric ties must agree if requested."""
         return eliminate(self._ties(agree), self.fixed, values, self.name)
 
     def _ties(self, agree: bool) -> list[MultiPointConstraint]:
-        """Return the constraints, symmetric ties with a node that supports hold as master.
+        """Return the constraints, symmetric ties with a node that supports hold as independent.
 
         With `agree`, ModelError where supports move both nodes of a tie, and not alike.
         """
@@ -220,15 +220,15 @@ class Supports:
         return [c for c in turned if c]
 
     def _turned(self, tie: MultiPointConstraint, agree: bool) -> MultiPointConstraint | None:
-        """Return a symmetric tie with the node that supports hold as master; None if they hold both alike."""
-        slave, (master,) = tie.slave, tie.masters
-        if not self.fixed.flat[slave]:
+        """Return a symmetric tie, what supports hold as independent; None if they hold both alike."""
+        dependent, (independent,) = tie.dependent, tie.independents
+        if not self.fixed.flat[dependent]:
             return tie
-        if not self.fixed.flat[master]:
-            return MultiPointConstraint(master, (slave,), (1.0,))
-        one, other = self.values.flat[slave], self.values.flat[master]
-        both = f"{self.name(slave)} and {self.name(master)} are tied, but"
-        if agree and self._function(slave) is not self._function(master):
+        if not self.fixed.flat[independent]:
+            return MultiPointConstraint(independent, (dependent,), (1.0,))
+        one, other = self.values.flat[dependent], self.values.flat[independent]
+        both = f"{self.name(dependent)} and {self.name(independent)} are tied, but"
+        if agree and self._function(dependent) is not self._function(independent):
             raise ModelError(f"{both} move differently: give both the same function, or fix only one of them")
         if agree and one != other:
             raise ModelError(
@@ -238,7 +238,9 @@ class Supports:
 
     def check_used(self, used: Mask) -> list[str]:
         """Raise ModelError for constraints of nodes that no element uses, by the mask (n,) of those used."""
-        dofs = np.array([dof for slave, (terms, _) in self.slaves().items() for dof in (slave, *terms)], int)
+        dofs = np.array(
+            [dof for dependent, (terms, _) in self.dependents().items() for dof in (dependent, *terms)], int
+        )
         unused = dofs[~used[dofs // 3]]
         if len(unused):
             raise ModelError(UNUSED.format(self.name(int(unused[0]))))
@@ -249,16 +251,16 @@ class Supports:
     def constraint_map(self, nodes: Ints, values: Array | None = None) -> ConstraintMap:
         """Return the constraint map of the degrees of freedom of some nodes, renumbered in order."""
         fixed, u = self.fixed, self.values if values is None else values
-        slaves = None
+        dependents = None
         if self.constraints:
-            found = self.slaves() if values is None else self._eliminated(values, agree=False)
-            slaves = self._renumbered(found, nodes)
+            found = self.dependents() if values is None else self._eliminated(values, agree=False)
+            dependents = self._renumbered(found, nodes)
         if len(nodes) < len(fixed):
             fixed, u = fixed[nodes], u[nodes]
-        return constraint_map(fixed, u, slaves)
+        return constraint_map(fixed, u, dependents)
 
-    def _renumbered(self, slaves: Slaves, nodes: Ints) -> Slaves:
-        """Return the slaves on some nodes by the degrees of freedom of these."""
+    def _renumbered(self, dependents: Dependents, nodes: Ints) -> Dependents:
+        """Return the dependents on some nodes by the degrees of freedom of these."""
         row = np.full(self.mesh.n_nodes, -1)
         row[nodes] = np.arange(len(nodes))
 
@@ -271,19 +273,19 @@ class Supports:
             return 3 * new + old % 3
 
         return {
-            dof(slave): ({dof(master): weight for master, weight in terms.items()}, constant)
-            for slave, (terms, constant) in slaves.items()
-            if row[slave // 3] >= 0
+            dof(dependent): ({dof(independent): weight for independent, weight in terms.items()}, constant)
+            for dependent, (terms, constant) in dependents.items()
+            if row[dependent // 3] >= 0
         }
 
     def supported(self, residual: Array) -> Array:
         """Return a residual (n, 3) where supports or constraints act, and 0 elsewhere."""
         acts = self.fixed.copy()
-        acts.flat[[dof for c in self.constraints for dof in (c.slave, *c.masters)]] = True
-        return np.where(acts, self.on_masters(residual), 0.0)
+        acts.flat[[dof for c in self.constraints for dof in (c.dependent, *c.independents)]] = True
+        return np.where(acts, self.on_independents(residual), 0.0)
 
-    def on_masters(self, forces: Array) -> Array:
-        """Return nodal forces (n, 3) with those on hanging nodes passed on to their masters."""
+    def on_independents(self, forces: Array) -> Array:
+        """Return nodal forces (n, 3) with those on hanging nodes passed on to their independents."""
         return forces if self.mesh.hanging is None else self.mesh.hanging.gather(forces)
 
     def constraint_rows(self) -> tuple[Ints, Ints, Array]:
@@ -291,8 +293,8 @@ class Supports:
         fixed = np.flatnonzero(self.fixed)
         row, dof, weight = [np.arange(len(fixed))], [fixed], [np.ones(len(fixed))]
         for r, constraint in enumerate(self.constraints, start=len(fixed)):
-            row.append(np.full(1 + len(constraint.masters), r))
-            dof.append(np.array([constraint.slave, *constraint.masters], dtype=np.int64))
+            row.append(np.full(1 + len(constraint.independents), r))
+            dof.append(np.array([constraint.dependent, *constraint.independents], dtype=np.int64))
             weight.append(np.array([1.0, *(-w for w in constraint.weights)]))
         return np.concatenate(row), np.concatenate(dof), np.concatenate(weight)
 
@@ -300,7 +302,9 @@ class Supports:
 def hanging_constraints(mesh: Mesh) -> tuple[MultiPointConstraint, ...]:
     """Return the constraints that keep the displacement continuous at the hanging nodes of a mesh."""
     return tuple(
-        MultiPointConstraint(3 * node + axis, tuple((3 * masters + axis).tolist()), tuple(weights.tolist()))
-        for node, masters, weights in mesh.hanging or ()
+        MultiPointConstraint(
+            3 * node + axis, tuple((3 * independents + axis).tolist()), tuple(weights.tolist())
+        )
+        for node, independents, weights in mesh.hanging or ()
         for axis in range(3)
     )

@@ -318,7 +318,7 @@ def _followers(
     for k in np.unique(counts):
         same = np.flatnonzero(counts == k)
         take = hanging.start[same][:, None] + np.arange(k)
-        yield hanging.nodes[same], hanging.masters[take], hanging.weights[take]
+        yield hanging.nodes[same], hanging.independents[take], hanging.weights[take]
     for group in groups:
         shape = group.element.shape
         around = () if _is_linear(shape) else surroundings(shape)

@@ -19,19 +19,19 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
     from scipy.sparse import csr_array
 
-Slaves: TypeAlias = "dict[int, tuple[dict[int, float], float]]"
-"""For each slave the weights of free degrees of freedom, and a constant."""
+Dependents: TypeAlias = "dict[int, tuple[dict[int, float], float]]"
+"""For each dependent the weights of free degrees of freedom, and a constant."""
 
 
 @dataclass(frozen=True)
 class MultiPointConstraint:
-    """One linear multi-point constraint: u[slave] = Σ weights · u[masters] + constant (dofs)."""
+    """One linear multi-point constraint: u[dependent] = Σ weights · u[independents] + constant (dofs)."""
 
-    slave: int
-    masters: tuple[int, ...]
+    dependent: int
+    independents: tuple[int, ...]
     weights: tuple[float, ...]
     constant: float = 0.0
-    symmetric: bool = False  # a tie: where supports hold the slave, the master follows
+    symmetric: bool = False  # a tie: where supports hold the dependent, the independent follows
 
 
 @dataclass(eq=False)
@@ -59,7 +59,7 @@ class ConstraintMap:
         return u
 
     def transform_matrix(self) -> csr_array[Any, Any]:
-        """Return T (N, q) as a sparse matrix, whether or not there are slaves."""
+        """Return T (N, q) as a sparse matrix, whether or not there are dependents."""
         from scipy.sparse import csr_array
 
         if self.T is not None:
@@ -84,28 +84,28 @@ class ConstraintMap:
         return A if len(self.free) == A.shape[0] else A[self.free][:, self.free]
 
 
-def constraint_map(fixed: Mask, values: Array, slaves: Slaves | None = None) -> ConstraintMap:
-    """Return the map of nodes with prescribed displacements and slaves.
+def constraint_map(fixed: Mask, values: Array, dependents: Dependents | None = None) -> ConstraintMap:
+    """Return the map of nodes with prescribed displacements and dependents.
 
     Where all supports displace the nodes alike along an axis, c carries the free ones along: what remains to
     be solved for is the strain alone, and its error does not grow with the displacement.
     """
     constrained, c = fixed.ravel(), values.ravel() * fixed.ravel()
-    if slaves is None:
+    if dependents is None:
         for axis in range(3):
             at_axis, along = constrained[axis::3], c[axis::3]
             if at_axis.any() and np.ptp(along[at_axis]) == 0 and along[at_axis][0] != 0:
                 along[:] = along[at_axis][0]
         return ConstraintMap(np.flatnonzero(~constrained), c)
     is_free = ~constrained
-    is_free[list(slaves)] = False
+    is_free[list(dependents)] = False
     free = np.flatnonzero(is_free)
     column = np.full(len(constrained), -1)
     column[free] = np.arange(len(free))
     rows, columns, weights = [free], [column[free]], [np.ones(len(free))]
-    for slave, (terms, constant) in sorted(slaves.items()):
-        c[slave] = constant
-        rows.append(np.full(len(terms), slave))
+    for dependent, (terms, constant) in sorted(dependents.items()):
+        c[dependent] = constant
+        rows.append(np.full(len(terms), dependent))
         columns.append(column[list(terms)])
         weights.append(np.array(list(terms.values()), dtype=float))
     from scipy.sparse import csr_array
@@ -116,45 +116,47 @@ def constraint_map(fixed: Mask, values: Array, slaves: Slaves | None = None) -> 
 
 def eliminate(
     constraints: Iterable[MultiPointConstraint], fixed: Mask, values: Array, name: Callable[[int], str]
-) -> Slaves:
+) -> Dependents:
     """Express every dependent dof by free ones; ModelError for cycles and dofs constrained twice."""
-    by_slave: dict[int, MultiPointConstraint] = {}
+    by_dependent: dict[int, MultiPointConstraint] = {}
     for constraint in constraints:
-        slave = constraint.slave
-        if slave in by_slave:
-            raise ModelError(f"{name(slave)} is the slave of two constraints; remove one of them")
-        if fixed.flat[slave]:
-            raise ModelError(f"{name(slave)} is both fixed and the slave of a constraint; do one of the two")
-        by_slave[slave] = constraint
-    done: Slaves = {}
-    for start in by_slave:
+        dependent = constraint.dependent
+        if dependent in by_dependent:
+            raise ModelError(f"{name(dependent)} depends on others by two constraints; remove one of them")
+        if fixed.flat[dependent]:
+            raise ModelError(
+                f"{name(dependent)} is both fixed and dependent by a constraint; do one of the two"
+            )
+        by_dependent[dependent] = constraint
+    done: Dependents = {}
+    for start in by_dependent:
         stack, open_ = [start], set()  # no recursion: chains of constraints may be long
         while stack:
-            slave = stack[-1]
-            waiting = [m for m in by_slave[slave].masters if m in by_slave and m not in done]
-            if slave in done or not waiting:
+            dependent = stack[-1]
+            waiting = [m for m in by_dependent[dependent].independents if m in by_dependent and m not in done]
+            if dependent in done or not waiting:
                 stack.pop()
-                open_.discard(slave)
-                done.setdefault(slave, _substitute(by_slave[slave], done, fixed, values))
-            elif slave in open_:
-                raise ModelError(f"the constraints of {name(slave)} form a cycle; remove one of them")
+                open_.discard(dependent)
+                done.setdefault(dependent, _substitute(by_dependent[dependent], done, fixed, values))
+            elif dependent in open_:
+                raise ModelError(f"the constraints of {name(dependent)} form a cycle; remove one of them")
             else:
-                open_.add(slave)
+                open_.add(dependent)
                 stack += waiting
     return done
 
 
 def _substitute(
-    constraint: MultiPointConstraint, done: Slaves, fixed: Mask, values: Array
+    constraint: MultiPointConstraint, done: Dependents, fixed: Mask, values: Array
 ) -> tuple[dict[int, float], float]:
-    """Return the weights of free masters and the constant of a constraint."""
+    """Return the weights of free independents and the constant of a constraint."""
     terms: dict[int, float] = {}
     constant = constraint.constant
-    for master, weight in zip(constraint.masters, constraint.weights, strict=True):
-        if fixed.flat[master]:
-            constant += weight * values.flat[master]
+    for independent, weight in zip(constraint.independents, constraint.weights, strict=True):
+        if fixed.flat[independent]:
+            constant += weight * values.flat[independent]
             continue
-        inner, offset = done.get(master, ({master: 1.0}, 0.0))
+        inner, offset = done.get(independent, ({independent: 1.0}, 0.0))
         constant += weight * offset
         for dof, factor in inner.items():
             terms[dof] = terms.get(dof, 0.0) + weight * factor

@@ -21,10 +21,10 @@ def antiplane(wheels, element, radial, around):
     bottom = mesh.nodes("z-")
     place = {tuple(np.round(mesh.points[i, :2], 9)): int(i) for i in bottom}
     for i in np.setdiff1d(np.arange(mesh.n_nodes), bottom):
-        master = place.get(tuple(np.round(mesh.points[i, :2], 9)))
-        assert master is not None
+        independent = place.get(tuple(np.round(mesh.points[i, :2], 9)))
+        assert independent is not None
         if not model.supports.fixed[i, 2]:
-            model.constrain((int(i), "z"), {(master, "z"): 1.0})
+            model.constrain((int(i), "z"), {(independent, "z"): 1.0})
     return model
 
 

@@ -161,9 +161,9 @@ def test_bodies_apart_balance_each_for_itself():
 def test_bodies_that_constraints_tie_balance_as_one(solver):
     model, n = bars()
     left, right = (model.mesh.nodes(where) for where in ends(4, 3))
-    for slave, master in zip(left.tolist(), right.tolist(), strict=True):
+    for dependent, independent in zip(left.tolist(), right.tolist(), strict=True):
         for axis in "xyz":
-            model.constrain((slave, axis), {(master, axis): 1.0})
+            model.constrain((dependent, axis), {(independent, axis): 1.0})
     pull(model, 1e6, ends(0, 7))
     result = model.solve(solver)
     near(result.stress("element"), np.tile([1e6, 0, 0, 0, 0, 0], (24, 1)))
@@ -182,9 +182,9 @@ def test_bodies_that_constraints_tie_balance_as_one(solver):
 def test_a_periodic_cell_needs_no_support():
     model = bar((3, 2, 1))
     left, right = (model.mesh.nodes(side) for side in ("x-", "x+"))
-    for master, slave in zip(left.tolist(), right.tolist(), strict=True):
+    for independent, dependent in zip(left.tolist(), right.tolist(), strict=True):
         for axis, jump in zip("xyz", (3e-3, 0.0, 0.0), strict=True):
-            model.constrain((slave, axis), {(master, axis): 1.0}, jump)
+            model.constrain((dependent, axis), {(independent, axis): 1.0}, jump)
     result = model.solve()
     near(result.u, stretched(model.mesh.points, 1e-3))
     assert "translation x, y, z; rotation about x;" in result.report.notes[0]

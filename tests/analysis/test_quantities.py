@@ -302,7 +302,7 @@ def test_prestress_and_prescribed_values_are_no_part_of_the_adjoint():
 
 
 def test_hanging_nodes_of_a_support_belong_to_its_reaction():
-    """A fine bar beside a coarse one on the same support: slaves there follow nodes that are held."""
+    """A fine bar beside a coarse one on the same support: dependents there follow nodes that are held."""
     model = pulled_bar()
     held = model.solve().error(of=kl.ReactionOf("x+", "x"))
     tied = kl.Model(model.mesh, kl.Isotropic3D(E=1e3, nu=0.3))

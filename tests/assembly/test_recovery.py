@@ -260,8 +260,8 @@ def test_weights_in_wide_patches_fall_with_the_distance():
 def test_hanging_nodes_take_the_patches_of_their_masters():
     mesh = kl.box(cells=(2, 1, 1))
     none = np.zeros(mesh.n_nodes, dtype=bool)
-    masters = lists(np.array([0, 0]), np.array([1, 2]), 1)
-    found = patches(mesh.blocks, mesh.points, none, np.array([0]), masters)
+    independents = lists(np.array([0, 0]), np.array([1, 2]), 1)
+    found = patches(mesh.blocks, mesh.points, none, np.array([0]), independents)
     assert found.of.lengths[0] == 2
     assert len(found.elements) == mesh.n_nodes - 1
 

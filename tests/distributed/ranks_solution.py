@@ -78,8 +78,10 @@ def initial(mesh):
 def tied(mesh):
     """A chain of constraints through the body, and one with weights."""
     model = clamped(mesh)
-    for (slave, axis), masters, constant in CHAIN:
-        model.constrain((slave - 1, axis), {(node - 1, a): w for (node, a), w in masters.items()}, constant)
+    for (dependent, axis), independents, constant in CHAIN:
+        model.constrain(
+            (dependent - 1, axis), {(node - 1, a): w for (node, a), w in independents.items()}, constant
+        )
     return model
 
 
@@ -130,7 +132,7 @@ def nearly_incompressible(mesh):
 
 
 def tied_to_supports(mesh):
-    """Masters that are prescribed, of which one moves."""
+    """Independents that are prescribed, of which one moves."""
     model = clamped(mesh)
     model.fix(lambda x: (x[:, 0] == 1) & (x[:, 2] > 0), "y", 1e-3)
     top, side = model.mesh.nodes("z+"), model.mesh.nodes("x+")

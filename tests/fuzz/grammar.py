@@ -69,8 +69,8 @@ def mdpa(rng: Random) -> bytes:
         fixed = rng.choice((1, 1, 1, 0))
         blocks.append((f"NodalData {name}", [f"{i} {fixed} {number(rng)}" for i in held]))
     if rng.random() < 0.3:
-        weights, masters = [number(rng) for _ in range(2)], [rng.choice(ids) for _ in range(3)]
-        row = f"1 {number(rng)} [{', '.join(weights)}] {' '.join(masters)}"
+        weights, independents = [number(rng) for _ in range(2)], [rng.choice(ids) for _ in range(3)]
+        row = f"1 {number(rng)} [{', '.join(weights)}] {' '.join(independents)}"
         blocks.append(("Constraints LinearMasterSlaveConstraint DISPLACEMENT_X", [row]))
     if rng.random() < 0.4:
         conditions = [f"1 1 {' '.join(rng.choice(ids) for _ in range(3))}", f"2 1 {' '.join(ids[:3])}"]

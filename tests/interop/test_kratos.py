@@ -418,8 +418,10 @@ def hanging(links):
     model.fix("z-")
     model.add(GRAVITY)
     top = model.mesh.nodes("z+").tolist()
-    for (slave, axis), masters, constant in links:
-        model.constrain((top[slave], axis), {(top[i], a): w for (i, a), w in masters.items()}, constant)
+    for (dependent, axis), independents, constant in links:
+        model.constrain(
+            (top[dependent], axis), {(top[i], a): w for (i, a), w in independents.items()}, constant
+        )
     return model
 
 
@@ -440,7 +442,7 @@ def test_multi_point_constraints_are_those_of_kratos(tmp_path):
 
 
 def test_kratos_shifts_the_directions_of_constraints_that_mix_them(tmp_path):
-    """A known fault of its reader: the first master gets the direction of the slave, and so on.
+    """A known fault of its reader: the first independent gets the direction of the dependent, and so on.
 
     We read such a file as it is written; the numbers of Kratos come out of the shifted directions.
     """

@@ -38,9 +38,9 @@ def model_of(problem):
     add_loads(model, problem)
     for dof, value in problem.fixed.items():
         model.fix([dof // 3], "xyz"[dof % 3], value)
-    for slave, masters, constant in problem.links:
-        weights = {(dof // 3, "xyz"[dof % 3]): weight for dof, weight in masters.items()}
-        model.constrain((slave // 3, "xyz"[slave % 3]), weights, constant)
+    for dependent, independents, constant in problem.links:
+        weights = {(dof // 3, "xyz"[dof % 3]): weight for dof, weight in independents.items()}
+        model.constrain((dependent // 3, "xyz"[dependent % 3]), weights, constant)
     if problem.prestress is not None:
         model.add_prestress(problem.prestress)
     if problem.stress_free is not None:
@@ -103,7 +103,10 @@ def statics(problem, K, f):
     """Return differences of displacements, reactions, stresses and energy."""
     result = model_of(problem).solve()
     u, residual = solid.solve(problem, K, f)
-    held = [*problem.fixed, *(dof for slave, masters, _ in problem.links for dof in (slave, *masters))]
+    held = [
+        *problem.fixed,
+        *(dof for dependent, independents, _ in problem.links for dof in (dependent, *independents)),
+    ]
     reactions = np.zeros(len(u))
     reactions[held] = residual[held]
     force = np.abs(K).max() * np.abs(u).max(initial=0.0)

@@ -213,7 +213,7 @@ def add_supports(problem, rng):
     free = [dof for dof in range(3 * n) if dof not in problem.fixed]
     rng.shuffle(free)
     while rng.random() < 0.4 and len(free) > 6:
-        slave, *masters = (int(free.pop()) for _ in range(int(rng.integers(2, 4))))
-        weights = rng.uniform(0.3, 1.5, len(masters)) * rng.choice([-1, 1], len(masters))
+        dependent, *independents = (int(free.pop()) for _ in range(int(rng.integers(2, 4))))
+        weights = rng.uniform(0.3, 1.5, len(independents)) * rng.choice([-1, 1], len(independents))
         constant = float(moved * 1e-3 * rng.uniform(-1, 1))
-        problem.links.append((slave, dict(zip(masters, weights.tolist(), strict=True)), constant))
+        problem.links.append((dependent, dict(zip(independents, weights.tolist(), strict=True)), constant))

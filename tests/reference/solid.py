@@ -15,8 +15,9 @@ PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
 class Problem:
     """A model: points (n, 3), cells (kind, nodes, material), and what acts on it.
 
-    `materials` are (C (6, 6), density, constants); `fixed` gives displacements by dof, `links` are (slave,
-    {master: weight}, constant); loads on faces stand by tuples of nodes, counter-clockwise from outside.
+    `materials` are (C (6, 6), density, constants); `fixed` gives displacements by dof, `links` are
+    (dependent, {independent: weight}, constant); loads on faces stand by tuples of nodes, counter-clockwise
+    from outside.
     """
 
     points: np.ndarray
@@ -142,8 +143,8 @@ def constraints(problem):
     for dof, value in problem.fixed.items():
         rows.append({dof: 1.0})
         values.append(value)
-    for slave, masters, constant in problem.links:
-        rows.append({slave: 1.0} | {dof: -weight for dof, weight in masters.items()})
+    for dependent, independents, constant in problem.links:
+        rows.append({dependent: 1.0} | {dof: -weight for dof, weight in independents.items()})
         values.append(constant)
     A = np.zeros((len(rows), problem.points.size))
     for r, row in enumerate(rows):

@@ -54,8 +54,8 @@ WRONG = {
     "link float": (lambda: model().constrain((1.5, "x"), {TOP: 1.0}), "a degree of freedom is"),
     "link axis": (lambda: model().constrain((1, "xy"), {TOP: 1.0}), "a degree of freedom is"),
     "link axis number": (lambda: model().constrain((1, 0), {TOP: 1.0}), "a degree of freedom is"),
-    "link master": (lambda: model().constrain((1, "x"), {7: 1.0}), "a degree of freedom is"),
-    "link masters": (lambda: model().constrain((1, "x"), [TOP]), "masters must map"),
+    "link independent": (lambda: model().constrain((1, "x"), {7: 1.0}), "a degree of freedom is"),
+    "link independents": (lambda: model().constrain((1, "x"), [TOP]), "independents must map"),
     "link weight": (
         lambda: model().constrain((1, "x"), {TOP: "a"}),
         "weights of a constraint must be made of real",

@@ -25,7 +25,7 @@ def refuse(model, equations):
     """Have a change of the constraints refused, and take it back."""
     model.constrain((13, "x"), {(14, "x"): 1.0})
     model.constrain((13, "x"), {(12, "x"): 1.0})
-    with pytest.raises(kl.ModelError, match="slave of two constraints"):
+    with pytest.raises(kl.ModelError, match="depends on others by two constraints"):
         equations.solve()
     model.supports.constraints = model.supports.constraints[:-2]
 

@@ -149,10 +149,10 @@ def periodic(axes="xyz", cells=(4, 3, 3)):
     model.add(kl.Gravity((1.0, 2.0, -9.81)))
     X = mesh.points
     low, high = (np.flatnonzero((X[:, 1] == y) & (X[:, 2] > 0)) for y in (0.0, 3.0))
-    for slave in high:
-        master = low[np.abs(X[low] - X[slave] * [1, 0, 1]).max(axis=1).argmin()]
+    for dependent in high:
+        independent = low[np.abs(X[low] - X[dependent] * [1, 0, 1]).max(axis=1).argmin()]
         for axis in axes:
-            model.constrain((int(slave), axis), {(int(master), axis): 1.0})
+            model.constrain((int(dependent), axis), {(int(independent), axis): 1.0})
     return model
 
 
@@ -195,8 +195,8 @@ def test_a_level_under_ties_moves_rigidly():
     shape = (model.mesh.n_nodes, len(level.nodes))
     P = csr_array((kept.weights, kept.indices, kept.indptr), shape=shape)
     ones = np.ones(P.shape[1])
-    slaves = np.flatnonzero(model.mesh.points[level.nodes][:, 1] == 3.0)
+    dependents = np.flatnonzero(model.mesh.points[level.nodes][:, 1] == 3.0)
     np.testing.assert_allclose(P @ ones, 1.0, rtol=0, atol=1e-14)
     assert abs(kept.K @ np.tile([1.0, 0.0, 0.0], len(ones))).max() < 1e-9 * kept.K.norm()
-    held = slaves[model.mesh.points[level.nodes][slaves][:, 2] > 0]
-    assert np.abs(P[:, held]).sum() == 0  # their unknowns are those of their masters
+    held = dependents[model.mesh.points[level.nodes][dependents][:, 2] > 0]
+    assert np.abs(P[:, held]).sum() == 0  # their unknowns are those of those they depend on

@@ -107,33 +107,33 @@ def periodic(kind="8N"):
     points = model.mesh.points
     sides = [model.mesh.nodes(side) for side in ("x-", "x+")]
     left, right = (rows[np.lexsort(points[rows, 1:].round(9).T)] for rows in sides)
-    for master, slave in zip(left, right, strict=True):
-        if points[slave, 2] > 0:
+    for independent, dependent in zip(left, right, strict=True):
+        if points[dependent, 2] > 0:
             for axis in "xyz":
                 offset = 1e-3 if axis == "x" else 0.0
-                model.constrain((int(slave), axis), {(int(master), axis): 1.0}, offset)
+                model.constrain((int(dependent), axis), {(int(independent), axis): 1.0}, offset)
     model.add(GRAVITY)
     return model
 
 
 def stiff_end(kind="8N", held=False):
-    """Return a beam whose end moves as one; one of its masters may be prescribed."""
+    """Return a beam whose end moves as one; one of its independents may be prescribed."""
     model = clamped(box(kind=kind))
     first, *others = model.mesh.nodes("x+").tolist()
     if held:
         model.fix(np.array([first]), "x", 1e-4)
-    for slave in others:
-        model.constrain((slave, "x"), {(first, "x"): 1.0})
-        model.constrain((slave, "y"), {(first, "y"): 1.0, (first, "z"): 0.5})
+    for dependent in others:
+        model.constrain((dependent, "x"), {(first, "x"): 1.0})
+        model.constrain((dependent, "y"), {(first, "y"): 1.0, (first, "z"): 0.5})
     return model
 
 
 def two_masters():
     model = clamped(box())
     nodes = model.mesh.nodes("x+").tolist()
-    for slave in nodes[1:-1:3]:
+    for dependent in nodes[1:-1:3]:
         for axis in "xyz":
-            model.constrain((slave, axis), {(nodes[0], axis): 0.5, (nodes[-1], axis): 0.5})
+            model.constrain((dependent, axis), {(nodes[0], axis): 0.5, (nodes[-1], axis): 0.5})
     return model
 
 
@@ -204,9 +204,9 @@ MODELS = {
     "periodic, quadratic": lambda: periodic("20N"),
     "end that moves as one": stiff_end,
     "end that moves as one, quadratic": lambda: stiff_end("20N"),
-    "master that is held": lambda: stiff_end(held=True),
-    "master that is held, quadratic": lambda: stiff_end("10N", held=True),
-    "slaves of two masters": two_masters,
+    "independent that is held": lambda: stiff_end(held=True),
+    "independent that is held, quadratic": lambda: stiff_end("10N", held=True),
+    "dependents of two independents": two_masters,
     "partly fixed": partly_fixed,
     "prescribed": prescribed,
     "contrast": lambda: contrast(1e6),

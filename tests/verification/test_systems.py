@@ -152,7 +152,7 @@ def test_a_change_that_breaks_the_model_is_found():
     ready.solve()
     model.supports.constraints = [MultiPointConstraint(0, (3,), (1.0,))]
     for _ in range(2):  # it stays broken
-        with pytest.raises(kl.ModelError, match="both fixed and the slave"):
+        with pytest.raises(kl.ModelError, match="both fixed and the dependent"):
             ready.solve()
     model.supports.constraints = ()
     np.testing.assert_array_equal(ready.solve().u, model.solve().u)
@@ -220,7 +220,7 @@ def test_equations_alone_reduce_expand_and_multiply(solver):
     close(one.internal_load(u), one.residual(u, np.zeros_like(u)))
     f = rng.standard_normal(u.shape)
     f[-1] = 0.0
-    one_by_one = f.copy()  # T^T f: the slave hands its force to its master
+    one_by_one = f.copy()  # T^T f: the dependent hands its force to its independent
     one_by_one[34, 1] += 0.5 * f[35, 1]
     free = ~supports.fixed[:-1].ravel()
     free[3 * 35 + 1] = False

@@ -174,6 +174,6 @@ def constraints_of(mesh: Mesh, constraints: Iterable[MultiPointConstraint]) -> l
         return int(mesh.node_ids[number // 3]), f"DISPLACEMENT_{'XYZ'[number % 3]}"
 
     return [
-        Constraint(i, dof(each.slave), tuple(map(dof, each.masters)), each.weights, each.constant)
+        Constraint(i, dof(each.dependent), tuple(map(dof, each.independents)), each.weights, each.constant)
         for i, each in enumerate(constraints, start=1)
     ]

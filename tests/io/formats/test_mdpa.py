@@ -411,16 +411,18 @@ def test_free_data_on_missing_nodes_and_elements_is_noted(read):
 
 
 @pytest.mark.parametrize(
-    ("header", "masters"),
+    ("header", "independents"),
     [("", "XX"), (" DISPLACEMENT_Y", "YY"), (" DISPLACEMENT_Y DISPLACEMENT_Z", "YZ")],
 )
-def test_constraint_variables_follow_the_header(read, header, masters):
+def test_constraint_variables_follow_the_header(read, header, independents):
     header = f"LinearMasterSlaveConstraint DISPLACEMENT_X{header}"
     text = f"Begin Constraints {header}\n4 0.5 [0.5, 0.25] 1 2 3\nEnd Constraints\n"
     (constraint,) = read(NODES + text).constraints
     assert (constraint.id, constraint.constant, constraint.weights) == (4, 0.5, (0.5, 0.25))
     assert constraint.dependent == (1, "DISPLACEMENT_X")
-    assert constraint.independents == tuple((i + 2, f"DISPLACEMENT_{axis}") for i, axis in enumerate(masters))
+    assert constraint.independents == tuple(
+        (i + 2, f"DISPLACEMENT_{axis}") for i, axis in enumerate(independents)
+    )
 
 
 @pytest.mark.parametrize(

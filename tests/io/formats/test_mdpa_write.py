@@ -58,8 +58,8 @@ print("RESULT" + json.dumps({
     "parts": {p.FullName(): [sorted(n.Id for n in p.Nodes), sorted(e.Id for e in p.Elements)]
               for top in part.SubModelParts for p in [top, *top.SubModelParts]},
     "weights": [A[0, 0], A[0, 1]], "constant": b[0],
-    "slave": [d.Id() for d in constraint.GetSlaveDofsVector()],
-    "masters": [d.Id() for d in constraint.GetMasterDofsVector()],
+    "dependent": [d.Id() for d in constraint.GetSlaveDofsVector()],
+    "independents": [d.Id() for d in constraint.GetMasterDofsVector()],
 }))
 """
 
@@ -249,7 +249,7 @@ def test_kratos_itself_reads_the_same(tmp_path):
         "main.all.top": [[8, 50], []],
     }
     assert (found["weights"], found["constant"]) == ([0.1, 1 / 3], 0.7)
-    assert (found["slave"], found["masters"]) == ([8], [9, 17])
+    assert (found["dependent"], found["independents"]) == ([8], [9, 17])
 
 
 def test_elements_without_a_formulation_are_written_as_plain_ones_with_a_note(tmp_path):

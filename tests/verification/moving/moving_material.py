@@ -132,11 +132,11 @@ def antiplane(kind: str) -> Model:
     model = Model(mesh, SOIL)
     model.fix(np.arange(mesh.n_nodes), "xy")
     model.fix("inner", "z")
-    masters = {tuple(np.round(mesh.points[i, :2], 9)): int(i) for i in mesh.nodes("z-")}
+    independents = {tuple(np.round(mesh.points[i, :2], 9)): int(i) for i in mesh.nodes("z-")}
     for i in np.setdiff1d(np.arange(mesh.n_nodes), mesh.nodes("z-")):
-        master = masters[tuple(np.round(mesh.points[i, :2], 9))]
+        independent = independents[tuple(np.round(mesh.points[i, :2], 9))]
         if not model.supports.fixed[i, 2]:
-            model.constrain((int(i), "z"), {(master, "z"): 1.0})
+            model.constrain((int(i), "z"), {(independent, "z"): 1.0})
     model.add(Rotation("z", rate=RATE))
     return model
 
