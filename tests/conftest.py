@@ -9,8 +9,8 @@ from scenes import SHARED
 
 from kratos_lite.cli import main
 
-collect_ignore = ["interop/kratos_driver.py", "interop/kratos_parts_driver.py"]
-"""Scripts that tests run in other processes."""
+collect_ignore = ["interop/kratos_driver.py", "interop/kratos_parts_driver.py", "fixtures/bad"]
+"""Scripts that tests run, and those that must fail."""
 
 
 signal.signal(

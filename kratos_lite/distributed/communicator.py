@@ -186,8 +186,13 @@ class Ranks(Alone):
     def run(self, task: Callable[..., T], *arguments: Any, each: Callable[[int], Any] | None = None) -> T:
         """Call task(ranks, *arguments) on all ranks, and return what it returns here, on rank 0."""
         for rank in range(1, self.size):
-            given = arguments if each is None else (*arguments, each(rank))
-            self.comm.send(self._message(task, given), dest=rank)
+            try:
+                given = arguments if each is None else (*arguments, each(rank))
+                self.comm.send(self._message(task, given), dest=rank)
+            except BaseException as error:
+                if rank > 1:  # those before wait for the others
+                    self.abort(error)
+                raise
         return self._do(lambda: (task, arguments if each is None else (*arguments, each(0))))
 
     def _message(self, task: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:
