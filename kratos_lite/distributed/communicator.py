@@ -172,11 +172,10 @@ class Ranks(Alone):
 
     def abort(self, error: BaseException) -> None:
         """End all ranks, of which others may wait for this one, and say why."""
-        known = isinstance(error, KratosLiteError)
-        text = "interrupted" if isinstance(error, KeyboardInterrupt) else f"{error}"
-        text = text if known or isinstance(error, KeyboardInterrupt) else f"{type(error).__name__}: {text}"
+        text = str(error) if isinstance(error, KratosLiteError) else f"{type(error).__name__}: {error}"
         LOG.debug("%s", "".join(traceback.format_exception(error)))
-        if sys.__stderr__ is not None:
+        # a signal comes from mpirun, which says so, or ends this rank since another has said its error
+        if sys.__stderr__ is not None and not isinstance(error, KeyboardInterrupt):
             sys.__stderr__.write(f"error: rank {self.rank}: {text}\n")
             sys.__stderr__.flush()
         self.comm.Abort(2)
