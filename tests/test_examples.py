@@ -1,6 +1,7 @@
 """Every example runs as a script and prints the numbers that are known."""
 
 import json
+import logging
 import re
 import runpy
 import sys
@@ -25,7 +26,8 @@ def script(capsys, monkeypatch, tmp_path):
 
     monkeypatch.setenv("MPLBACKEND", "agg")
     monkeypatch.chdir(tmp_path)
-    return call
+    yield call
+    logging.getLogger("kratos_lite").setLevel(logging.NOTSET)
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ materials with a stress of their own, which are computed by their methods in cac
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ import numpy as np
 from kratos_lite import voigt
 from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, as_double, by_mass_rule, compiled
 from kratos_lite.elements import KinematicLinear, custom
+from kratos_lite.elements.tables import tabulate
 from kratos_lite.typing import Array, Ints, Mask, Rows
 
 
@@ -75,6 +76,23 @@ def body_force(points: Array, group: ElementGroup, b: Array) -> Array:
     for chunk in () if module else group.chunks():
         nodes = group.nodes[chunk]
         add_nodal(total, nodes, group.at(points, chunk).body_force(b[nodes] if nodal else b))
+    return total
+
+
+def body_force_by_function(
+    points: Array, group: ElementGroup, b: Callable[[Array], Array], factors: int
+) -> Array:
+    """Return ∫ N b dV of a group as nodal forces (n, 3) in N; b of places (m, 3) gives (m, 3) in N/m³.
+
+    b is taken at the points of a rule that is exact for `factors` shape functions.
+    """
+    total = np.zeros_like(points)
+    for part in by_mass_rule(points, group, factors):
+        N, _ = tabulate(part.element.shape, part.rule)
+        for chunk in part.chunks():
+            nodes, dV = part.nodes[chunk], part.at(points, chunk).dV
+            X = N @ points[nodes]
+            add_nodal(total, nodes, N.T @ (b(X.reshape(-1, 3)).reshape(X.shape) * dV[..., None]))
     return total
 
 

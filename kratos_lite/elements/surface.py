@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,10 +16,14 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 
-def face_rule(shape: type[Shape]) -> Rule:
-    """Return the rule for loads on a face or line, exact for N N times area (plane) or normal."""
+FUNCTION = 5
+"""Factors of the rule for a load by a function: N, and a polynomial of degree p + 2 on curved faces."""
+
+
+def face_rule(shape: type[Shape], factors: int = 2) -> Rule:
+    """Return the rule for loads on a face or line, exact for so many N times area (plane) or normal."""
     p = shape.degree
-    return rule_for(shape.cell, max(4 * p - (2 if shape.cell == "triangle" else 1), 0))
+    return rule_for(shape.cell, max((factors + 2) * p - (2 if shape.cell == "triangle" else 1), 0))
 
 
 def area_vectors(shape: type[Shape], X: ArrayLike, rule: Rule | None = None) -> Array:
@@ -29,10 +34,15 @@ def area_vectors(shape: type[Shape], X: ArrayLike, rule: Rule | None = None) -> 
     return np.cross(tangents[..., 0, :], tangents[..., 1, :]) * rule.weights[:, None]
 
 
-def surface_load(shape: type[Shape], X: ArrayLike, traction: ArrayLike) -> Array:
-    """Return ∫ N t dA, ∫ N t ds or t (..., k, 3) in N of faces, lines or points; t constant or nodal."""
-    X, t = np.asarray(X, dtype=float), np.asarray(traction, dtype=float)
-    rule = face_rule(shape)
+def surface_load(
+    shape: type[Shape], X: ArrayLike, traction: ArrayLike | Callable[[Array], Array], factors: int = FUNCTION
+) -> Array:
+    """Return ∫ N t dA, ∫ N t ds or t (..., k, 3) in N of faces, lines or points.
+
+    t is constant, nodal, or a function of places (..., g, 3), taken at the points of the rule of `factors`.
+    """
+    X = np.asarray(X, dtype=float)
+    rule = face_rule(shape, factors if callable(traction) else 2)
     N, dN = tabulate(shape, rule)
     if shape.cell == "point":
         measure = np.ones((*X.shape[:-2], 1))
@@ -41,6 +51,9 @@ def surface_load(shape: type[Shape], X: ArrayLike, traction: ArrayLike) -> Array
         measure = np.linalg.norm(tangents[..., 0, :], axis=-1) * rule.weights
     else:
         measure = np.linalg.norm(area_vectors(shape, X, rule), axis=-1)
+    if callable(traction):
+        return N.T @ (measure[..., None] * traction(N @ X))
+    t = np.asarray(traction, dtype=float)
     if t.ndim == X.ndim and t.shape[-2:] == (len(shape.nodes), 3):
         return (N.T * measure[..., None, :]) @ (N @ t)
     return (measure @ N)[..., :, None] * t[..., None, :]
@@ -67,12 +80,19 @@ def surface_pressure_tangent(shape: type[Shape], X: ArrayLike, pressure: ArrayLi
     return -p[..., None, None, None, None] * np.einsum("g,ga,...gbic->...acbi", rule.weights, N, change)
 
 
-def surface_pressure(shape: type[Shape], X: ArrayLike, pressure: ArrayLike) -> Array:
-    """Return -∫ N p n dA (..., k, 3) in N of faces; p in Pa, one, (...) per face or (..., k) nodal."""
-    X, p = np.asarray(X, dtype=float), np.asarray(pressure, dtype=float)
-    rule = face_rule(shape)
+def surface_pressure(
+    shape: type[Shape], X: ArrayLike, pressure: ArrayLike | Callable[[Array], Array], factors: int = FUNCTION
+) -> Array:
+    """Return -∫ N p n dA (..., k, 3) in N of faces.
+
+    p in Pa: one, (...) per face, (..., k) nodal, or a function of places (..., g, 3) as for `surface_load`.
+    """
+    X = np.asarray(X, dtype=float)
+    rule = face_rule(shape, factors if callable(pressure) else 2)
     N, _ = tabulate(shape, rule)
-    if p.ndim and p.shape == X.shape[:-1]:
+    if callable(pressure):
+        at_points = pressure(N @ X)[..., None]
+    elif (p := np.asarray(pressure, dtype=float)).ndim and p.shape == X.shape[:-1]:
         at_points = (p @ N.T)[..., None]
     else:
         at_points = p[..., None, None]

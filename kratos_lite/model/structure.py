@@ -291,6 +291,7 @@ CHECKS: tuple[Callable[[Structure, Sequence[ElementGroup]], list[str]], ...] = (
     lambda model, groups: check_spurious_modes(model.mesh, groups, model.supports),
     lambda model, groups: checks.check_nodes(model.mesh),
     lambda model, groups: model.supports.check_used(model.mesh.used_nodes()),
+    lambda model, groups: [text for load in model.loads for text in load.warnings(model.mesh, groups)],
 )
 """What is checked of each model with sound cells: a check returns warnings, or raises an error."""
 

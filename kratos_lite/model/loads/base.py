@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
 
@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
 OfPlace: TypeAlias = "Callable[[Array], ArrayLike]"
 """A function of places (m, 3) in m."""
+
+MOST_CHANGE = 0.01
+"""Of the forces of a function, by the next quadrature rule; more is a warning."""
 
 
 class Load(ABC):
@@ -68,6 +71,19 @@ class Load(ABC):
         elif where is not None and not callable(where):
             mesh.nodes(where)
 
+    def warnings(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
+        """Return what may be wrong with the load on a mesh, though it acts.
+
+        Parameters
+        ----------
+        mesh, groups : as for `forces`.
+
+        Returns
+        -------
+        Sentences.
+        """
+        return []
+
     def refined(self, finer: Finer) -> Load:
         """Return the same load on a finer mesh.
 
@@ -88,6 +104,34 @@ class Load(ABC):
             f"{type(self).__name__} cannot be carried over to a finer mesh: its class defines no "
             "refined(finer); add the load to a model of the finer mesh instead"
         )
+
+
+class DistributedLoad(Load):
+    """A load over faces, lines or volumes, which may be a function of places."""
+
+    factors: ClassVar[int]
+
+    @abstractmethod
+    def integral(self, mesh: Mesh, groups: Sequence[ElementGroup], factors: int) -> Array:
+        """Return the nodal forces (n, 3) in N; a function is taken at the points of a rule of `factors`."""
+
+    def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
+        """Return the nodal forces (n, 3) in N."""
+        return self.integral(mesh, groups, self.factors)
+
+    def warnings(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
+        """Return a warning if the load is a function that jumps inside elements."""
+        if not any(callable(value) for name, value in vars(self).items() if name != "where"):
+            return []
+        forces = self.integral(mesh, groups, self.factors + 2)  # one more point a direction, or two
+        change = float(np.abs(self.forces(mesh, groups) - forces).sum())
+        if change <= MOST_CHANGE * float(np.abs(forces).sum()):
+            return []
+        return [
+            f"{self!r} jumps or peaks inside elements: its forces change by "
+            f"{100 * change / np.abs(forces).sum():.2g} % with the next quadrature rule; "
+            "put edges of elements where it does, or refine there"
+        ]
 
 
 class TimeDependentLoad(Load):
@@ -143,6 +187,11 @@ class TimeDependentLoad(Load):
                 f"the load at t = {time:g} s must be a PointLoad or another, or None; got {found!r}"
             )
         return found
+
+    def warnings(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
+        """Return what may be wrong with the load at the time 0."""
+        load = self.at(0.0)
+        return [] if load is None else load.warnings(mesh, groups)
 
     def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
         """Return the nodal forces (n, 3) in N at the time 0."""
@@ -204,6 +253,10 @@ class ScaledLoad(TimeDependentLoad):
         """Check that what the load acts on exists."""
         self.load.check(mesh)
 
+    def warnings(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
+        """Return what may be wrong with the load."""
+        return self.load.warnings(mesh, groups)
+
     def refined(self, finer: Finer) -> Load:
         """Return the load on a finer mesh, with the same amplitude."""
         return ScaledLoad(self.load.refined(finer), self.amplitude)
@@ -228,3 +281,15 @@ def vectors(values: ArrayLike, what: str, shapes: str, dimensions: tuple[int, ..
         found = f"shape {array.shape}" if array.ndim else f"the number {array}"
         raise InputError(f"{what} must be {shapes}; got {found}")
     return array
+
+
+def at_places(function: OfPlace, what: str, width: tuple[int, ...]) -> Callable[[Array], Array]:
+    """Return a function of places (..., 3) that checks what the given one of (m, 3) returns."""
+
+    def checked(X: Array) -> Array:
+        values, m = finite(function(X.reshape(-1, 3).copy()), what), X[..., 0].size
+        if values.shape not in ((m, *width), width):
+            raise InputError(f"{what} at places (m, 3) must have shape {('m', *width)}; got {values.shape}")
+        return np.broadcast_to(values, (m, *width)).reshape(*X.shape[:-1], *width)
+
+    return checked

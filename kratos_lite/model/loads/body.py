@@ -11,7 +11,7 @@ from kratos_lite.assembly import gauss_point_fields
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh, WhereElements
-from kratos_lite.model.loads.base import Load, OfPlace, vectors
+from kratos_lite.model.loads.base import DistributedLoad, Load, OfPlace, at_places, vectors
 from kratos_lite.typing import Array, Mask
 
 if TYPE_CHECKING:
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from kratos_lite.mesh.finer import Finer
 
 
-class BodyForce(Load):
+class BodyForce(DistributedLoad):
     """Force per volume.
 
     Parameters
     ----------
-    force : (3,) float, or (n, 3) interpolated from the nodes; N/m³; or a function of places (n, 3) that
-        returns either.
+    force : (3,) float, or (n, 3) interpolated from the nodes; N/m³; or a function of places (m, 3) that
+        returns either, taken at quadrature points.
     where : elements that carry it: part name, property id or rows; all if not given.
     """
 
@@ -36,44 +36,20 @@ class BodyForce(Load):
         self.force: Any = force if callable(force) else vectors(force, *self.what, (1, 2))
         self.where = where
 
-    def per_volume(self, group: ElementGroup, points: Array) -> Array:
-        """Return the force per volume.
+    factors = 4  # N, and a polynomial of degree p + 2 over straight cells
+
+    def scale(self, group: ElementGroup) -> float:
+        """Return what multiplies the load.
 
         Parameters
         ----------
         group : elements of one material.
-        points : (n, 3) m, of the mesh.
 
         Returns
         -------
-        (3,) or nodal (n, 3) in N/m³.
+        1, and the density in kg/m³ for `Gravity`.
         """
-        return self.nodal(points)
-
-    def nodal(self, points: Array) -> Array:
-        """Return the force (3,) or nodal (n, 3) at the nodes of a mesh.
-
-        Parameters
-        ----------
-        points : (n, 3) m, of the mesh.
-
-        Returns
-        -------
-        (3,) or (n, 3), in the unit of the load.
-
-        Raises
-        ------
-        InputError
-            It has another number of nodes, or its function does not return such values.
-        """
-        force: Array = self.force
-        if callable(force):
-            force = vectors(force(points.copy()), *self.what, (1, 2))
-        if force.ndim == 2 and len(force) != len(points):
-            raise InputError(
-                f"a nodal {type(self).__name__} needs shape ({len(points)}, 3); got {force.shape}"
-            )
-        return force
+        return 1.0
 
     def carriers(self, mesh: Mesh) -> Mask:
         """Return which elements carry it.
@@ -101,20 +77,27 @@ class BodyForce(Load):
         if self.where is not None:
             mesh.elements(self.where)
 
-    def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
+    def integral(self, mesh: Mesh, groups: Sequence[ElementGroup], factors: int) -> Array:
         """Return ∫ N b dV as nodal forces (n, 3) in N.
 
         Raises
         ------
         InputError
-            A nodal force has another number of nodes.
+            A nodal force has another number of nodes, or a function does not return forces.
         """
-        total = np.zeros_like(mesh.points)
-        chosen = self.carriers(mesh)
+        points, total, carriers = mesh.points, np.zeros_like(mesh.points), self.carriers(mesh)
+        force = at_places(self.force, self.what[0], (3,)) if callable(self.force) else self.force
+        if not callable(force) and force.ndim == 2 and len(force) != len(points):
+            name = type(self).__name__
+            raise InputError(f"a nodal {name} needs shape ({len(points)}, 3); got {force.shape}")
         for group in groups:
-            b, part = self.per_volume(group, mesh.points), group.take(chosen[group.rows])
-            if b.any() and len(part):
-                total += gauss_point_fields.body_force(mesh.points, part, b)
+            part, scale = group.take(carriers[group.rows]), self.scale(group)
+            if not (len(part) and scale):
+                continue
+            if callable(force):
+                total += scale * gauss_point_fields.body_force_by_function(points, part, force, factors)
+            elif force.any():
+                total += gauss_point_fields.body_force(points, part, scale * force)
         return total
 
     def refined(self, finer: Finer) -> Load:
@@ -129,8 +112,8 @@ class Gravity(BodyForce):
 
     Parameters
     ----------
-    acceleration : (3,) float, or (n, 3) interpolated from the nodes; m/s²; or a function of places (n, 3)
-        that returns either.
+    acceleration : (3,) float, or (n, 3) interpolated from the nodes; m/s²; or a function of places (m, 3)
+        that returns either, taken at quadrature points.
     where : elements that carry it: part name, property id or rows; all if not given.
 
     Examples
@@ -144,6 +127,6 @@ class Gravity(BodyForce):
     def __init__(self, acceleration: ArrayLike | OfPlace, where: WhereElements = None) -> None:
         super().__init__(acceleration, where)
 
-    def per_volume(self, group: ElementGroup, points: Array) -> Array:
-        """Return density × acceleration."""
-        return group.material.density * self.nodal(points)
+    def scale(self, group: ElementGroup) -> float:
+        """Return the density."""
+        return group.material.density

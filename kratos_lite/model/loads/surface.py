@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup, add_nodal
-from kratos_lite.elements.surface import surface_load, surface_pressure
+from kratos_lite.elements.surface import FUNCTION, surface_load, surface_pressure
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Block, Mesh, Where, outward_signs
-from kratos_lite.model.loads.base import Load, OfPlace, vectors
+from kratos_lite.model.loads.base import DistributedLoad, Load, OfPlace, at_places, vectors
 from kratos_lite.typing import Array
-from kratos_lite.validation import finite, number
+from kratos_lite.validation import number
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -24,26 +24,29 @@ if TYPE_CHECKING:
 SURFACES = ("triangle", "quadrilateral")
 
 
-class FaceLoad(Load):
+class FaceLoad(DistributedLoad):
     """A load on faces or lines."""
 
     @abstractmethod
-    def on_faces(self, mesh: Mesh) -> Iterator[tuple[Block, Array]]:
+    def on_faces(self, mesh: Mesh, factors: int = FUNCTION) -> Iterator[tuple[Block, Array]]:
         """Yield blocks of faces with the forces on the nodes of each face.
 
         Parameters
         ----------
         mesh : points (n, 3), elements, conditions and named parts.
+        factors : a function of places is taken at the points of a rule exact for so many shape functions.
 
         Returns
         -------
         Blocks of m faces, and (m, k, 3) in N.
         """
 
-    def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
+    factors = FUNCTION
+
+    def integral(self, mesh: Mesh, groups: Sequence[ElementGroup], factors: int) -> Array:
         """Return the nodal forces (n, 3) in N of all faces."""
         total = np.zeros_like(mesh.points)
-        for block, forces in self.on_faces(mesh):
+        for block, forces in self.on_faces(mesh, factors):
             add_nodal(total, block.nodes, forces)
         return total
 
@@ -54,7 +57,7 @@ class Traction(FaceLoad):
     Parameters
     ----------
     where : part; its conditions if it has any, otherwise the boundary faces among its nodes.
-    traction : (3,) float, Pa; or a function of places (m, 3) that returns (m, 3), interpolated from nodes.
+    traction : (3,) float, Pa; or a function of places (m, 3) that returns (m, 3), taken at quadrature points.
     """
 
     cells: ClassVar[tuple[str, ...]] = SURFACES
@@ -64,14 +67,13 @@ class Traction(FaceLoad):
         if not callable(traction):
             self.traction = vectors(traction, "a traction", "(3,) in Pa")
 
-    def on_faces(self, mesh: Mesh) -> Iterator[tuple[Block, Array]]:
+    def on_faces(self, mesh: Mesh, factors: int = FUNCTION) -> Iterator[tuple[Block, Array]]:
         """Yield blocks of faces with ∫ N t dA (m, k, 3) in N of each face."""
         what = "a traction" if self.cells == SURFACES else "a line load"
         for block in _faces(mesh, self.where, what, self.cells):
             assert block.shape is not None
-            X, t = mesh.points[block.nodes], self.traction
-            at = _at_nodes(t, X, what, (3,)) if callable(t) else t
-            yield block, surface_load(block.shape, X, at)
+            t = at_places(self.traction, what, (3,)) if callable(self.traction) else self.traction
+            yield block, surface_load(block.shape, mesh.points[block.nodes], t, factors)
 
     def refined(self, finer: Finer) -> Load:
         """Return the load on a finer mesh: on the faces or lines that have come from those of the old one."""
@@ -96,7 +98,7 @@ class Pressure(FaceLoad):
     Parameters
     ----------
     where : part; its conditions if it has any, otherwise the boundary faces among its nodes.
-    pressure : float, Pa; or a function of places (m, 3) that returns (m,), interpolated from nodes.
+    pressure : float, Pa; or a function of places (m, 3) that returns (m,), taken at quadrature points.
     normal : ``"outward"`` takes the outward normal of the body; ``"nodes"`` the normal about which
         the nodes of each condition run counter-clockwise, as Kratos does.
 
@@ -113,15 +115,15 @@ class Pressure(FaceLoad):
             pressure = number(pressure, "a pressure")
         self.where, self.pressure, self.normal = where, pressure, normal
 
-    def on_faces(self, mesh: Mesh) -> Iterator[tuple[Block, Array]]:
+    def on_faces(self, mesh: Mesh, factors: int = FUNCTION) -> Iterator[tuple[Block, Array]]:
         """Yield blocks of faces with -∫ N p n dA (m, k, 3) in N of each face."""
         for block in _faces(mesh, self.where, "a pressure"):
             assert block.shape is not None
-            X, p = mesh.points[block.nodes], self.pressure
-            at = _at_nodes(p, X, "a pressure", ()) if callable(p) else np.full(block.nodes.shape, p)
+            p = at_places(self.pressure, "a pressure", ()) if callable(self.pressure) else self.pressure
+            forces = surface_pressure(block.shape, mesh.points[block.nodes], p, factors)
             if self.normal == "outward":
-                at = at * outward(mesh, block)[:, None]
-            yield block, surface_pressure(block.shape, X, at)
+                forces *= outward(mesh, block)[:, None, None]
+            yield block, forces
 
     def refined(self, finer: Finer) -> Load:
         """Return the load on a finer mesh: on the faces that have come from those of the old one."""
@@ -155,12 +157,3 @@ def _faces(mesh: Mesh, where: Where, what: str, cells: Sequence[str] = SURFACES)
             "on the boundary has all its nodes in it"
         )
     return faces
-
-
-def _at_nodes(function: OfPlace, X: Array, what: str, width: tuple[int, ...]) -> Array:
-    """Return what a function gives at the nodes (m, k, 3) of faces, (m, k, *width)."""
-    given = finite(function(X.reshape(-1, 3).copy()), what)
-    wanted = (X.shape[0] * X.shape[1], *width)
-    if given.shape not in (wanted, width):
-        raise InputError(f"{what} at places (m, 3) must have shape {('m', *width)}; got {given.shape}")
-    return np.broadcast_to(given, wanted).reshape(*X.shape[:2], *width)

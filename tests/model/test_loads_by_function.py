@@ -1,0 +1,121 @@
+"""A load is what its function says: resultants against closed forms and the divergence theorem."""
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+
+KINDS = ["4N", "5N", "6N", "8N", "10N", "13N", "15N", "20N", "27N"]
+LAW = kl.Isotropic3D(E=210e9, nu=0.3, density=7620.0)
+
+
+def totals(model, *loads):
+    """Return the resultant force and moment about the origin, (6,), of loads on a model."""
+    groups = model.element_groups()
+    forces = sum(load.forces(model.mesh, groups) for load in loads)
+    return np.concatenate([forces.sum(axis=0), np.cross(model.mesh.points, forces).sum(axis=0)])
+
+
+def bent(kind, curved=True):
+    """Return a box whose nodes are moved by a quadratic map, or by a linear one."""
+    mesh = kl.box((1.0, 1.2, 0.8), (2, 2, 2), element=kind)
+    x, y, z = mesh.points.T
+    square = 0.1 * curved
+    moved = [x + 0.2 * y + square * y * z, y - 0.1 * z + square * x * x, z + 0.1 * x - square * x * y]
+    return kl.Model(mesh.replace(points=np.stack(moved, axis=1)), LAW)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("curved", [False, True])
+@pytest.mark.parametrize("degree", [1, 2, 3])
+def test_pressure_on_all_faces_is_the_force_of_its_gradient(kind, curved, degree):
+    """∮ -p n dA = -∫ ∇p dV, ∮ x × (-p n) dA = -∫ x × ∇p dV: faces beside volumes, by other rules."""
+    model, a = bent(kind, curved), np.array([0.7, -0.4, 1.1])
+    gradient = kl.BodyForce(lambda X: -degree * (1.3 + X @ a)[:, None] ** (degree - 1) * a)
+    found = totals(model, kl.Pressure(lambda X: np.ones(len(X), bool), lambda X: (1.3 + X @ a) ** degree))
+    wanted = totals(model, gradient)
+    np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-12 * np.abs(wanted).max())
+
+
+@pytest.mark.parametrize(
+    ("kind", "degree"), [(kind, d) for kind in KINDS for d in range(1, 4 + (int(kind[:-1]) > 8))]
+)
+def test_a_polynomial_traction_on_a_flat_face(kind, degree):
+    """∫ x^d dA and ∫ y x^d dA on 2 × 3 of a plane; up to d = p + 2."""
+    model = kl.Model(kl.box((2.0, 3.0, 1.0), (2, 2, 1), element=kind), LAW)
+    found = totals(model, kl.Traction("z+", lambda X: X[:, :1] ** degree * [0.0, 0.0, 1.0]))
+    powers = 2.0 ** (np.arange(degree + 1, degree + 3)) / np.arange(degree + 1, degree + 3)
+    wanted = [0, 0, 3 * powers[0], 4.5 * powers[0], -3 * powers[1], 0]
+    np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-12 * np.abs(wanted).max())
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    "load",
+    [
+        lambda on: kl.Traction("z+", lambda X: on(X)[:, None] * [0.0, 0.0, -1000.0]),
+        lambda on: kl.Pressure("z+", lambda X: 1000.0 * on(X)),
+    ],
+)
+def test_a_patch_whose_edges_are_edges_of_elements(kind, load):
+    """-1000 N/m² on a quarter of a face: -250 N at its middle, and no warning."""
+    model = kl.Model(kl.box((1, 1, 1), (8, 8, 1), element=kind), LAW)
+    patch = load(lambda X: (X[:, 0] < 0.5) & (X[:, 1] < 0.5))
+    wanted = [0, 0, -250, -62.5, 62.5, 0]
+    np.testing.assert_allclose(totals(model, patch), wanted, rtol=0, atol=1e-10)
+    model.fix("z-")
+    model.add(patch)
+    assert not any("jumps" in warning for warning in model.check())
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_body_force_that_jumps_between_elements(kind):
+    """f = (3, -1, 2) N/m³ where x < 1 of a block 2 × 1 × 1, and the weight of half of it."""
+    model = kl.Model(kl.box((2, 1, 1), (4, 2, 2), element=kind), LAW)
+    f, middle = np.array([3.0, -1.0, 2.0]), np.array([0.5, 0.5, 0.5])
+    found = totals(model, kl.BodyForce(lambda X: (X[:, :1] < 1) * f))
+    np.testing.assert_allclose(found, [*f, *np.cross(middle, f)], rtol=0, atol=1e-12)
+    found = totals(model, kl.Gravity(lambda X: (X[:, :1] < 1) * f))
+    np.testing.assert_allclose(found[:3], 7620.0 * f, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("load", "part"),
+    [
+        (kl.Traction("z+", lambda X: (X[:, :1] < 0.3) * [0.0, 0.0, -1e3]), "z+"),
+        (kl.Pressure("y-", lambda X: 1e3 * (X[:, 0] < 0.3)), "y-"),
+        (kl.BodyForce(lambda X: (X[:, :1] < 0.3) * [0.0, 0.0, -1e3]), "BodyForce"),
+        (kl.TimeDependentLoad(lambda t: kl.Pressure("z+", lambda X: 1e3 * (X[:, 0] < 0.3))), "z+"),
+    ],
+)
+def test_a_jump_inside_elements_is_a_warning_that_names_the_part(load, part):
+    model = kl.Model(kl.box((1, 1, 1), (4, 4, 4)), LAW)
+    model.fix("z-")
+    model.add(load)
+    (warning,) = model.solve().report.warnings
+    assert part in warning
+    assert "jumps or peaks inside elements" in warning
+
+
+def test_a_smooth_load_and_its_amplitude_are_no_warning():
+    model = kl.Model(kl.box((1, 1, 1), (4, 4, 4)), LAW)
+    model.fix("z-")
+    model.add(kl.Pressure("z+", lambda X: 1e3 * np.sin(3 * X[:, 0])), amplitude=lambda t: 2.0 + t)
+    result = model.solve()
+    assert result.report.warnings == []
+    total = -2e3 * (1 - np.cos(3.0)) / 3
+    np.testing.assert_allclose(result.report.total_load[2], total, rtol=1e-6)
+    np.testing.assert_allclose(result.reactions[:, 2].sum(), -total, rtol=1e-6)
+
+
+def test_each_mesh_takes_the_function_anew():
+    """A cone of pressure: its total on the meshes of an adaptive solution is its integral on each."""
+    model = kl.Model(kl.box((1, 1, 1), (2, 2, 2), element="20N"), LAW)
+    model.fix("z-")
+    model.add(kl.Pressure("z+", lambda X: 1e6 * np.exp(-8 * ((X[:, :2] - 0.5) ** 2).sum(axis=1))))
+    result = model.solve(error=0.05)
+    assert result.mesh.n_nodes > model.mesh.n_nodes
+    from scipy.special import erf
+
+    wanted = -1e6 * np.pi / 8 * erf(np.sqrt(2.0)) ** 2
+    np.testing.assert_allclose(result.report.total_load[2], wanted, rtol=1e-5)
