@@ -149,9 +149,8 @@ def make(name: str, kind: str, n: int, grading: float = 1.0) -> Scene:
     old, X = scene.model, scene.model.mesh.points.copy()
     X[:, :2] = np.sign(X[:, :2]) * np.abs(X[:, :2]) ** grading
     scene.model = kl.Model(kl.Mesh(X, old.mesh.blocks), UNIT)
-    for fixing in old.supports.fixings:
-        where = fixing.rows if fixing.where is None else fixing.where
-        scene.model.fix(where, fixing.axes, field=fixing.field)
+    for condition in old.supports.conditions:
+        scene.model.fix(condition.where, condition.axes, field=condition.field)
     return scene
 
 

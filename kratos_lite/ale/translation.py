@@ -9,7 +9,6 @@ from kratos_lite.ale.boundaries import cut_nodes, dashpots, periodic_pairs
 from kratos_lite.ale.motion import Motion
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.mesh import Mesh, WhereElements
-from kratos_lite.model.fixing import Fixing
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.constraint_map import MultiPointConstraint
@@ -91,7 +90,7 @@ class Translation(Motion):
         """Tie or fix the boundaries."""
         if self.boundaries == "fixed":
             for nodes in self.open_faces(structure.mesh):
-                structure.supports.apply(Fixing(None, nodes, "xyz", 0.0, None, False))
+                structure.fix(nodes)
         elif self.boundaries == "periodic":
             mesh = structure.mesh
             dependents, independents = periodic_pairs(mesh, self.direction, self.moving(mesh))

@@ -21,7 +21,7 @@ from kratos_lite.analysis.origin import Origin
 from kratos_lite.analysis.quantities import Quantity, Solved
 from kratos_lite.assembly.recovery import Recovery
 from kratos_lite.errors import ModelError
-from kratos_lite.model.fixing import AXES
+from kratos_lite.model.supports import AXES
 from kratos_lite.typing import Array, Mask
 
 SAME = 1e-6

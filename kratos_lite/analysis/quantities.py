@@ -14,8 +14,8 @@ from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import ModelError
 from kratos_lite.mesh import Mesh, Where
 from kratos_lite.mesh.locate import Located
-from kratos_lite.model.fixing import AXES
 from kratos_lite.model.loads.surface import Traction
+from kratos_lite.model.supports import AXES
 from kratos_lite.typing import Array
 from kratos_lite.validation import choice, finite
 

@@ -72,13 +72,12 @@ class PrescribedDisplacement:
     def _shares(self) -> tuple[Array, list[tuple[Callable[[float], float], Array]]]:
         """What is prescribed while all that moves is at 0, and the share (3a,) of each motion, at 1."""
         values = self.supports.values.copy()
-        for motion in self.supports.motions:
-            values[motion.rows, motion.axis] = 0.0
+        motions = self.supports.motions
+        for _, moved in motions:
+            values[moved] = 0.0
         resting, shares = self._at(values), []
-        for motion in self.supports.motions:
-            values[motion.rows, motion.axis] = 1.0
-            shares.append((motion.function, self._at(values) - resting))
-            values[motion.rows, motion.axis] = 0.0
+        for function, moved in motions:
+            shares.append((function, self._at(np.where(moved, 1.0, values)) - resting))
         return resting, shares
 
     def _at(self, values: Array) -> Array:

@@ -10,8 +10,8 @@ import numpy as np
 
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh.finer import Finer
-from kratos_lite.model.fixing import Fixing
 from kratos_lite.model.structure import Structure
+from kratos_lite.model.supports import DirichletCondition
 from kratos_lite.quadrature import Rule
 
 S = TypeVar("S", bound=Structure)
@@ -37,11 +37,11 @@ def refined(structure: S, finer: Finer) -> S:
     new._material_of = structure._material_of[finer.elements]
     _carry_rules(structure, new, finer)
     if structure.initial_displacement is not None:
-        new.stress_free_at(finer.interpolate(structure.initial_displacement))
+        new.set_stress_free_state(finer.interpolate(structure.initial_displacement))
     if structure.prestress is not None:
         new.add_prestress(structure.prestress[finer.elements])
-    for fixing in structure.supports.fixings:
-        new.supports.apply(_refixed(fixing, finer))
+    for condition in structure.supports.conditions:
+        new.supports.add(_refined_condition(condition, finer))
     _carry_constraints(structure, new, finer)
     new.loads = [load.refined(finer) for load in structure.loads]
     for name, load in structure.named_loads.items():
@@ -67,18 +67,17 @@ def _carry_rules(structure: Structure, new: Structure, finer: Finer) -> None:
         )
 
 
-def _refixed(fixing: Fixing, finer: Finer) -> Fixing:
-    """Return what a call of `fix` means on the finer mesh."""
-    mesh, old = finer.mesh, finer.coarse.n_nodes
-    rows = mesh.nodes(finer.grown(fixing.rows) if fixing.where is None else fixing.where)
-    value = fixing.value
-    if fixing.field is not None or callable(value) or np.ndim(value) < 2:
-        return replace(fixing, rows=rows, override=True)
-    nodal = np.full((old, np.shape(value)[1]), np.nan)
-    nodal[fixing.rows] = value
-    nodal = finer.interpolate(nodal)
-    known = ~np.isnan(nodal[rows]).any(axis=1)
-    return replace(fixing, rows=rows[known], value=nodal[rows[known]], override=True)
+def _refined_condition(condition: DirichletCondition, finer: Finer) -> DirichletCondition:
+    """Return what a Dirichlet condition means on the finer mesh."""
+    where, value = finer.where(condition.where), condition.value
+    nodes = finer.mesh.nodes(where)
+    if condition.field is not None or callable(value) or np.ndim(value) < 2:
+        return replace(condition, where=where, nodes=nodes, override=True)
+    nodal = np.full((finer.coarse.n_nodes, np.shape(value)[1]), np.nan)
+    nodal[condition.nodes] = value
+    nodal = finer.interpolate(nodal)[nodes]
+    known = ~np.isnan(nodal).any(axis=1)
+    return replace(condition, where=where, nodes=nodes[known], value=nodal[known], override=True)
 
 
 def _carry_constraints(structure: Structure, new: Structure, finer: Finer) -> None:

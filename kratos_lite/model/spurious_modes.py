@@ -15,14 +15,15 @@ and holds the amplitude of a chain that ends at it.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.errors import ModelError
-from kratos_lite.mesh import Mesh
-from kratos_lite.model.opposite_faces import OppositeFaces, opposite_of
+from kratos_lite.mesh import Mesh, with_rows
+from kratos_lite.mesh.topology import faces_of
 from kratos_lite.model.supports import Supports
 from kratos_lite.typing import Array, Ints, Mask
 
@@ -46,20 +47,22 @@ def check_spurious_modes(
     if not reduced.any():
         return []
     faces = mesh.all_faces
-    across = OppositeFaces(mesh, faces)
+    neighbor = np.full(len(faces.element), -1)
+    neighbor[faces.one], neighbor[faces.other] = faces.other, faces.one
     for open_ in faces.non_conforming():
-        across.mate[open_] = -1
-    ends = _ends(across, reduced)
+        neighbor[open_] = -1
+    ends, nodes = _ends(mesh, reduced)
+    outer = neighbor[ends] < 0
     fixed = np.zeros(mesh.points.shape, dtype=bool) if supports is None else supports.fixed
-    mirrored, held = _supported(across, ends[across.outer[ends]], fixed)
-    joined: Mask = np.any((~across.outer | mirrored)[ends], axis=2)  # (m, 3)
-    rows = faces.element[ends[:, 0, 0]]
+    mirrored, held = _supported(mesh.points, nodes, outer, fixed)
+    joined: Mask = np.any(~outer | mirrored, axis=2)  # (m, 3)
+    elements = faces.element[ends[:, 0, 0]]
     sound = ~reduced
-    sound[rows[joined.sum(axis=1) >= 2]] = True
-    held |= across.beyond(sound[faces.element])
-    chained = np.all(joined[:, :, None] & held[ends], axis=2)
+    sound[elements[joined.sum(axis=1) >= 2]] = True
+    held |= ~outer & sound[faces.element[neighbor[ends]]]
+    chained = np.all(joined[:, :, None] & held, axis=2)
     free = np.zeros(mesh.n_elements, dtype=bool)
-    free[rows] = ~sound[rows] & ~np.any(chained, axis=1)
+    free[elements] = ~sound[elements] & ~np.any(chained, axis=1)
     if free.any():
         row = int(free.argmax())
         raise ModelError(
@@ -74,36 +77,31 @@ def _name(groups: Sequence[ElementGroup], row: int) -> str:
     return next(group.element.__name__ for group in groups if (group.rows == row).any())
 
 
-def _ends(across: OppositeFaces, reduced: Mask) -> Ints:
-    """Return the faces (m, 3, 2) at the ends of the axes of all elements with reduced integration."""
-    found, start = [], 0
-    for number, block in enumerate(across.mesh.blocks):
-        cells = np.flatnonzero(reduced[start : start + len(block)])
-        start += len(block)
-        if len(cells) and block.shape is not None:
-            pairs = np.array([(i, j) for i, j in enumerate(opposite_of(block.shape)) if i < j])
-            found.append(across.number(number, pairs, cells[:, None, None]))
-    return np.concatenate([np.zeros((0, 3, 2), dtype=np.int64), *found])
+def _ends(mesh: Mesh, reduced: Mask) -> tuple[Ints, Ints]:
+    """Return the numbers (m, 3, 2) of the faces at both ends of each axis, and their nodes (m, 3, 2, 8)."""
+    ends, nodes, start = [], [], 0
+    for block, at in with_rows(mesh.blocks):
+        cells, columns = np.flatnonzero(reduced[at]), np.array(faces_of(block))
+        if len(cells):
+            apart = [
+                (i, j) for i, j in combinations(range(6), 2) if not np.isin(columns[i], columns[j]).any()
+            ]
+            pairs = np.array(apart)
+            ends.append(start + pairs * len(block) + cells[:, None, None])
+            nodes.append(block.nodes[cells][:, columns[pairs]])
+        start += len(faces_of(block)) * len(block)
+    return np.concatenate(ends), np.concatenate(nodes)
 
 
-def _supported(across: OppositeFaces, outer: Ints, fixed: Mask) -> tuple[Mask, Mask]:
-    """Return which of all faces are fixed along their normal, as mirrors, and which within their plane.
-
-    `outer` are those to look at; `fixed` (n, 3) says which components of the nodes are.
-    """
-    mirrored = np.zeros(len(across.mate), dtype=bool)
-    held = mirrored.copy()
-    outer = outer[np.any(np.all(fixed[across.corners(outer)], axis=1), axis=1)]
-    for face, nodes in zip(outer.tolist(), across.nodes(outer), strict=True):
-        all_fixed = fixed[nodes].all(axis=0)
-        if all_fixed.any():
-            normal = _normal(across.mesh.points[nodes])
-            mirrored[face] = all_fixed.all() or bool((all_fixed & (normal > 1 - 1e-9)).any())
-            held[face] = all_fixed.all() or bool((all_fixed & (normal < 1e-9)).any())
-    return mirrored, held
-
-
-def _normal(X: Array) -> Array:
-    """Return the absolute components of the normal of a flat face X (k, 3); 0.5 for a curved one."""
-    spread, axes = np.linalg.svd(X - X.mean(axis=0))[1:]
-    return np.abs(axes[2]) if spread[2] < 1e-9 * spread[0] else np.full(3, 0.5)
+def _supported(points: Array, nodes: Ints, outer: Mask, fixed: Mask) -> tuple[Mask, Mask]:
+    """Return which outer faces (m, 3, 2) are fixed along their normal, as mirrors, and which in the plane."""
+    along = fixed[nodes].all(axis=3) & outer[..., None]
+    normal = np.full(along.shape, 0.5)  # of curved faces, and of those that are not fixed
+    if (chosen := along.any(axis=3)).any():
+        X = points[nodes[chosen]]
+        spread, axes = np.linalg.svd(X - X.mean(axis=1, keepdims=True), full_matrices=False)[1:]
+        flat = spread[:, 2] < 1e-9 * spread[:, 0]
+        normal[chosen] = np.where(flat[:, None], np.abs(axes[:, 2]), 0.5)
+    clamped = along.all(axis=3)
+    mirrored, held = ((along & mask).any(axis=3) for mask in (normal > 1 - 1e-9, normal < 1e-9))
+    return np.asarray(clamped | mirrored), np.asarray(clamped | held)

@@ -1,33 +1,44 @@
-"""Structure: a solid with supports, loads and motion, which is what is analyzed; it knows no analysis."""
+"""Structure: a mesh with materials, supports, loads and motion, which is what is analyzed."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from kratos_lite.assembly.element_groups import ElementGroup
+import numpy as np
+
+from kratos_lite.assembly.element_groups import ElementGroup, element_class, element_groups_of
 from kratos_lite.assembly.sparsity_pattern import PatternCache
-from kratos_lite.errors import InputError, ModelError, nearest
+from kratos_lite.elements import ELEMENTS
+from kratos_lite.elements.formulations import (
+    NON_LOCKING,
+    checked_formulation,
+    is_nearly_incompressible,
+    is_unnamed,
+)
+from kratos_lite.errors import InputError, MeshError, ModelError, nearest
 from kratos_lite.materials import LinearMaterial
-from kratos_lite.mesh import Mesh, distinct
+from kratos_lite.mesh import Mesh, Where, WhereElements, distinct
 from kratos_lite.model import checks
-from kratos_lite.model.coincident_nodes import check_coincident
 from kratos_lite.model.equal import key_of
 from kratos_lite.model.free_motions import FreeMotions
 from kratos_lite.model.hourglass_modes import check_rules
-from kratos_lite.model.joints import check_joints
+from kratos_lite.model.joints import check_coincident, check_joints
 from kratos_lite.model.loads import Load, ScaledLoad
 from kratos_lite.model.locking import check_locking
 from kratos_lite.model.rigid_body_modes import free_motions
 from kratos_lite.model.spurious_modes import check_spurious_modes
-from kratos_lite.model.supported_solid import SupportedSolid
+from kratos_lite.model.supports import DirichletCondition, Supports, axis_numbers
+from kratos_lite.quadrature import Rule
+from kratos_lite.solvers.constraint_map import rigid_modes
 from kratos_lite.tabular import Tabular
 from kratos_lite.time_series import Factor
-from kratos_lite.validation import instance
+from kratos_lite.typing import Array
+from kratos_lite.validation import finite, function_or_none, instance
 
 if TYPE_CHECKING:
-    pass
+    from numpy.typing import ArrayLike
 
 
 class Attachment(ABC):
@@ -48,20 +59,20 @@ class Attachment(ABC):
         """
 
 
-class Structure(SupportedSolid, Tabular):
-    """What is analyzed: a solid with supports, loads and motion.
+class Structure(Tabular):
+    """What is analyzed: a mesh with materials, supports, loads and motion; it knows no analysis.
 
     Parameters
     ----------
     mesh : points, elements and named parts.
     material : one material for all elements, or materials by part name or property id.
-    formulation : of the elements, in place of what their names in the mesh say; see `Solid.formulation`.
+    formulation : of the elements, in place of what their names in the mesh say; see `formulation`.
 
     Attributes
     ----------
     supports : what is prescribed; see `fix`, `release` and `constrain`.
     loads : those added; the list may be changed.
-    notes : what readers of files found, for the report.
+    notes : what readers of files remarked, for the report.
 
     Raises
     ------
@@ -77,13 +88,335 @@ class Structure(SupportedSolid, Tabular):
         material: LinearMaterial | Mapping[Any, LinearMaterial] | None = None,
         formulation: str | None = None,
     ) -> None:
-        super().__init__(mesh, material, formulation)
+        self._mesh = checks.checked_mesh(mesh)
+        self._materials: list[LinearMaterial] = []
+        self._material_of = np.full(mesh.n_elements, -1)
+        self._rules: dict[int, Rule | int] = {}
+        self._rule_of = np.full(mesh.n_elements, -1)
+        self._initial_displacement: Array | None = None
+        self._prestress: Array | None = None
+        self._changes = 0
+        self.formulation = formulation
+        self.supports = Supports(mesh)
         self.loads: list[Load] = []
         self._named: dict[str, Load] = {}
-        self._keys: dict[Hashable, Load] = {}
         self._motion: Attachment | None = None
         self.notes: list[str] = []
         self.patterns = PatternCache()
+        if isinstance(material, Mapping):
+            for where, assigned in material.items():
+                self.assign(assigned, where)
+        elif material is not None:
+            self.assign(material)
+
+    @property
+    def version(self) -> tuple[int, int]:
+        """Change counters of everything that affects the equations except prescribed values and loads."""
+        return self._changes, self.supports.version
+
+    # ---- elements and materials ---------------------------------------------------------------
+
+    @property
+    def mesh(self) -> Mesh:
+        """Points, elements and named parts, which do not change."""
+        return self._mesh
+
+    @property
+    def formulation(self) -> str | None:
+        """Formulation of the elements, or None: their names in the mesh say it.
+
+        ``standard``, ``enhanced``, ``b_bar``, ``reduced``, or ``non_locking``: that of each shape which does
+        not lock with its material.  Elements have the last whose names say only the number of nodes, such as
+        ``Element3D8N``.  Elements of users keep theirs.
+        """
+        return self._formulation
+
+    @formulation.setter
+    def formulation(self, word: str | None) -> None:
+        if word is not None:
+            checked_formulation(word)
+            for block in self.mesh.blocks:
+                if len(block) and block.name in ELEMENTS:
+                    element_class(self.mesh, block, word)
+        self._formulation = word
+        self._changes += 1
+
+    def assign(self, material: LinearMaterial, where: WhereElements = None) -> None:
+        """Give elements a material.
+
+        Parameters
+        ----------
+        material : such as `Isotropic3D`.
+        where : elements by part name, property id or rows; all if not given.
+
+        Raises
+        ------
+        InputError
+            `material` is not a material.
+        MeshError
+            There is no such part, property or element.
+        """
+        checks.checked_material(material)
+        rows = self.mesh.elements(where)
+        self._materials.append(material)
+        self._material_of[rows] = len(self._materials) - 1
+        self._changes += 1
+
+    @property
+    def has_own_rules(self) -> bool:
+        """Whether any element has another quadrature rule than that of its class."""
+        return bool((self._rule_of >= 0).any())
+
+    def use_rule(self, rule: Rule | int, where: WhereElements = None) -> None:
+        """Replace the quadrature rule of elements.
+
+        Parameters
+        ----------
+        rule : a Rule, or an INTEGRATION_ORDER 1 … 5 of Kratos.
+        where : elements by part name, property id or rows; all if not given.
+
+        Raises
+        ------
+        InputError
+            `rule` is invalid.
+        MeshError
+            There is no such part, property or element.
+        """
+        if isinstance(rule, bool) or not isinstance(rule, (int, Rule)):
+            raise InputError(f"a Rule or an INTEGRATION_ORDER 1 … 5 is needed; got {rule!r}")
+        number = len(self._rules)
+        self._rules[number] = rule
+        self._rule_of[self.mesh.elements(where)] = number
+        self._changes += 1
+
+    def element_groups(self, unnamed: str = NON_LOCKING) -> list[ElementGroup]:
+        """Return the elements grouped by kind, rule and material.
+
+        Parameters
+        ----------
+        unnamed : formulation of elements whose names in the mesh say none.
+
+        Returns
+        -------
+        The groups.
+
+        Raises
+        ------
+        ModelError
+            An element has no material, or there are no elements.
+        InputError
+            An element has an unknown kind, or a rule does not fit it.
+        """
+        return element_groups_of(
+            self.mesh,
+            self._materials,
+            self._material_of,
+            self._rules,
+            self._rule_of,
+            self.prestress,
+            self.formulation,
+            unnamed,
+        )
+
+    def chosen(self, groups: Sequence[ElementGroup] = ()) -> str:
+        """Return which formulation was chosen and why, in one line; "" where names of elements say it.
+
+        Parameters
+        ----------
+        groups : of `element_groups`.
+
+        Returns
+        -------
+        Such as ``non_locking, as the mesh names none: EnhancedStrain3D8N``.
+        """
+        found = dict.fromkeys(_kind(group) for group in groups)
+        unnamed = any(is_unnamed(block.name) for block in self.mesh.blocks if len(block))
+        if self.formulation is None and not unnamed:
+            return ""
+        why = "as the mesh names none" if self.formulation is None else "as asked for"
+        kinds = f": {', '.join(found)}" if found else ""
+        return f"{self.formulation or NON_LOCKING}, {why}{kinds}"
+
+    # ---- initial stress -----------------------------------------------------------------------
+
+    @property
+    def initial_displacement(self) -> Array | None:
+        """Displacement (n, 3) in m without stress, read-only, or None; see `set_stress_free_state`."""
+        return self._initial_displacement
+
+    @property
+    def prestress(self) -> Array | None:
+        """Stress (m, 6) in Pa of unstrained elements, tension positive, or None; see `add_prestress`."""
+        return self._prestress
+
+    def set_stress_free_state(self, displacement: ArrayLike) -> None:
+        """Make the body stress-free at a displacement u0: strain comes from u - u0.
+
+        Parameters
+        ----------
+        displacement : (n, 3) m.
+
+        Raises
+        ------
+        InputError
+            It has another shape, or is not finite.
+        """
+        u0 = finite(displacement, "the initial displacement", self.mesh.points.shape)
+        u0.flags.writeable = False
+        self._initial_displacement = u0
+        self._changes += 1
+
+    def add_prestress(self, stress: ArrayLike, where: WhereElements = None) -> None:
+        """Add a stress that elements carry before they are strained: σ = C ε + stress, tension positive.
+
+        PRESTRESS and INSITU_STRESS in files of Kratos have the opposite sign: σ = C ε - PRESTRESS.
+
+        Parameters
+        ----------
+        stress : (6,) or (m, 6) Pa, in the order xx yy zz xy yz zx.
+        where : m elements by part name, property id or rows; all if not given.
+
+        Raises
+        ------
+        InputError
+            It has another shape, or is not finite.
+        MeshError
+            There is no such part, property or element.
+        """
+        s, rows = finite(stress, "a prestress"), self.mesh.elements(where)
+        if s.shape not in ((6,), (len(rows), 6)):
+            raise InputError(
+                f"a prestress has six components xx yy zz xy yz zx, or shape ({len(rows)}, 6); "
+                f"got shape {s.shape}"
+            )
+        total = np.zeros((self.mesh.n_elements, 6)) if self._prestress is None else self._prestress.copy()
+        total[rows] += s
+        total.flags.writeable = False
+        self._prestress = total
+        self._changes += 1
+
+    # ---- supports ------------------------------------------------------------------------------
+
+    def fix(
+        self,
+        where: Where,
+        axes: str = "xyz",
+        value: ArrayLike | Callable[[float], float] = 0.0,
+        *,
+        field: Callable[[Array], ArrayLike] | None = None,
+        override: bool = False,
+        name: str | None = None,
+    ) -> None:
+        """Prescribe the displacement of nodes.
+
+        Parameters
+        ----------
+        where : part name, point (x, y, z) in m, predicate on the points (n, 3), mask or node indices.
+        axes : some of ``"x"``, ``"y"``, ``"z"``, such as ``"xz"``.
+        value : m; one number, one per axis, or one row per node; or a `TimeSeries` or function of time in s,
+            which statics take at the time 0.
+        field : in place of a value, a function of places (k, 3) in m that returns one row per node or one
+            number per axis in m.  A mesh that is made finer takes its values, others are interpolated.
+        override : let this value win over an earlier one for the same degree of freedom, and this support
+            replace the one of its name.
+        name : by which `release` knows the support.
+
+        Raises
+        ------
+        ModelError
+            If no node is chosen, a degree of freedom gets two different values, or another support has
+            the name.
+        InputError
+            The axes or the value make no sense.
+        MeshError
+            There is no such part or node.
+        """
+        nodes = self.mesh.nodes(where)
+        if self.mesh.whole and not len(nodes):
+            what = f"part {where!r} has no nodes" if isinstance(where, str) else "no node is chosen"
+            raise ModelError(f"cannot fix {axes}: {what}")
+        function_or_none(field, "field must be a function of places (k, 3)")
+        if name is not None:
+            instance(name, "the name of a support", str, "'clamp'")
+        self.supports.add(DirichletCondition(where, nodes, axes, value, field, override, name))
+
+    def release(self, where: Where, axes: str = "xyz") -> None:
+        """Take supports away: one by its name, or whatever holds some nodes along axes.
+
+        Parameters
+        ----------
+        where : name of a support; what others prescribe on its nodes stays.  Or nodes, as for `fix`.
+        axes : of the nodes, such as ``"xz"``.
+
+        Raises
+        ------
+        InputError
+            The axes make no sense.
+        MeshError
+            There is no such support, part or node.
+        ModelError
+            Nothing is prescribed there.
+
+        Examples
+        --------
+        >>> import kratos_lite as kl
+        >>> model = kl.Model(kl.box(), kl.Isotropic3D(E=1e9, nu=0.3))
+        >>> model.fix("x-", name="clamp")
+        >>> model.fix("z-", "z")
+        >>> print(model.supports)
+        clamp: x-, xyz = 0 m
+        z-, z = 0 m
+        >>> model.release("clamp")
+        >>> int(model.supports.fixed.sum())
+        4
+        """
+        named = self.supports.named
+        if isinstance(where, str) and where in named:
+            self.supports.drop(named[where])
+            return
+        try:
+            nodes = self.mesh.nodes(where)
+        except MeshError as error:
+            if not (named and isinstance(where, str)):
+                raise
+            hint = nearest(where, named)
+            raise MeshError(f"{error}; named supports are {', '.join(named)}.{hint}") from None
+        fixed = self.supports.fixed[np.ix_(nodes, np.array(axis_numbers(axes)))]
+        if self.mesh.whole and not fixed.any():
+            raise ModelError(f"nothing is prescribed along {axes} there, so that nothing is released")
+        self.supports.add(DirichletCondition(where, nodes, axes, released=True))
+
+    def constrain(
+        self,
+        dependent: tuple[int, str],
+        independents: Mapping[tuple[int, str], float],
+        constant: float = 0.0,
+    ) -> None:
+        """Tie a degree of freedom to others: u[dependent] = Σ weight · u[independent] + constant.
+
+        Parameters
+        ----------
+        dependent : (node index, axis letter).
+        independents : weights by (node index, axis letter).
+        constant : m.
+
+        Raises
+        ------
+        InputError
+            A degree of freedom, weight or constant is invalid.
+        """
+        self.supports.constrain(dependent, independents, constant)
+
+    def rigid_modes(self) -> Array:
+        """Return the rigid-body modes of all nodes.
+
+        Returns
+        -------
+        (3n, 6): translations in x, y and z, rotations about x, y and z.
+        """
+        return rigid_modes(self.mesh.points)
+
+    # ---- loads and motion ----------------------------------------------------------------------
 
     @property
     def motion(self) -> Attachment | None:
@@ -95,8 +428,6 @@ class Structure(SupportedSolid, Tabular):
         if value is not None:
             raise ModelError("a motion also ties or fixes boundaries: give it to model.add(...)")
         self._motion = None
-
-    # ---- loads --------------------------------------------------------------------------------
 
     def add(
         self,
@@ -143,11 +474,11 @@ class Structure(SupportedSolid, Tabular):
             raise InputError(f"a load such as Gravity or Traction is needed; got {type(load).__name__}")
         load = load if amplitude is None else ScaledLoad(load, amplitude)
         load.check(self.mesh)
-        key, named = key_of(load), self.named_loads
+        named = self.named_loads
         if name is not None:
             instance(name, "the name of a load", str, "'wind'")
         if name in named:
-            if key_of(named[name]) == key:
+            if key_of(named[name]) == key_of(load):
                 return
             if not override:
                 raise ModelError(
@@ -156,22 +487,9 @@ class Structure(SupportedSolid, Tabular):
                 )
             self.loads[:] = [load if other is named[name] else other for other in self.loads]
         else:
-            self._tell_equal(load, key)
             self.loads.append(load)
-        self._keys[key] = load
         if name is not None:
             self._named[name] = load
-
-    def _tell_equal(self, load: Load, key: Hashable) -> None:
-        """Log a warning if an equal load is there already; the report has it, too."""
-        if _place(self.loads, self._keys.get(key)) is not None:
-            import logging  # a quick start without it
-
-            logging.getLogger("kratos_lite").warning(
-                "an equal load %r is there already; both act.  If one alone is meant, as where a cell of a "
-                "notebook is run twice, give it a name: model.add(load, name=...)",
-                load,
-            )
 
     @property
     def named_loads(self) -> dict[str, Load]:
@@ -212,6 +530,20 @@ class Structure(SupportedSolid, Tabular):
         del self.loads[place]
 
     # ---- checks -------------------------------------------------------------------------------
+
+    def check_geometry(self) -> list[str]:
+        """Check coordinates, node lists and det J of all elements, whatever their material.
+
+        Returns
+        -------
+        Warnings, one sentence each.
+
+        Raises
+        ------
+        MeshError, InputError
+            With every element that is wrong.
+        """
+        return checks.check_geometry(self.mesh, self.formulation)
 
     def checked(self) -> tuple[list[ElementGroup], list[str]]:
         """Return what a solution starts from, of a model that passes all checks but that of `free_motions`.
@@ -280,6 +612,12 @@ class Structure(SupportedSolid, Tabular):
     def __repr__(self) -> str:
         name = type(self).__name__
         return f"{name}({self.mesh.n_nodes} nodes, {self.mesh.n_elements} elements, {len(self.loads)} loads)"
+
+
+def _kind(group: ElementGroup) -> str:
+    """Return the name of the element of a group, with its material where that decides about it."""
+    name = group.element.__name__
+    return f"{name} for {group.material}" if is_nearly_incompressible(group.material.C) else name
 
 
 CHECKS: tuple[Callable[[Structure, Sequence[ElementGroup]], list[str]], ...] = (

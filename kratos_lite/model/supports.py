@@ -1,16 +1,16 @@
-"""Supports: prescribed displacements, prescribed motion in time, and multi-point constraints of a mesh."""
+"""Supports: prescribed displacements, also as functions of time, and multi-point constraints of a mesh."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import replace
+from collections.abc import Callable, Hashable, Iterable, Mapping
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.mesh import Mesh
-from kratos_lite.model.fixing import AXES, Fixing, PrescribedMotion, Selected, axis_numbers
+from kratos_lite.mesh import Mesh, Where
+from kratos_lite.model.equal import key_of
 from kratos_lite.solvers.constraint_map import (
     ConstraintMap,
     Dependents,
@@ -25,20 +25,71 @@ from kratos_lite.validation import finite
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-UNUSED = "a constraint uses {}, which belongs to no element; remove it"
-PRESCRIBED_TWICE = "by a function of time and otherwise; fix it once, or with override=True"
+AXES = "xyz"
+CONSTANT = -1
+"""In place of the number of a function of time."""
+
+
+def axis_numbers(axes: str) -> list[int]:
+    """Return the axis numbers of a word such as ``"xz"``.
+
+    >>> axis_numbers("xz")
+    [0, 2]
+    """
+    known = isinstance(axes, str) and axes and set(axes) <= set(AXES)
+    if not known or len(set(axes)) != len(axes):
+        raise InputError(f"axes must be some of x, y, z, each once, such as 'xz'; got {axes!r}")
+    return [AXES.index(a) for a in axes]
+
+
+@dataclass(frozen=True, eq=False)
+class DirichletCondition:
+    """One call of `Structure.fix` or `Structure.release`, from which a refined mesh is supported alike.
+
+    Attributes
+    ----------
+    where, nodes : the nodes as the caller chose them, and their indices.
+    axes : such as ``"xz"``.
+    value : m; as the caller gave it, or a function of time in s.
+    field : function of places, or None.
+    override : whether it replaces earlier ones.
+    name : of the support, or None.
+    released : whether the nodes are released along the axes instead.
+    """
+
+    where: Where
+    nodes: Ints
+    axes: str
+    value: ArrayLike | Callable[[float], float] = 0.0
+    field: Callable[[Array], ArrayLike] | None = None
+    override: bool = False
+    name: str | None = None
+    released: bool = False
+
+    def __str__(self) -> str:
+        where = self.where if isinstance(self.where, str) else f"{len(self.nodes)} nodes"
+        if self.released:
+            return f"{where}: {self.axes} released"
+        value = "by a field" if self.field is not None else "as a function of time"
+        if not callable(self.value) and self.field is None:
+            value = f"= {self.value:g} m" if isinstance(self.value, (int, float)) else "by values"
+        return f"{self.name + ': ' if self.name else ''}{where}, {self.axes} {value}"
+
+    @property
+    def key(self) -> Hashable:
+        """What equal calls share."""
+        return key_of([self.nodes, self.axes, self.value, self.field])
 
 
 class Supports:
-    """What holds a structure: prescribed displacements, prescribed motion and multi-point constraints.
+    """What supports a structure: Dirichlet conditions, constant or functions of time, and constraints.
 
     Attributes
     ----------
     fixed : (n, 3) bool, read-only, which degrees of freedom are prescribed.
     values : (n, 3) float, read-only, their displacements in m, at the time 0 where they move.
+    conditions : the Dirichlet conditions that these came from, in order.
     hanging : the constraints of hanging nodes, the first of all.
-    motions : the prescribed motion.
-    fixings : the calls of `Structure.fix` that all this came from, in order.
     version : counts the changes of what is prescribed, but for values and functions of time.
     value_version : counts all changes.
     """
@@ -47,146 +98,128 @@ class Supports:
         self.mesh = mesh
         self._fixed: Mask = np.zeros(mesh.points.shape, dtype=bool)
         self._values: Array = np.zeros(mesh.points.shape)
+        self._function = np.full(mesh.points.shape, CONSTANT, dtype=np.int32)
+        self._functions: list[tuple[object, Callable[[float], float]]] = []
         self.fixed, self.values = self._fixed.view(), self._values.view()
         self.fixed.flags.writeable = self.values.flags.writeable = False
         self.hanging = self._constraints = hanging_constraints(mesh)
         self._hangs = np.zeros(mesh.n_nodes, dtype=bool)
         if mesh.hanging is not None:
             self._hangs[mesh.hanging.nodes] = True
-        self.fixings: list[Fixing] = []
-        self.motions: tuple[PrescribedMotion, ...] = ()
+        self.conditions: list[DirichletCondition] = []
         self.version = self.value_version = 0
         self._dependents: tuple[int, Dependents] = (-1, {})
+
+    def __str__(self) -> str:
+        tied = [f"{len(self.constraints)} constraints"] if self.constraints else []
+        return "\n".join([*map(str, self.conditions), *tied]) or "none"
 
     def name(self, dof: int) -> str:
         """Return the readable name of a degree of freedom, 3·node + axis."""
         return f"node {self.mesh.node_ids[dof // 3]} along {AXES[dof % 3]}"
 
-    # ---- prescribed displacements ------------------------------------------------------------------------
+    def dof(self, where: tuple[int, str]) -> int:
+        """Return the number of a degree of freedom (node index, axis letter)."""
+        node, axis = where if isinstance(where, tuple) and len(where) == 2 else (None, None)
+        known = isinstance(node, (int, np.integer)) and 0 <= node < self.mesh.n_nodes
+        if not known or axis not in tuple(AXES):
+            raise InputError(f"a degree of freedom is (node index, axis letter); got {where!r}")
+        return 3 * int(where[0]) + AXES.index(where[1])
 
-    def apply(self, fixing: Fixing) -> None:
-        """Prescribe or release what a call of `Structure` asks for; hanging nodes follow others."""
-        rows, value = fixing.rows, fixing.value
-        if fixing.released:
-            self._free(rows, fixing.axes)
-            self.fixings.append(fixing)
+    # ---- Dirichlet conditions ----------------------------------------------------------------------------
+
+    @property
+    def named(self) -> dict[str, DirichletCondition]:
+        """The conditions that have a name, by their names."""
+        return {condition.name: condition for condition in self.conditions if condition.name is not None}
+
+    def add(self, condition: DirichletCondition) -> None:
+        """Add a condition: one with the name of another replaces this, if it is to override."""
+        old = self.named.get(condition.name or "")
+        if old and old.key == condition.key:
             return
-        stays = ~self._hangs[rows]
-        if len(rows) and not stays.any():
+        if old and not condition.override:
             raise ModelError(
-                f"cannot fix {fixing.axes}: the nodes, such as {self.mesh.node_ids[rows[0]]}, hang on an "
+                f"there is another support {old.name!r} already, {old}; replace it by override=True, or take "
+                f"it away by model.release({old.name!r})"
+            )
+        self._apply(condition)
+        self.conditions.append(condition)
+        if old:
+            self.drop(old)
+
+    def drop(self, condition: DirichletCondition) -> None:
+        """Take a condition away; what others prescribe stays."""
+        self.conditions = [other for other in self.conditions if other is not condition]
+        self._fixed[:], self._values[:], self._function[:] = False, 0.0, CONSTANT
+        self.version += 1
+        self.value_version += 1
+        for other in self.conditions:
+            self._apply(replace(other, override=True))
+
+    def _apply(self, condition: DirichletCondition) -> None:
+        """Prescribe or release what a condition says; hanging nodes follow others."""
+        nodes, axes, value, function = condition.nodes, condition.axes, condition.value, CONSTANT
+        numbers = axis_numbers(axes)
+        if condition.released:
+            at = np.ix_(nodes, np.array(numbers))
+            self._fixed[at], self._values[at], self._function[at] = False, 0.0, CONSTANT
+            self.version += 1
+            self.value_version += 1
+            return
+        follows = self._hangs[nodes]
+        if len(nodes) and follows.all():
+            raise ModelError(
+                f"cannot fix {axes}: the nodes, such as {self.mesh.node_ids[nodes[0]]}, hang on an "
                 "edge or face of a larger element and follow its nodes; fix these"
             )
         if callable(value):
-            self.prescribe_motion(rows[stays], fixing.axes, value, fixing.override)
-        else:
-            if fixing.field is not None:
-                value = fixing.field(self.mesh.points[rows])
-            value = finite(value, "a prescribed displacement")
-            if value.ndim == 2 and len(value) == len(rows):
-                value = value[stays]
-            self.fix(rows[stays], fixing.axes, value, fixing.override)
-        self.fixings.append(fixing)
-
-    @property
-    def named(self) -> dict[str, Fixing]:
-        """The calls of `Structure.fix` that have a name, by their names."""
-        return {fixing.name: fixing for fixing in self.fixings if fixing.name is not None}
-
-    def drop(self, gone: Fixing) -> None:
-        """Take back one call of `Structure.fix`; what others prescribe stays."""
-        kept = [fixing for fixing in self.fixings if fixing is not gone]
-        self.motions = ()
-        self._fixed[:], self._values[:] = False, 0.0
-        self.version += 1
-        self.value_version += 1
-        for fixing in kept:
-            self.apply(replace(fixing, override=True))
-        self.fixings = kept
-
-    def release(self, where: Selected, rows: Ints, axes: str) -> None:
-        """Release nodes along axes, whatever has prescribed them; ModelError if nothing has."""
-        held = self.fixed[np.ix_(rows, np.array(axis_numbers(axes)))].any()
-        if self.mesh.whole and not held:
-            raise ModelError(f"nothing is prescribed along {axes} there, so that nothing is released")
-        self.apply(Fixing(where, rows, axes, 0.0, None, True, released=True))
-
-    def _free(self, rows: Ints, axes: str) -> None:
-        numbers = axis_numbers(axes)
-        at = np.ix_(rows, np.array(numbers))
-        self._end_motion(rows, numbers, None, override=True)
-        self._fixed[at], self._values[at] = False, 0.0
-        self.version += 1
-        self.value_version += 1
-
-    def __str__(self) -> str:
-        tied = [f"{len(self.constraints)} constraints"] if self.constraints else []
-        return "\n".join([*map(str, self.fixings), *tied]) or "none"
-
-    def fix(self, rows: Ints, axes: str, value: ArrayLike = 0.0, override: bool = False) -> None:
-        """Prescribe the displacement of nodes along axes."""
-        numbers = axis_numbers(axes)
+            function, value = self._number(value)
+        elif condition.field is not None:
+            value = condition.field(self.mesh.points[nodes])
         new = finite(value, "a prescribed displacement")
         try:
-            new = np.broadcast_to(new, (len(rows), len(numbers)))
+            new = np.broadcast_to(new, (len(nodes), len(numbers)))[~follows]
         except ValueError:
             raise InputError(
                 f"value must be one number, {len(numbers)} numbers (one per axis of {axes!r}) "
-                f"or have shape ({len(rows)}, {len(numbers)}); got shape {new.shape}"
+                f"or have shape ({len(nodes)}, {len(numbers)}); got shape {new.shape}"
             ) from None
-        at = np.ix_(rows, np.array(numbers))
-        clash = self.fixed[at] & (self.values[at] != new)
-        if clash.any() and not override:
-            i, j = np.argwhere(clash)[0]
-            dof = int(3 * rows[i] + numbers[j])
-            raise ModelError(
-                f"{self.name(dof)} is prescribed twice: {self.values.flat[dof]:g} m and {new[i, j]:g} m; "
-                "fix it once, or with override=True"
-            )
-        self._end_motion(rows, numbers, None, override)
-        self._prescribe(at, new)
-
-    def prescribe_motion(
-        self, rows: Ints, axes: str, function: Callable[[float], float], override: bool = False
-    ) -> None:
-        """Prescribe the displacement of nodes along axes as a function of time; see `fix`."""
-        numbers, checked = axis_numbers(axes), function_of(function, "a prescribed displacement")
-        start = checked(0.0)
-        resting = self.fixed.copy()
-        for motion in self.motions:
-            resting[motion.rows, motion.axis] = False
-        at = np.ix_(rows, np.array(numbers))
-        i, j = np.nonzero(resting[at])
-        if len(i) and not override:
-            dof = 3 * int(rows[i[0]]) + numbers[j[0]]
-            raise ModelError(f"{self.name(dof)} is prescribed twice: {PRESCRIBED_TWICE}")
-        self._end_motion(rows, numbers, function, override)
-        self._prescribe(at, start)
-        self.motions += tuple(PrescribedMotion(rows, axis, checked, function) for axis in numbers)
-
-    def _prescribe(self, at: tuple[Ints, ...], value: ArrayLike) -> None:
-        """Set values, and count the change."""
+        at = np.ix_(nodes[~follows], np.array(numbers))
+        if not condition.override:
+            self._check_prescribed_once(at, new, function)
         self.version += not self.fixed[at].all()
         self.value_version += 1
-        self._fixed[at] = True
-        self._values[at] = value
+        self._fixed[at], self._values[at], self._function[at] = True, new, function
 
-    def _end_motion(self, rows: Ints, axes: list[int], given: object, override: bool) -> None:
-        """Take nodes out of the motion that they have along axes, unless the same function is given again."""
-        kept = []
-        for old in self.motions:
-            again = np.isin(old.rows, rows) & (old.axis in axes)
-            if again.any() and not override and old.given is not given:
-                dof = 3 * int(old.rows[again][0]) + old.axis
-                raise ModelError(f"{self.name(dof)} is prescribed twice: {PRESCRIBED_TWICE}")
-            kept.append(replace(old, rows=old.rows[~again]))
-        self.motions = tuple(old for old in kept if len(old.rows))
+    def _number(self, function: Callable[[float], float]) -> tuple[int, float]:
+        """Return the number of a function of time, and its value at the time 0."""
+        checked = function_of(function, "a prescribed displacement")
+        start = checked(0.0)
+        for number, (known, _) in enumerate(self._functions):
+            if known is function:
+                return number, start
+        self._functions.append((function, checked))
+        return len(self._functions) - 1, start
 
-    def _function(self, dof: int) -> object:
-        """Return the function of time of a degree of freedom, as the caller gave it, or None."""
-        node, axis = divmod(dof, 3)
-        mine = (m.given for m in self.motions if m.axis == axis and (m.rows == node).any())
-        return next(mine, None)
+    def _check_prescribed_once(self, at: tuple[Ints, ...], new: Array, function: int) -> None:
+        """Raise ModelError if degrees of freedom have another value, or another function of time."""
+        differs = (self._function[at] != function) | ((self.values[at] != new) & (function == CONSTANT))
+        clash = np.argwhere(self.fixed[at] & differs)
+        for i, j in clash[:1]:
+            dof = int(3 * at[0][i, 0] + at[1][0, j])
+            how = f"{self.values.flat[dof]:g} m and {new[i, j]:g} m"
+            if function != CONSTANT or self._function.flat[dof] != CONSTANT:
+                how = "by a function of time and otherwise"
+            raise ModelError(
+                f"{self.name(dof)} is prescribed twice: {how}; fix it once, or with override=True"
+            )
+
+    @property
+    def motions(self) -> list[tuple[Callable[[float], float], Mask]]:
+        """Functions of the time in s that return m, each with the degrees of freedom (n, 3) that it moves."""
+        moved = [(function, self._function == number) for number, (_, function) in enumerate(self._functions)]
+        return [(function, mask) for function, mask in moved if mask.any()]
 
     # ---- multi-point constraints ------------------------------------------------------------------------
 
@@ -206,6 +239,21 @@ class Supports:
         if self._dependents[0] != self.value_version:
             self._dependents = self.value_version, self._eliminated(self.values, agree=True)
         return self._dependents[1]
+
+    def constrain(
+        self, dependent: tuple[int, str], independents: Mapping[tuple[int, str], float], constant: float
+    ) -> None:
+        """Add the constraint u[dependent] = Σ weight · u[independent] + constant; see `Structure`."""
+        if not isinstance(independents, Mapping):
+            raise InputError(
+                f"independents must map (node index, axis letter) to a weight; got {independents!r}"
+            )
+        weights = finite(list(independents.values()), "weights of a constraint").tolist()
+        offset = float(finite(constant, "the constant of a constraint"))
+        constraint = MultiPointConstraint(
+            self.dof(dependent), tuple(map(self.dof, independents)), tuple(weights), offset
+        )
+        self.constraints = (*self.constraints, constraint)
 
     def _eliminated(self, values: Array, agree: bool) -> Dependents:
         """Return the dependents for prescribed values; those of symmetric ties must agree if requested."""
@@ -228,7 +276,7 @@ class Supports:
             return MultiPointConstraint(independent, (dependent,), (1.0,))
         one, other = self.values.flat[dependent], self.values.flat[independent]
         both = f"{self.name(dependent)} and {self.name(independent)} are tied, but"
-        if agree and self._function(dependent) is not self._function(independent):
+        if agree and self._function.flat[dependent] != self._function.flat[independent]:
             raise ModelError(f"{both} move differently: give both the same function, or fix only one of them")
         if agree and one != other:
             raise ModelError(
@@ -243,7 +291,8 @@ class Supports:
         )
         unused = dofs[~used[dofs // 3]]
         if len(unused):
-            raise ModelError(UNUSED.format(self.name(int(unused[0]))))
+            name = self.name(int(unused[0]))
+            raise ModelError(f"a constraint uses {name}, which belongs to no element; remove it")
         return []
 
     # ---- for the equations ------------------------------------------------------------------------------
@@ -265,12 +314,7 @@ class Supports:
         row[nodes] = np.arange(len(nodes))
 
         def dof(old: int) -> int:
-            new = int(row[old // 3])
-            if new < 0:
-                raise ModelError(
-                    f"a constraint uses {self.name(old)}, which belongs to no element; remove it"
-                )
-            return 3 * new + old % 3
+            return 3 * int(row[old // 3]) + old % 3
 
         return {
             dof(dependent): ({dof(independent): weight for independent, weight in terms.items()}, constant)

@@ -26,7 +26,7 @@ def strained(model, how):
     if how == "prestress":
         model.add_prestress((1e3, 1e3, 1e3, 0, 0, 0))
     else:
-        model.stress_free_at(1e-3 * model.mesh.points)
+        model.set_stress_free_state(1e-3 * model.mesh.points)
     return model
 
 

@@ -74,7 +74,7 @@ def test_a_prestress_does_no_work_in_it():
 def test_it_is_0_in_the_state_without_stress():
     model = bar()
     stretched = model.mesh.points * [1e-3, 0, 0]
-    model.stress_free_at(stretched)
+    model.set_stress_free_state(stretched)
     result = model.solve()
     for density in densities(result):
         assert np.abs(density / UNIAXIAL - 1).max() < 1e-10

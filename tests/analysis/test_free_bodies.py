@@ -82,7 +82,7 @@ def test_own_strain_and_own_stress_are_in_balance_by_nature():
     warm, stressed = bar(element=ELEMENTS[1]), bar()
     X = warm.mesh.points - warm.mesh.points.mean(axis=0)
     turned = np.cross((1e-3, -2e-3, 3e-3), X) + 0.1
-    warm.stress_free_at(1.2e-5 * 80 * (X - (X.max(axis=0) + X.min(axis=0)) / 2) + turned)
+    warm.set_stress_free_state(1.2e-5 * 80 * (X - (X.max(axis=0) + X.min(axis=0)) / 2) + turned)
     result = warm.solve()
     near(result.u, 1.2e-5 * 80 * (X - (X.max(axis=0) + X.min(axis=0)) / 2))
     assert np.abs(result.stress("element")).max() < 1e-6 * STEEL.E * 1.2e-5 * 80

@@ -31,7 +31,7 @@ def mixed_model(density=7.0):
     )
     model.use_rule(3, [1])
     model.add_prestress([5.0, -3.0, 2.0, 1.0, 4.0, -2.0], [0, 6])
-    model.stress_free_at(1e-4 * np.sin(np.arange(spare.size)).reshape(-1, 3))
+    model.set_stress_free_state(1e-4 * np.sin(np.arange(spare.size)).reshape(-1, 3))
     model.fix(lambda X: X[:, 0] < 0.1)
     model.add(kl.Gravity((1.0, 2.0, -9.81)))
     model.add(kl.BodyForce((0.0, 30.0, 0.0), [2, 5]), amplitude=2.0)

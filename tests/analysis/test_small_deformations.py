@@ -98,7 +98,7 @@ def test_large_prescribed_displacements_are_not_blamed_on_units_and_rigid_ones_o
 def test_displacement_counts_from_the_state_without_stress():
     model = kl.Model(kl.box(), kl.Isotropic3D(210e9, 0.3))
     u0 = 0.4 * model.mesh.points
-    model.stress_free_at(u0)
+    model.set_stress_free_state(u0)
     model.fix("z-", "xyz", u0[model.mesh.nodes("z-")])
     assert not told(model.solve().report.warnings)
 

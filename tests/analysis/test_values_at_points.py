@@ -176,7 +176,7 @@ def test_values_at_gauss_points_are_found_again_by_their_places(kind):
     mesh = distorted(kind)
     u = 1e-3 * np.random.default_rng(1).uniform(-1, 1, mesh.points.shape)
     model = held_model(mesh, u)
-    model.stress_free_at(u[::-1])
+    model.set_stress_free_state(u[::-1])
     model.add_prestress(np.arange(6.0 * mesh.n_elements).reshape(-1, 6))
     result = model.solve()
     places = result.at_integration_points("INTEGRATION_COORDINATES")

@@ -71,7 +71,7 @@ def initial(mesh):
     model = clamped(mesh)
     ids = mesh.element_ids[:, None] + np.arange(6)
     model.add_prestress(1e3 * np.sin(ids))
-    model.stress_free_at(1e-4 * np.cos(mesh.points[:, [1, 2, 0]] * 5))
+    model.set_stress_free_state(1e-4 * np.cos(mesh.points[:, [1, 2, 0]] * 5))
     return model
 
 

@@ -76,7 +76,7 @@ def test_materials_prestress_and_stress_free_displacement_follow():
     one = model()
     one.assign(kl.Isotropic3D(E=1e9, nu=0.2), [1])
     one.add_prestress(np.arange(6.0), [2])
-    one.stress_free_at(one.mesh.points * 0.1)
+    one.set_stress_free_state(one.mesh.points * 0.1)
     for finer in finer_of(one):
         new = refined(one, finer)
         stiff = {group.material.C[0, 0]: group.rows for group in new.element_groups()}

@@ -53,7 +53,7 @@ MUTATIONS = [
         "joined.sum(axis=1) >= 1",
         "tests/model/test_spurious_modes.py",
     ),
-    Mutation("model/spurious_modes.py", "& held[ends]", "& True", "tests/model/test_spurious_modes.py"),
+    Mutation("model/spurious_modes.py", "None] & held", "None] & True", "tests/model/test_spurious_modes.py"),
     # ---- shapes, rules, B, C
     Mutation("shapes/tensor.py", "f = 1 + x * p", "f = 1 - x * p", ELEMENTS),
     Mutation(

@@ -44,7 +44,7 @@ def model_of(problem):
     if problem.prestress is not None:
         model.add_prestress(problem.prestress)
     if problem.stress_free is not None:
-        model.stress_free_at(problem.stress_free)
+        model.set_stress_free_state(problem.stress_free)
     return model
 
 

@@ -94,11 +94,11 @@ WRONG = {
     ),
     "nodal vector": (lambda: kl.NodalForces(np.ones(3)), r"nodal forces must be \(n, 3\)"),
     "activate word": (
-        lambda: model().stress_free_at("a"),
+        lambda: model().set_stress_free_state("a"),
         "the initial displacement must be made of real numbers",
     ),
     "activate shape": (
-        lambda: model().stress_free_at(np.zeros(3)),
+        lambda: model().set_stress_free_state(np.zeros(3)),
         r"the initial displacement must have shape \(27, 3\)",
     ),
     "prestress word": (lambda: model().add_prestress("a"), "a prestress must be made of real numbers"),

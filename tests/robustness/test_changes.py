@@ -120,7 +120,7 @@ def test_warnings_of_rules_come_once():
 
 def test_what_a_model_was_checked_with_cannot_be_changed_in_place():
     model = pressed()
-    model.stress_free_at(np.zeros_like(model.mesh.points))
+    model.set_stress_free_state(np.zeros_like(model.mesh.points))
     mesh, block = model.mesh, model.mesh.blocks[0]
     arrays = [mesh.points, mesh.node_ids, mesh.parts["z-"].nodes, block.nodes, block.ids, block.properties]
     arrays += [model.prestress, model.initial_displacement]

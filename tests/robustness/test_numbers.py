@@ -188,7 +188,7 @@ def test_elements_with_different_rules_give_a_list_of_stresses():
 def test_a_rigid_displacement_without_stress_leaves_a_held_body_without_stress(distance):
     model = kl.Model(kl.box(cells=(2, 2, 2)), kl.Isotropic3D(E=1e9, nu=0.3))
     model.fix("z-")
-    model.stress_free_at(np.full((27, 3), distance))
+    model.set_stress_free_state(np.full((27, 3), distance))
     result = model.solve()
     assert np.abs(result.u).max() < 1e-14 * distance
     assert np.abs(result.stress()).max() < 1e-5 * distance  # rounding of 1e9 Pa times the distance

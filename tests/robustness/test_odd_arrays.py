@@ -123,12 +123,12 @@ CASES: Case = {
     ("Structure.fix", "where"): (lambda v: changed("fix", v), NODES),
     ("Structure.release", "where"): (released, NODES),
     ("Structure.fix", "value"): (lambda v: changed("fix", "z+", "xyz", v), VECTOR),
-    ("Solid.assign", "where"): (lambda v: changed("assign", ROCK, v), [0]),
-    ("Solid.use_rule", "where"): (lambda v: changed("use_rule", 2, v), [0]),
-    ("Solid.add_prestress", "stress"): (lambda v: changed("add_prestress", v), STRESS),
-    ("Solid.add_prestress", "where"): (lambda v: changed("add_prestress", STRESS, v), [0]),
-    ("Solid.stress_free_at", "displacement"): (
-        lambda v: changed("stress_free_at", v),
+    ("Structure.assign", "where"): (lambda v: changed("assign", ROCK, v), [0]),
+    ("Structure.use_rule", "where"): (lambda v: changed("use_rule", 2, v), [0]),
+    ("Structure.add_prestress", "stress"): (lambda v: changed("add_prestress", v), STRESS),
+    ("Structure.add_prestress", "where"): (lambda v: changed("add_prestress", STRESS, v), [0]),
+    ("Structure.set_stress_free_state", "displacement"): (
+        lambda v: changed("set_stress_free_state", v),
         1e-3 * CUBE.points[:, ::-1],
     ),
     ("Structure.add", "amplitude"): (lambda v: loaded(kl.Gravity(VECTOR), v), 2.0),

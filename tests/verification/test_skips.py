@@ -105,7 +105,7 @@ def by_prestress(model):
 def by_initial_displacement(model):
     u0 = np.zeros_like(model.mesh.points)
     u0[26] = 1e-3
-    model.stress_free_at(u0)
+    model.set_stress_free_state(u0)
 
 
 @pytest.mark.parametrize(

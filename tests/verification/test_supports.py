@@ -283,7 +283,7 @@ def test_a_body_activated_in_a_displaced_state_has_no_stress_there():
     for side in ("x-", "y-", "z-"):
         model.fix(side, "xyz", u0[mesh.nodes(side)], override=True)
     model.fix("x+", "xyz", u0[mesh.nodes("x+")], override=True)
-    model.stress_free_at(u0)
+    model.set_stress_free_state(u0)
     result = model.solve()
     np.testing.assert_allclose(result.u, u0, atol=1e-16)
     np.testing.assert_allclose(result.stress(), 0, atol=1e-3)
@@ -372,7 +372,7 @@ def test_a_free_expansion_that_the_supports_allow_is_in_equilibrium(kind, cells)
     for part, axis in (("x-", "x"), ("y-", "y"), ("z-", "z")):
         model.fix(part, axis)
     expansion = mesh.points * [0.01, 0.02, 0.03]
-    model.stress_free_at(expansion)
+    model.set_stress_free_state(expansion)
     result = model.solve()
     assert np.abs(result.u - expansion).max() < 1e-11
     assert np.abs(result.stress()).max() < 1e-5  # of stresses of 1e4 Pa, if it were held

@@ -135,7 +135,7 @@ def _activate(model: Model, u0: Array) -> None:
         text = f"initial DISPLACEMENT of {count} free nodes is not used: {others[0]} takes it for a guess"
         model.notes.append(f"{text}, only KinematicLinear3D and its kin for the state without stress")
     elif count:
-        model.stress_free_at(u0)
+        model.set_stress_free_state(u0)
         text = f"elements are free of stress at the initial DISPLACEMENT of {count} free nodes"
         model.notes.append(f"{text}; --ignore-initial-displacement leaves it out")
 

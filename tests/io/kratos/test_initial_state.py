@@ -142,6 +142,6 @@ def test_a_written_model_is_free_of_stress_at_the_same_displacement(write, tmp_p
 
 def test_a_model_whose_initial_displacement_has_no_place_in_a_file_is_not_written(write, tmp_path):
     model = kl.read(write())
-    model.stress_free_at(np.full((8, 3), 1e-3))
+    model.set_stress_free_state(np.full((8, 3), 1e-3))
     with pytest.raises(kl.InputError, match="prescribed degrees of freedom cannot be written"):
         kl.write(tmp_path / "x.mdpa", model)
