@@ -7,6 +7,7 @@ Source: Kronbichler & Kormann, Computers & Fluids 63 (2012) 135-147.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -36,8 +37,18 @@ class MatrixFree:
     ) -> None:
         self.points, self.groups = as_double(points), list(groups)
         self.assembled = self._assembled if assembled is None else assembled
+        self.tied = False
         module = compiled("multigrid", self.groups[0].element)
         self.product: Any = module.Product(self.points, list(map(_tables, self.groups)))
+
+    def tie(self, T: Any, assembled: Callable[[], BlockMatrix]) -> MatrixFree:
+        """Return T^T K T (3n, 3n), with T in the numbering of all components; `assembled` makes it."""
+        tied = copy(self)
+        tied.tied, tied.assembled = True, assembled
+        dependents = np.flatnonzero((np.diff(T.indptr) > 0) & (T.diagonal() == 0)).astype(np.int32)
+        rows = T[dependents]
+        self.product.tie(dependents, rows.indptr.astype(np.int32), rows.indices.astype(np.int32), rows.data)
+        return tied
 
     @staticmethod
     def takes(group: ElementGroup) -> bool:
@@ -57,7 +68,7 @@ class MatrixFree:
 
     def __matmul__(self, x: Array) -> Array:
         """Return K x of a vector (3n,)."""
-        return self.product.times(np.ascontiguousarray(x, dtype=float))
+        return self.product.times(np.ascontiguousarray(x, dtype=float), self.tied)
 
     def norm(self) -> float:
         """Return the largest row sum of |K| over the nodes of an element at the stiffest node."""

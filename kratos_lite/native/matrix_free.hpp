@@ -3,6 +3,8 @@
 // Forces of elements are summed node by node in ascending order of elements, whatever the number of threads.
 
 #pragma once
+#include <algorithm>
+#include <numeric>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -11,6 +13,45 @@
 #include "sparse.hpp"
 
 namespace kl {
+
+// Components x_i = sum w x_j that depend on others; where K is tied, T'K T takes its place.
+struct Ties {
+    struct Share {
+        int32_t node, tie;  // of an independent component, and the dependent one it takes a share of
+        int axis;
+        double weight;
+    };
+    std::vector<int32_t> dependents, start, independents;
+    std::vector<double> weights;
+    std::vector<Share> shares;       // sorted by nodes
+    std::vector<int32_t> of;         // first share of each node, (n + 1)
+
+    Ties() = default;
+    Ties(std::vector<int32_t> dependents, std::vector<int32_t> start, std::vector<int32_t> independents,
+         std::vector<double> weights, int64_t n)
+        : dependents(std::move(dependents)), start(std::move(start)), independents(std::move(independents)),
+          weights(std::move(weights)), of(n + 1, 0) {
+        for (int32_t t = 0; t < size(); ++t)
+            for (int32_t k = this->start[t]; k < this->start[t + 1]; ++k) {
+                const int32_t j = this->independents[k];
+                shares.push_back({j / 3, t, j % 3, this->weights[k]});
+                ++of[j / 3 + 1];
+            }
+        std::stable_sort(shares.begin(), shares.end(), [](const Share& a, const Share& b) { return a.node < b.node; });
+        std::partial_sum(of.begin(), of.end(), of.begin());
+    }
+    int32_t size() const { return static_cast<int32_t>(dependents.size()); }
+
+    // Give dependent components of x (3n) what they depend on.
+    template <class T>
+    void fill(T* x) const {
+        for (int32_t t = 0; t < size(); ++t) {
+            T sum = 0;
+            for (int32_t k = start[t]; k < start[t + 1]; ++k) sum += static_cast<T>(weights[k]) * x[independents[k]];
+            x[dependents[t]] = sum;
+        }
+    }
+};
 
 class MatrixFree {
 public:
@@ -42,34 +83,59 @@ public:
         for (ProductGroup& s : groups) find_places(s);
     }
 
-    // done(i, y) with y = (K x)_i for each node i, by all threads.
+    // done(i, y) with y = (K x)_i for each node i, by all threads; tied or not.
     template <class T, class F>
-    void multiply(const T* x, const F& done) const {
+    void multiply(const T* x, const F& done, bool tied = true) const {
         const auto turn = turns.take();
         std::vector<T>& room = std::get<std::vector<T>>(rooms);
         room.resize(4 * pairs);
+        tied = tied && ties.size();
+        std::vector<T> filled, passed_on(tied ? ties.size() : 0);
+        if (tied) {
+            filled.assign(x, x + 3 * n + 1);
+            ties.fill(filled.data());
+            x = filled.data();
+        }
         for (const ProductGroup& s : groups)
             over(s, [&](int64_t first, int64_t last) { run(s, x, room.data() + 4 * (s.first + first * s.w.k), first, last); });
+        const auto force = [&](int64_t i) {
+            vec<T, 4> sum = {};
+            for (int32_t p = start[i]; p < start[i + 1]; ++p)
+                sum += *reinterpret_cast<const vec<T, 4>*>(room.data() + 4 * static_cast<int64_t>(met[p]));
+            return sum;
+        };
+        for (size_t t = 0; t < passed_on.size(); ++t) passed_on[t] = force(ties.dependents[t] / 3)[ties.dependents[t] % 3];
         parallel_ranges(n, NODES, [&](int64_t first, int64_t last) {
             for (int64_t i = first; i < last; ++i) {
-                vec<T, 4> sum = {};
-                for (int32_t p = start[i]; p < start[i + 1]; ++p)
-                    sum += *reinterpret_cast<const vec<T, 4>*>(room.data() + 4 * static_cast<int64_t>(met[p]));
-                const T y[3] = {sum[0], sum[1], sum[2]};
+                const vec<T, 4> sum = force(i);
+                T y[3] = {sum[0], sum[1], sum[2]};
+                for (int32_t k = tied ? ties.of[i] : 0; tied && k < ties.of[i + 1]; ++k)
+                    y[ties.shares[k].axis] += static_cast<T>(ties.shares[k].weight) * passed_on[ties.shares[k].tie];
                 done(i, y);
             }
         });
     }
 
     // x has a number behind its last.
-    void multiply(const double* x, double* y) const {
-        multiply(x, [&](int64_t i, const double* sum) { std::copy(sum, sum + 3, y + 3 * i); });
+    void multiply(const double* x, double* y, bool tied = true) const {
+        multiply(x, [&](int64_t i, const double* sum) { std::copy(sum, sum + 3, y + 3 * i); }, tied);
     }
 
-    // The diagonal blocks, row-major; they are kept from `norm` on until they are taken.
+    // The diagonal blocks, row-major; they are kept from `norm` on until they are taken.  Those of ties are
+    // without the stiffness between a node and its dependents: good enough to smooth with.
     std::vector<double> diagonal() const {
         const auto turn = turns.take();
-        return kept.empty() ? diagonal_blocks() : std::exchange(kept, {});
+        std::vector<double> D = kept.empty() ? diagonal_blocks() : std::exchange(kept, {});
+        const std::vector<double> untied = ties.size() ? D : std::vector<double>();
+        for (int64_t i = 0; ties.size() && i < n; ++i)
+            for (int32_t k = ties.of[i]; k < ties.of[i + 1]; ++k)
+                for (int32_t l = ties.of[i]; l < ties.of[i + 1]; ++l) {
+                    const Ties::Share &a = ties.shares[k], &b = ties.shares[l];
+                    const int32_t j = ties.dependents[a.tie], m = ties.dependents[b.tie];
+                    if (j / 3 == m / 3)
+                        D[9 * i + 3 * a.axis + b.axis] += a.weight * b.weight * untied[9 * (j / 3) + 3 * (j % 3) + m % 3];
+                }
+        return D;
     }
 
     // The largest sum of |K| over a row among the nodes of an element at the stiffest node.
@@ -98,10 +164,12 @@ public:
     int64_t bytes() const {
         int64_t all = 4 * static_cast<int64_t>(start.size() + met.size() + std::get<0>(rooms).size() + 2 * std::get<1>(rooms).size());
         for (const ProductGroup& s : groups) all += 4 * static_cast<int64_t>(s.geometry.size());
+        all += static_cast<int64_t>(sizeof(Ties::Share) * ties.shares.size());
         return all;
     }
 
     int64_t n;
+    Ties ties;
 
 private:
     std::vector<double> diagonal_blocks() const {

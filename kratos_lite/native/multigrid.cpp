@@ -82,14 +82,24 @@ public:
         prepare();
     }
 
-    Array<double> times(Array<double> x) const {
+    // Components that depend on others from now on, with their weights.
+    void tie(Array<int32_t> dependents, Array<int32_t> indptr, Array<int32_t> independents, Array<double> weights) {
+        require(indptr.size() == dependents.size() + 1, "indptr must have a row for each dependent component");
+        require(weights.size() == independents.size(), "one weight for each index is needed");
+        check_rows(indptr, independents.size());
+        require(are_rows(dependents, 3 * n) && are_rows(independents, 3 * n), "indices must be components of nodes");
+        const auto copied = [](const auto& array) { return std::vector(array.data(), array.data() + array.size()); };
+        ties = Ties(copied(dependents), copied(indptr), copied(independents), copied(weights), n);
+    }
+
+    Array<double> times(Array<double> x, bool tied) const {
         require(x.size() == 3 * n, "x must have three numbers for each point");
         Array<double> y(3 * n);
         Doubles from(x.data(), x.data() + 3 * n);
         from.push_back(0);
         double* to = y.mutable_data();
         GilReleased release;
-        multiply(from.data(), to);
+        multiply(from.data(), to, tied);
         return y;
     }
 
@@ -379,7 +389,8 @@ auto shared_transfer(Array<int32_t> indptr, Array<int32_t> indices, Array<float>
 KL_MODULE(_multigrid, m) {
     add_class<Matrix>("kratos_lite.native.Matrix", {});
     add_class<Product>("kratos_lite.native.Product",
-                       {method<&Product::times>("times"), method<&Product::largest_row_sum>("norm")});
+                       {method<&Product::times>("times", nullptr, {"x", {"tied", Py_False}}), method<&Product::tie>("tie"),
+                        method<&Product::largest_row_sum>("norm")});
     add_class<Pressures>("kratos_lite.native.Pressures", {method<&Pressures::solve>("solve")});
     add_class<Multigrid>("kratos_lite.native.Multigrid",
                          {method<&Multigrid::aggregate>("aggregate", nullptr, {"modes", {"matrix", Py_None}}),

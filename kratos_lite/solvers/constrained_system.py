@@ -83,8 +83,7 @@ class ConstrainedSystem:
     def _has_product(self) -> bool:
         from kratos_lite.assembly.matrix_free import MatrixFree  # a quick start for small models
 
-        tied = self.constraint_map.T is not None or self._hanging is not None
-        return not tied and all(map(MatrixFree.takes, self.groups))
+        return all(map(MatrixFree.takes, self.groups))
 
     def _is_stretched(self) -> bool:
         from kratos_lite.solvers.coarse_level import is_stretched  # a quick start for small models

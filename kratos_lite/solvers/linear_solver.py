@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kratos_lite.assembly.block_matrix import BlockMatrix
+from kratos_lite.assembly.matrix_free import MatrixFree
 from kratos_lite.solvers import direct
 from kratos_lite.solvers.constraint_map import ConstraintMap
 from kratos_lite.solvers.plan import Plan, after, is_quick_to_factorize, tolerance_of
@@ -151,6 +152,9 @@ class LinearSolver:
             return self.K
         if isinstance(self.K, BlockMatrix):
             return constrained(self.K, T, free)
+        if isinstance(self.K, MatrixFree):
+            assembled = self.K.assembled
+            return self.K.tie(on_all(T, free), lambda: constrained(assembled(), T, free))
         D = (self.K.D.tocsr() @ on_all(T, free)).tobsr(self.K.D.blocksize)
         return replace(self.K, A=constrained(self.K.A, T, free), D=D)
 
@@ -204,8 +208,8 @@ class LinearSolver:
 
 def constrained(K: BlockMatrix, T: Any, free: Ints) -> BlockMatrix:
     """Return T^T K T in the numbering of all components, in 3x3 blocks; u = T q with q = u[free]."""
-    full = on_all(T, free)
-    return BlockMatrix.of(full.T @ K.scipy().tocsr() @ full)
+    full = on_all(T, free).tobsr((3, 3))
+    return BlockMatrix.of(full.T @ K.scipy() @ full)
 
 
 def on_all(T: Any, free: Ints) -> Any:
