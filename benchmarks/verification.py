@@ -71,7 +71,7 @@ def is_curved(mesh: kl.Mesh) -> bool:
 
 def given(model: kl.Model, kind: str, folder: Path, number: int) -> Given | None:
     """Write a model for the programs; None where it ties displacements to others, which not all can."""
-    if model.supports.constraints or model.motion is not None:
+    if len(model.supports.constraints) or model.motion is not None:
         return None
     scene = Scene("m", kind, number, model)
     forces = scene.forces()

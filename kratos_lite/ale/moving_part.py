@@ -42,8 +42,8 @@ def check_ties(
 ) -> list[str]:
     """Return a warning of ties of moving to other material along its flow; ModelError if it travels."""
     glued = []
-    for constraint in structure.supports.constraints:
-        dofs = np.array([constraint.dependent, *constraint.independents])
+    for dependent, independents, weights, _ in structure.supports.constraints:
+        dofs = np.array([dependent, *independents])
         nodes, axes = dofs // 3, dofs % 3
         if moving[nodes].all() or not moving[nodes].any():
             continue
@@ -55,7 +55,7 @@ def check_ties(
             )
         rows, at = np.unique(nodes, return_inverse=True)
         force = np.zeros((len(rows), 3))
-        np.add.at(force, (at, axes), [-1.0, *constraint.weights])
+        np.add.at(force, (at, axes), [-1.0, *weights])
         c = field(structure.mesh.points[rows])
         sizes = np.linalg.norm(c, axis=1) * np.linalg.norm(force, axis=1)
         along = np.abs((c * force).sum(axis=1)) > ALONG * sizes

@@ -11,7 +11,7 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.mesh import Mesh, WhereElements
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
-from kratos_lite.solvers.constraint_map import MultiPointConstraint
+from kratos_lite.solvers.constraints import Constraints
 from kratos_lite.time_series import Factor
 from kratos_lite.typing import Array, Ints
 from kratos_lite.validation import choice
@@ -94,8 +94,8 @@ class Translation(Motion):
         elif self.boundaries == "periodic":
             mesh = structure.mesh
             dependents, independents = periodic_pairs(mesh, self.direction, self.moving(mesh))
-            structure.supports.constraints += tuple(
-                MultiPointConstraint(3 * a + axis, (3 * b + axis,), (1.0,), symmetric=True)
-                for a, b in zip(dependents.tolist(), independents.tolist(), strict=True)
-                for axis in range(3)
+            dofs = [(3 * nodes[:, None] + np.arange(3)).ravel() for nodes in (dependents, independents)]
+            ones, zeros = np.ones(len(dofs[0])), np.zeros(len(dofs[0]))
+            structure.supports.constraints += Constraints.of(
+                dofs[0], dofs[1][:, None], ones, zeros, symmetric=True
             )

@@ -137,7 +137,7 @@ def solve_part(
 
 def _checked(model: Structure) -> tuple[list[ElementGroup], list[str]]:
     """Return elements and warnings of a part whose elements are sound; refuse what needs the whole mesh."""
-    if model.supports.constraints or model.motion is not None or model.mesh.hanging is not None:
+    if len(model.supports.constraints) or model.motion is not None or model.mesh.hanging is not None:
         raise ModelError(
             "constraints, hanging nodes and motions need the whole mesh on one process; solve it by "
             "`kratos-lite solve` from one file"

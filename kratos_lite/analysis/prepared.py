@@ -77,7 +77,7 @@ def dirichlet_conditions(supports: Supports, used: Mask) -> DirichletConditions:
     """Return what supports prescribe; ModelError where their constraints contradict one another."""
     dependents = supports.dependents()
     moved = supports.fixed & (supports.values != 0)
-    moved.flat[[dependent for dependent, (_, constant) in dependents.items() if constant]] = True
+    moved.flat[dependents.dependents[dependents.constants != 0]] = True
     displaced = any_axis(moved)
     at_rest = ~any_axis(~supports.fixed) & ~displaced
     return DirichletConditions(supports.value_version, displaced, at_rest, int(supports.fixed[used].sum()))

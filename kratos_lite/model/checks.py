@@ -235,7 +235,7 @@ def check_loads(
     loads: Sequence[Load], groups: Sequence[ElementGroup], forces: Array, supports: Supports
 ) -> list[str]:
     """Warn of loads that cannot do anything: gravity without mass, or forces on fixed components alone."""
-    moved = supports.values.any() or any(c.constant for c in supports.constraints)
+    moved = supports.values.any() or supports.constraints.constants.any()
     if any(isinstance(load, Gravity) for load in loads) and all(g.material.density == 0 for g in groups):
         return ["gravity acts on no mass: every material has density 0; give density in kg/m³"]
     if not forces.any() and not moved:

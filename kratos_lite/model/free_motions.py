@@ -116,7 +116,7 @@ class FreeMotions:
         if not self.any:
             return chosen
         left = self._pair[0] * ~self.supports.fixed[..., None]
-        left.reshape(-1, left.shape[2])[list(self.supports.dependents())] = 0.0
+        left.reshape(-1, left.shape[2])[self.supports.dependents().dependents] = 0.0
         for step in range(left.shape[2]):
             size = (left**2).sum(axis=2)
             best = self._by_part(size.max(axis=1), largest=True)

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from kratos_lite.mesh import NO_ROWS, Mesh, equal_sets, with_rows
 from kratos_lite.mesh.topology import Sets, corners, faces_of, set_keys
-from kratos_lite.solvers.constraint_map import MultiPointConstraint
+from kratos_lite.solvers.constraints import Constraints
 from kratos_lite.typing import Array, Ints
 
 NORMAL = np.array([0.5257311, 0.6180340, 0.5844215])
@@ -76,7 +74,7 @@ def _halved_squares(mesh: Mesh) -> Ints:
     return np.concatenate(elements)[np.concatenate(meets)]
 
 
-def check_coincident(mesh: Mesh, constraints: Sequence[MultiPointConstraint] = ()) -> list[str]:
+def check_coincident(mesh: Mesh, constraints: Constraints | None = None) -> list[str]:
     """Warn of different nodes at the same place (within 1e-8 of the mean spacing) that nothing ties."""
     rows = np.flatnonzero(mesh.used_nodes())
     if len(rows) < 2:
@@ -84,13 +82,10 @@ def check_coincident(mesh: Mesh, constraints: Sequence[MultiPointConstraint] = (
     X, ids = mesh.points[rows], mesh.node_ids[rows]
     size = max(float(np.ptp(x)) for x in X.T)  # by columns, which is faster
     found = _nodes_at_one_place(X, ids, 1e-8 * size / len(rows) ** (1 / 3))
-    if found and constraints:
-        pairs = {
-            frozenset((c.dependent // 3, independent // 3))
-            for c in constraints
-            for independent in c.independents
-        }
-        tied = {frozenset(mesh.node_ids[list(pair)].tolist()) for pair in pairs}
+    if found and constraints is not None:
+        ends = constraints.dependents[constraints.owner] // 3, constraints.independents // 3
+        pairs = np.unique(np.stack(ends, axis=1), axis=0)
+        tied = set(map(frozenset, mesh.node_ids[pairs].tolist()))
         found = [pair for pair in found if frozenset(pair) not in tied]
     if not found:
         return []

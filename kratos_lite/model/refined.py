@@ -82,14 +82,14 @@ def _refined_condition(condition: DirichletCondition, finer: Finer) -> Dirichlet
 
 def _carry_constraints(structure: Structure, new: Structure, finer: Finer) -> None:
     """Carry over constraints of nodes; refuse those that tie edges on which new nodes lie."""
-    hanging = set(map(id, structure.supports.hanging))
-    own = [c for c in structure.supports.constraints if id(c) not in hanging]
-    if not own:
+    every = structure.supports.constraints
+    own = every.take(np.arange(len(every)) >= len(structure.supports.hanging))
+    if not len(own):
         return
-    tied = np.unique([c.dependent // 3 for c in own])
+    tied = np.unique(own.dependents // 3)
     if len(finer.grown(tied)) > len(tied):
         raise ModelError(
             f"{len(own)} constraints tie nodes of edges that are cut, but not their new nodes; constrain "
             "a finer mesh instead"
         )
-    new.supports.constraints = (*new.supports.constraints, *own)
+    new.supports.constraints += own

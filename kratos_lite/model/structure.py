@@ -388,24 +388,37 @@ class Structure(Tabular):
 
     def constrain(
         self,
-        dependent: tuple[int, str],
-        independents: Mapping[tuple[int, str], float],
-        constant: float = 0.0,
+        dependents: tuple[int, str] | ArrayLike,
+        independents: Mapping[tuple[int, str], float] | ArrayLike,
+        constant: ArrayLike = 0.0,
+        *,
+        weights: ArrayLike = 1.0,
     ) -> None:
-        """Tie a degree of freedom to others: u[dependent] = Σ weight · u[independent] + constant.
+        """Tie degrees of freedom to others: u[dependent] = Σ weight · u[independent] + constant.
 
         Parameters
         ----------
-        dependent : (node index, axis letter).
-        independents : weights by (node index, axis letter).
-        constant : m.
+        dependents : (node index, axis letter); or (c,) int, degrees of freedom 3·node + axis.
+        independents : weights by (node index, axis letter); or (c,) or (c, k) int, k for each dependent.
+        constant : m; one, or (c,).
+        weights : of independents in arrays; one, or (c, k).
 
         Raises
         ------
         InputError
             A degree of freedom, weight or constant is invalid.
+
+        Examples
+        --------
+        >>> import numpy as np, kratos_lite as kl
+        >>> model = kl.Model(kl.box((2.0, 1.0, 1.0), (2, 1, 1)), kl.Isotropic3D(E=1e9, nu=0.3))
+        >>> model.constrain((0, "x"), {(3, "x"): 1.0})  # u_x of node 0 is that of node 3
+        >>> left, right = (np.flatnonzero(model.mesh.points[:, 0] == x) for x in (0.0, 2.0))
+        >>> model.constrain(3 * left + 1, 3 * right + 1)  # u_y of both ends alike, node by node
+        >>> len(model.supports.constraints)
+        5
         """
-        self.supports.constrain(dependent, independents, constant)
+        self.supports.constrain(dependents, independents, weights, constant)
 
     def rigid_modes(self) -> Array:
         """Return the rigid-body modes of all nodes.
@@ -602,7 +615,7 @@ class Structure(Tabular):
         rows += [("material", f"none for {without} elements")] if without else []
         rows.append(("fixed", f"{self.supports.fixed.sum()} components"))
         rows += [("support", str(fixing)) for fixing in self.supports.named.values()]
-        if self.supports.constraints:
+        if len(self.supports.constraints):
             rows.append(("constraints", str(len(self.supports.constraints))))
         names = {id(load): f"{name}: " for name, load in self.named_loads.items()}
         rows += [("load", f"{names.get(id(load), '')}{load!r}") for load in self.loads]

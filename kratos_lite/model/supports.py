@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh, Where
 from kratos_lite.model.equal import key_of
-from kratos_lite.solvers.constraint_map import (
-    ConstraintMap,
-    Dependents,
-    MultiPointConstraint,
-    constraint_map,
-    eliminate,
-)
+from kratos_lite.solvers.constraint_map import ConstraintMap, constraint_map
+from kratos_lite.solvers.constraints import Constraints, eliminate
 from kratos_lite.time_series import function_of
 from kratos_lite.typing import Array, Ints, Mask
-from kratos_lite.validation import finite
+from kratos_lite.validation import finite, short, whole_numbers
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -108,17 +103,17 @@ class Supports:
             self._hangs[mesh.hanging.nodes] = True
         self.conditions: list[DirichletCondition] = []
         self.version = self.value_version = 0
-        self._dependents: tuple[int, Dependents] = (-1, {})
+        self._dependents: tuple[int, Constraints] = (-1, Constraints.none())
 
     def __str__(self) -> str:
-        tied = [f"{len(self.constraints)} constraints"] if self.constraints else []
+        tied = [f"{len(self.constraints)} constraints"] if len(self.constraints) else []
         return "\n".join([*map(str, self.conditions), *tied]) or "none"
 
     def name(self, dof: int) -> str:
         """Return the readable name of a degree of freedom, 3·node + axis."""
         return f"node {self.mesh.node_ids[dof // 3]} along {AXES[dof % 3]}"
 
-    def dof(self, where: tuple[int, str]) -> int:
+    def dof(self, where: Any) -> int:
         """Return the number of a degree of freedom (node index, axis letter)."""
         node, axis = where if isinstance(where, tuple) and len(where) == 2 else (None, None)
         known = isinstance(node, (int, np.integer)) and 0 <= node < self.mesh.n_nodes
@@ -224,71 +219,110 @@ class Supports:
     # ---- multi-point constraints ------------------------------------------------------------------------
 
     @property
-    def constraints(self) -> tuple[MultiPointConstraint, ...]:
-        """The multi-point constraints."""
+    def constraints(self) -> Constraints:
+        """The multi-point constraints; those of hanging nodes come first."""
         return self._constraints
 
     @constraints.setter
-    def constraints(self, constraints: Iterable[MultiPointConstraint]) -> None:
-        self._constraints = tuple(constraints)
+    def constraints(self, constraints: Constraints) -> None:
+        self._constraints = constraints
         self.version += 1
         self.value_version += 1
 
-    def dependents(self) -> Dependents:
-        """Return the dependents of all constraints by free degrees of freedom."""
+    def dependents(self) -> Constraints:
+        """Return all constraints by free degrees of freedom alone."""
         if self._dependents[0] != self.value_version:
             self._dependents = self.value_version, self._eliminated(self.values, agree=True)
         return self._dependents[1]
 
     def constrain(
-        self, dependent: tuple[int, str], independents: Mapping[tuple[int, str], float], constant: float
+        self,
+        dependents: tuple[int, str] | ArrayLike,
+        independents: Mapping[tuple[int, str], float] | ArrayLike,
+        weights: ArrayLike,
+        constant: ArrayLike,
     ) -> None:
-        """Add the constraint u[dependent] = Σ weight · u[independent] + constant; see `Structure`."""
-        if not isinstance(independents, Mapping):
-            raise InputError(
-                f"independents must map (node index, axis letter) to a weight; got {independents!r}"
-            )
-        weights = finite(list(independents.values()), "weights of a constraint").tolist()
-        offset = float(finite(constant, "the constant of a constraint"))
-        constraint = MultiPointConstraint(
-            self.dof(dependent), tuple(map(self.dof, independents)), tuple(weights), offset
+        """Add constraints; see `Structure.constrain`."""
+        named = isinstance(dependents, tuple) and any(isinstance(part, str) for part in dependents)
+        if isinstance(independents, Mapping) or named:
+            if not isinstance(independents, Mapping):
+                raise InputError(
+                    f"independents must map (node index, axis letter) to a weight; got {independents!r}"
+                )
+            weights = finite(list(independents.values()), "weights of a constraint")[None]
+            dependents, independents = [self.dof(dependents)], np.array([list(map(self.dof, independents))])
+        c = self._dofs(dependents, "dependents")
+        each = self._dofs(independents, "independents")
+        each = each[:, None] if each.ndim == 1 else each
+        w, offsets = (
+            finite(weights, "weights of a constraint"),
+            finite(constant, "the constant of a constraint"),
         )
-        self.constraints = (*self.constraints, constraint)
+        try:
+            each = np.broadcast_to(each, (*c.shape, each.shape[-1]))
+            w, offsets = np.broadcast_to(w, each.shape), np.broadcast_to(offsets, c.shape)
+        except ValueError:
+            raise InputError(
+                f"of {len(c)} dependents, independents must be ({len(c)},) or ({len(c)}, k), weights one or "
+                f"as many, constants one or ({len(c)},); got {each.shape}, {w.shape} and {offsets.shape}"
+            ) from None
+        self.constraints += Constraints.of(c, each, w, offsets)
 
-    def _eliminated(self, values: Array, agree: bool) -> Dependents:
+    def _dofs(self, values: ArrayLike, what: str) -> Ints:
+        """Return degrees of freedom of this mesh, (c,) or (c, k)."""
+        dofs = whole_numbers(values, f"{what}, 3·node + axis,")
+        shaped = dofs.ndim == 1 or (dofs.ndim == 2 and what == "independents")
+        if not shaped or ((dofs < 0) | (dofs >= self.fixed.size)).any():
+            raise InputError(
+                f"{what} must be a row of degrees of freedom 3·node + axis, each below {self.fixed.size}; "
+                f"got {short(values)}"
+            )
+        return dofs
+
+    def _eliminated(self, values: Array, agree: bool) -> Constraints:
         """Return the dependents for prescribed values; those of symmetric ties must agree if requested."""
         return eliminate(self._ties(agree), self.fixed, values, self.name)
 
-    def _ties(self, agree: bool) -> list[MultiPointConstraint]:
+    def _ties(self, agree: bool) -> Constraints:
         """Return the constraints, symmetric ties with a node that supports hold as independent.
 
         With `agree`, ModelError where supports move both nodes of a tie, and not alike.
         """
-        turned = [self._turned(c, agree) if c.symmetric else c for c in self.constraints]
-        return [c for c in turned if c]
+        every = self.constraints
+        turned = every.symmetric & self.fixed.flat[every.dependents]
+        if not turned.any():
+            return every
+        partner = every.dependents.copy()
+        partner[every.symmetric] = every.independents[every.start[:-1][every.symmetric]]
+        both = turned & self.fixed.flat[partner]
+        if agree:
+            self._check_agreement(every.dependents[both], partner[both])
+        swap = turned & ~both
+        independents = every.independents.copy()
+        independents[every.start[:-1][swap]] = every.dependents[swap]
+        dependents = np.where(swap, partner, every.dependents)
+        return replace(every, dependents=dependents, independents=independents).take(~both)
 
-    def _turned(self, tie: MultiPointConstraint, agree: bool) -> MultiPointConstraint | None:
-        """Return a symmetric tie, what supports hold as independent; None if they hold both alike."""
-        dependent, (independent,) = tie.dependent, tie.independents
-        if not self.fixed.flat[dependent]:
-            return tie
-        if not self.fixed.flat[independent]:
-            return MultiPointConstraint(independent, (dependent,), (1.0,))
-        one, other = self.values.flat[dependent], self.values.flat[independent]
-        both = f"{self.name(dependent)} and {self.name(independent)} are tied, but"
-        if agree and self._function.flat[dependent] != self._function.flat[independent]:
-            raise ModelError(f"{both} move differently: give both the same function, or fix only one of them")
-        if agree and one != other:
+    def _check_agreement(self, dependents: Ints, independents: Ints) -> None:
+        """Raise ModelError where supports move tied degrees of freedom, and not alike."""
+        function, values = self._function.flat, self.values.flat
+        timed = function[dependents] != function[independents]
+        for i in np.flatnonzero(timed | (values[dependents] != values[independents]))[:1]:
+            one, other = int(dependents[i]), int(independents[i])
+            both = f"{self.name(one)} and {self.name(other)} are tied, but"
+            if timed[i]:
+                raise ModelError(
+                    f"{both} move differently: give both the same function, or fix only one of them"
+                )
             raise ModelError(
-                f"{both} prescribed as {one:g} m and {other:g} m: give both the same value, or fix one only"
+                f"{both} prescribed as {values[one]:g} m and {values[other]:g} m: give both the same value, "
+                "or fix one only"
             )
-        return None
 
     def check_used(self, used: Mask) -> list[str]:
         """Raise ModelError for constraints of nodes that no element uses, by the mask (n,) of those used."""
-        dofs = np.array(
-            [dof for dependent, (terms, _) in self.dependents().items() for dof in (dependent, *terms)], int
-        )
+        known = self.dependents()
+        dofs = np.concatenate([known.dependents, known.independents])
         unused = dofs[~used[dofs // 3]]
         if len(unused):
             name = self.name(int(unused[0]))
@@ -301,31 +335,19 @@ class Supports:
         """Return the constraint map of the degrees of freedom of some nodes, renumbered in order."""
         fixed, u = self.fixed, self.values if values is None else values
         dependents = None
-        if self.constraints:
-            found = self.dependents() if values is None else self._eliminated(values, agree=False)
-            dependents = self._renumbered(found, nodes)
+        if len(self.constraints):
+            known = self.dependents() if values is None else self._eliminated(values, agree=False)
+            dof_of = np.full(fixed.shape, -1)
+            dof_of[nodes] = np.arange(3 * len(nodes)).reshape(-1, 3)
+            dependents = known.renumbered(dof_of.ravel())
         if len(nodes) < len(fixed):
             fixed, u = fixed[nodes], u[nodes]
         return constraint_map(fixed, u, dependents)
 
-    def _renumbered(self, dependents: Dependents, nodes: Ints) -> Dependents:
-        """Return the dependents on some nodes by the degrees of freedom of these."""
-        row = np.full(self.mesh.n_nodes, -1)
-        row[nodes] = np.arange(len(nodes))
-
-        def dof(old: int) -> int:
-            return 3 * int(row[old // 3]) + old % 3
-
-        return {
-            dof(dependent): ({dof(independent): weight for independent, weight in terms.items()}, constant)
-            for dependent, (terms, constant) in dependents.items()
-            if row[dependent // 3] >= 0
-        }
-
     def supported(self, residual: Array) -> Array:
         """Return a residual (n, 3) where supports or constraints act, and 0 elsewhere."""
         acts = self.fixed.copy()
-        acts.flat[[dof for c in self.constraints for dof in (c.dependent, *c.independents)]] = True
+        acts.flat[np.concatenate([self.constraints.dependents, self.constraints.independents])] = True
         return np.where(acts, self.on_independents(residual), 0.0)
 
     def on_independents(self, forces: Array) -> Array:
@@ -334,21 +356,22 @@ class Supports:
 
     def constraint_rows(self) -> tuple[Ints, Ints, Array]:
         """Return all that is prescribed, but its values, as sparse rows of equations: (row, dof, weight)."""
-        fixed = np.flatnonzero(self.fixed)
-        row, dof, weight = [np.arange(len(fixed))], [fixed], [np.ones(len(fixed))]
-        for r, constraint in enumerate(self.constraints, start=len(fixed)):
-            row.append(np.full(1 + len(constraint.independents), r))
-            dof.append(np.array([constraint.dependent, *constraint.independents], dtype=np.int64))
-            weight.append(np.array([1.0, *(-w for w in constraint.weights)]))
-        return np.concatenate(row), np.concatenate(dof), np.concatenate(weight)
-
-
-def hanging_constraints(mesh: Mesh) -> tuple[MultiPointConstraint, ...]:
-    """Return the constraints that keep the displacement continuous at the hanging nodes of a mesh."""
-    return tuple(
-        MultiPointConstraint(
-            3 * node + axis, tuple((3 * independents + axis).tolist()), tuple(weights.tolist())
+        fixed, every = np.flatnonzero(self.fixed), self.constraints
+        rows = len(fixed) + np.arange(len(every))
+        return (
+            np.concatenate([np.arange(len(fixed)), rows, rows[every.owner]]),
+            np.concatenate([fixed, every.dependents, every.independents]),
+            np.concatenate([np.ones(len(fixed) + len(every)), -every.weights]),
         )
-        for node, independents, weights in mesh.hanging or ()
-        for axis in range(3)
-    )
+
+
+def hanging_constraints(mesh: Mesh) -> Constraints:
+    """Return the constraints that keep the displacement continuous at the hanging nodes of a mesh."""
+    hanging, every = mesh.hanging, Constraints.none()
+    if hanging is None:
+        return every
+    for axis in range(3):
+        dofs = 3 * hanging.nodes + axis, hanging.start, 3 * hanging.independents + axis
+        count = len(hanging)
+        every += Constraints(*dofs, hanging.weights, np.zeros(count), np.zeros(count, dtype=bool))
+    return every

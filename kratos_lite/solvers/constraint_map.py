@@ -6,32 +6,17 @@ exactly, without a penalty.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kratos_lite.errors import ModelError
+from kratos_lite.solvers.constraints import Constraints
 from kratos_lite.typing import Array, Ints, Mask
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
     from scipy.sparse import csr_array
-
-Dependents: TypeAlias = "dict[int, tuple[dict[int, float], float]]"
-"""For each dependent the weights of free degrees of freedom, and a constant."""
-
-
-@dataclass(frozen=True)
-class MultiPointConstraint:
-    """One linear multi-point constraint: u[dependent] = Σ weights · u[independents] + constant (dofs)."""
-
-    dependent: int
-    independents: tuple[int, ...]
-    weights: tuple[float, ...]
-    constant: float = 0.0
-    symmetric: bool = False  # a tie: where supports hold the dependent, the independent follows
 
 
 @dataclass(eq=False)
@@ -84,7 +69,7 @@ class ConstraintMap:
         return A if len(self.free) == A.shape[0] else A[self.free][:, self.free]
 
 
-def constraint_map(fixed: Mask, values: Array, dependents: Dependents | None = None) -> ConstraintMap:
+def constraint_map(fixed: Mask, values: Array, dependents: Constraints | None = None) -> ConstraintMap:
     """Return the map of nodes with prescribed displacements and dependents.
 
     Where all supports displace the nodes alike along an axis, c carries the free ones along: what remains to
@@ -98,69 +83,17 @@ def constraint_map(fixed: Mask, values: Array, dependents: Dependents | None = N
                 along[:] = along[at_axis][0]
         return ConstraintMap(np.flatnonzero(~constrained), c)
     is_free = ~constrained
-    is_free[list(dependents)] = False
+    is_free[dependents.dependents] = False
     free = np.flatnonzero(is_free)
     column = np.full(len(constrained), -1)
     column[free] = np.arange(len(free))
-    rows, columns, weights = [free], [column[free]], [np.ones(len(free))]
-    for dependent, (terms, constant) in sorted(dependents.items()):
-        c[dependent] = constant
-        rows.append(np.full(len(terms), dependent))
-        columns.append(column[list(terms)])
-        weights.append(np.array(list(terms.values()), dtype=float))
+    c[dependents.dependents] = dependents.constants
+    row = np.concatenate([free, dependents.dependents[dependents.owner]])
+    columns = column[np.concatenate([free, dependents.independents])]
+    weights = np.concatenate([np.ones(len(free)), dependents.weights])
     from scipy.sparse import csr_array
 
-    entries = (np.concatenate(weights), (np.concatenate(rows), np.concatenate(columns)))
-    return ConstraintMap(free, c, csr_array(entries, shape=(len(constrained), len(free))))
-
-
-def eliminate(
-    constraints: Iterable[MultiPointConstraint], fixed: Mask, values: Array, name: Callable[[int], str]
-) -> Dependents:
-    """Express every dependent dof by free ones; ModelError for cycles and dofs constrained twice."""
-    by_dependent: dict[int, MultiPointConstraint] = {}
-    for constraint in constraints:
-        dependent = constraint.dependent
-        if dependent in by_dependent:
-            raise ModelError(f"{name(dependent)} depends on others by two constraints; remove one of them")
-        if fixed.flat[dependent]:
-            raise ModelError(
-                f"{name(dependent)} is both fixed and dependent by a constraint; do one of the two"
-            )
-        by_dependent[dependent] = constraint
-    done: Dependents = {}
-    for start in by_dependent:
-        stack, open_ = [start], set()  # no recursion: chains of constraints may be long
-        while stack:
-            dependent = stack[-1]
-            waiting = [m for m in by_dependent[dependent].independents if m in by_dependent and m not in done]
-            if dependent in done or not waiting:
-                stack.pop()
-                open_.discard(dependent)
-                done.setdefault(dependent, _substitute(by_dependent[dependent], done, fixed, values))
-            elif dependent in open_:
-                raise ModelError(f"the constraints of {name(dependent)} form a cycle; remove one of them")
-            else:
-                open_.add(dependent)
-                stack += waiting
-    return done
-
-
-def _substitute(
-    constraint: MultiPointConstraint, done: Dependents, fixed: Mask, values: Array
-) -> tuple[dict[int, float], float]:
-    """Return the weights of free independents and the constant of a constraint."""
-    terms: dict[int, float] = {}
-    constant = constraint.constant
-    for independent, weight in zip(constraint.independents, constraint.weights, strict=True):
-        if fixed.flat[independent]:
-            constant += weight * values.flat[independent]
-            continue
-        inner, offset = done.get(independent, ({independent: 1.0}, 0.0))
-        constant += weight * offset
-        for dof, factor in inner.items():
-            terms[dof] = terms.get(dof, 0.0) + weight * factor
-    return terms, constant
+    return ConstraintMap(free, c, csr_array((weights, (row, columns)), shape=(len(constrained), len(free))))
 
 
 def rigid_modes(points: Array, center: ArrayLike | None = None) -> Array:

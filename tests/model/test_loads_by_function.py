@@ -94,7 +94,6 @@ def test_a_polynomial_body_force_over_straight_cells(kind, degree):
         (kl.Traction("z+", lambda X: (X[:, :1] < 0.3) * [0.0, 0.0, -1e3]), "z+"),
         (kl.Pressure("y-", lambda X: 1e3 * (X[:, 0] < 0.3)), "y-"),
         (kl.BodyForce(lambda X: (X[:, :1] < 0.3) * [0.0, 0.0, -1e3]), "BodyForce"),
-        (kl.TimeDependentLoad(lambda t: kl.Pressure("z+", lambda X: 1e3 * (X[:, 0] < 0.3))), "z+"),
     ],
 )
 def test_a_jump_inside_elements_is_a_warning_that_names_the_part(load, part):

@@ -21,6 +21,7 @@ TRANSIENT = "tests/analysis/test_transient.py"
 SIGNS = "tests/analysis/test_signs_and_orders.py"
 STEPS = "tests/analysis/test_rigid_and_pseudo_rigid_steps.py"
 LOADS = "tests/verification/test_loads.py"
+CONSTRAINTS = "tests/solvers/test_constraints.py"
 SUPPORTS = "tests/verification/test_supports.py"
 SYSTEMS = "tests/verification/test_systems.py"
 BODY_LOADS = "tests/bodies/test_loads.py"
@@ -433,8 +434,19 @@ MUTATIONS = [
         "R[..., 3:] *= size[body, None, None]",
         "tests/analysis/test_free_bodies.py",
     ),
+    Mutation("solvers/constraints.py", "constants += change", "constants -= change", CONSTRAINTS),
     Mutation(
-        "solvers/constraint_map.py", "constant += weight * offset", "constant -= weight * offset", SUPPORTS
+        "solvers/constraints.py",
+        "weight[held] * values.flat[dof[held]]",
+        "-weight[held] * values.flat[dof[held]]",
+        CONSTRAINTS,
+    ),
+    Mutation("solvers/linear_solver.py", "0.5 * (K_d @ select.T @ W)", "(K_d @ select.T @ W)", CONSTRAINTS),
+    Mutation(
+        "native/matrix_free.hpp",
+        "static_cast<T>(ties.shares[k].weight) * passed_on",
+        "passed_on",
+        CONSTRAINTS,
     ),
     Mutation(
         "solvers/constraint_map.py",

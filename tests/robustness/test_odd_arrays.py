@@ -60,6 +60,12 @@ def changed(name, *arguments, **options):
     return model.solve().u
 
 
+def tied(dependents=(0, 1), independents=(12, 13), constant=0.0, weights=1.0):
+    model = kl.Model(CUBE, ROCK)
+    model.constrain(dependents, independents, constant, weights=weights)
+    return model.supports.constraints.weights
+
+
 def released(where):
     model = static()
     model.fix(range(8))
@@ -122,6 +128,10 @@ CASES: Case = {
     ("annulus", "cells"): (lambda v: kl.annulus(1, 2, 1, v).points, (1, 4, 1)),
     ("Structure.fix", "where"): (lambda v: changed("fix", v), NODES),
     ("Structure.release", "where"): (released, NODES),
+    ("Structure.constrain", "dependents"): (tied, [0, 1]),
+    ("Structure.constrain", "independents"): (lambda v: tied(independents=v), [12, 13]),
+    ("Structure.constrain", "constant"): (lambda v: tied(constant=v), [0.0, 1e-3]),
+    ("Structure.constrain", "weights"): (lambda v: tied(weights=v), 0.5),
     ("Structure.fix", "value"): (lambda v: changed("fix", "z+", "xyz", v), VECTOR),
     ("Structure.assign", "where"): (lambda v: changed("assign", ROCK, v), [0]),
     ("Structure.use_rule", "where"): (lambda v: changed("use_rule", 2, v), [0]),

@@ -37,7 +37,7 @@ class CentralDifference(ModelIntegrator):
         """
         if e.terms is not None:
             raise ModelError("central differences do not take a motion of the material; use Newmark()")
-        if e.model.supports.constraints:
+        if len(e.model.supports.constraints):
             raise ModelError("central differences do not take constraints; use Newmark()")
 
     def critical_step(self, e: EquationsOfMotion) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -18,7 +17,7 @@ from kratos_lite.mesh import Block, Mesh, Part, with_rows
 from kratos_lite.model.loads import TimeDependentLoad
 from kratos_lite.model.loads.body import Gravity
 from kratos_lite.shapes.faces import Point1
-from kratos_lite.solvers.constraint_map import MultiPointConstraint
+from kratos_lite.solvers.constraints import Constraints
 from kratos_lite.tabular import names_of
 from kratos_lite.typing import Array, Ints
 
@@ -167,13 +166,15 @@ def kratos_name(part: str) -> str:
     return part.replace("+", "_plus").replace("-", "_minus")
 
 
-def constraints_of(mesh: Mesh, constraints: Iterable[MultiPointConstraint]) -> list[Constraint]:
+def constraints_of(mesh: Mesh, constraints: Constraints) -> list[Constraint]:
     """Return constraints of a mesh as those of a file."""
 
     def dof(number: int) -> tuple[int, str]:
         return int(mesh.node_ids[number // 3]), f"DISPLACEMENT_{'XYZ'[number % 3]}"
 
     return [
-        Constraint(i, dof(each.dependent), tuple(map(dof, each.independents)), each.weights, each.constant)
-        for i, each in enumerate(constraints, start=1)
+        Constraint(
+            i, dof(dependent), tuple(map(dof, independents.tolist())), tuple(weights.tolist()), constant
+        )
+        for i, (dependent, independents, weights, constant) in enumerate(constraints, start=1)
     ]

@@ -10,12 +10,15 @@ from kratos_lite.analysis.model import Model
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.elements.formulations import is_unnamed
 from kratos_lite.errors import Problems, naming, nearest
-from kratos_lite.io.formats.document import Data, Document, Note
+from kratos_lite.io.formats.document import Constraint, Data, Document, Note
 from kratos_lite.io.kratos.properties import USED, apply_properties
 from kratos_lite.io.kratos.variables import LOADING, SPLIT, VECTORS, Variables, components
 from kratos_lite.io.names import misspelt
 from kratos_lite.mesh import Mesh, distinct, ids_of, rows_of_ids
+from kratos_lite.solvers.constraints import Constraints
 from kratos_lite.typing import Array, Ints
+
+DISPLACEMENTS = ("DISPLACEMENT_X", "DISPLACEMENT_Y", "DISPLACEMENT_Z")
 
 PRESENT = ("SmallDisplacementElement", "TotalLagrangianElement", "UpdatedLagrangianElement", "Element3D")
 """Elements of Kratos today; they take the DISPLACEMENT of free nodes for a guess."""
@@ -173,15 +176,28 @@ def _note_overridden(values: Variables, data: Data, indices: Ints, model: Model)
 
 def _constrain(model: Model, document: Document) -> None:
     """Add the multi-point constraints of a document."""
-    index_of = document.mesh.node_rows
+    known: list[Constraint] = []
     for constraint in document.constraints:
-        dofs = [constraint.dependent, *constraint.independents]
-        if not all(name in ("DISPLACEMENT_X", "DISPLACEMENT_Y", "DISPLACEMENT_Z") for _, name in dofs):
+        names = {constraint.dependent[1], *(name for _, name in constraint.independents)}
+        if names <= set(DISPLACEMENTS):
+            known.append(constraint)
+        else:
             text = f"constraint {constraint.id} is not on displacements; ignored"
             model.notes.append(str(Note(constraint.line, text)))
-            continue
-        dependent, *independents = [(int(index_of([node])[0]), name[-1].lower()) for node, name in dofs]
-        weights: dict[tuple[int, str], float] = {}
-        for dof, weight in zip(independents, constraint.weights, strict=True):
-            weights[dof] = weights.get(dof, 0.0) + weight
-        model.constrain(dependent, weights, constraint.constant)
+    if not known:
+        return
+
+    def dofs(pairs: list[tuple[int, str]]) -> Ints:
+        ids, names = zip(*pairs, strict=True)
+        axes = np.array([DISPLACEMENTS.index(name) for name in names])
+        return 3 * document.mesh.node_rows(ids) + axes
+
+    counts = [len(constraint.weights) for constraint in known]
+    model.supports.constraints += Constraints(
+        dofs([constraint.dependent for constraint in known]),
+        np.concatenate([[0], np.cumsum(counts)]),
+        dofs([pair for constraint in known for pair in constraint.independents]),
+        np.array([weight for constraint in known for weight in constraint.weights]),
+        np.array([constraint.constant for constraint in known]),
+        np.zeros(len(known), dtype=bool),
+    )

@@ -188,11 +188,6 @@ class TimeDependentLoad(Load):
             )
         return found
 
-    def warnings(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
-        """Return what may be wrong with the load at the time 0."""
-        load = self.at(0.0)
-        return [] if load is None else load.warnings(mesh, groups)
-
     def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
         """Return the nodal forces (n, 3) in N at the time 0."""
         return self.history(lambda load: load.forces(mesh, groups))(0.0) + np.zeros_like(mesh.points)
