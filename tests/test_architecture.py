@@ -124,7 +124,7 @@ def test_a_scene_loads_its_own_element_and_family_of_shapes_alone():
 
 
 def test_one_element_loads_nothing_of_what_larger_models_and_results_need():
-    larger = ("mesh.hanging", "mesh.finer", "mesh.locate", "mesh.order", "model.loads.surface")
+    larger = ("mesh.hanging", "mesh.refined_mesh", "mesh.locate", "mesh.refinement", "model.loads.surface")
     larger += ("solvers.multigrid", "solvers.coarse_level", "solvers.dilatation", "analysis.error_estimate")
     names = small_scene(1, "Element3D8N") - loaded("import numpy")
     assert not {"pathlib", "numpy.typing", *(f"kratos_lite.{name}" for name in larger)} & names

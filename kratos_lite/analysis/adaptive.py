@@ -28,9 +28,8 @@ from kratos_lite.elements.custom import is_builtin
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh, with_rows
 from kratos_lite.mesh.facets import facets
-from kratos_lite.mesh.finer import Finer
-from kratos_lite.mesh.order import quadratic, raised
-from kratos_lite.mesh.refinement import refine
+from kratos_lite.mesh.refined_mesh import RefinedMesh
+from kratos_lite.mesh.refinement import quadratic, raised, refine
 from kratos_lite.model.refined import refined
 from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array, Mask, Progress
@@ -77,7 +76,7 @@ def solve_to(
         )
     check_quantity(quantity)
     level: Level | None = None
-    steps: list[Finer] = []
+    steps: list[RefinedMesh] = []
     history: list[RefinementStep] = []
     missed, keep = "", None
     rough = max(tolerance, min(ROUGH, ROUGH_SHARE * aim))
@@ -120,7 +119,11 @@ def solve_to(
 
 
 def _level(
-    model: Structure, result: Result, steps: Sequence[Finer], before: Level | None, quantity: Quantity | None
+    model: Structure,
+    result: Result,
+    steps: Sequence[RefinedMesh],
+    before: Level | None,
+    quantity: Quantity | None,
 ) -> Level:
     """Return what is known of the error of a result, or of a quantity of it."""
     if quantity is None:
@@ -149,7 +152,7 @@ def _solved(analysis: StaticAnalysis, start: Array | None, rough: float) -> Resu
     return result if good else analysis.solve(start=result.u)
 
 
-def _started(level: Level | None, steps: Sequence[Finer]) -> Array | None:
+def _started(level: Level | None, steps: Sequence[RefinedMesh]) -> Array | None:
     """Return the solution of a level on the next mesh, or None without one."""
     if level is None:
         return None
@@ -184,7 +187,7 @@ def check_geometry(geometry: Geometry | None, mesh: Mesh) -> None:
         mesh.nodes(part)
 
 
-def _next(level: Level, error: float, keep: Array | None, geometry: Geometry) -> list[Finer]:
+def _next(level: Level, error: float, keep: Array | None, geometry: Geometry) -> list[RefinedMesh]:
     """Return the steps to the next mesh; edges along `keep` are not cut."""
     mesh = level.model.mesh
     if _can_be_raised(level.model):
@@ -268,7 +271,7 @@ def _times(squares: Array, kept: Array, aim: float, pieces: int) -> Array:
     return found
 
 
-def _carried(model: S, steps: Sequence[Finer]) -> S:
+def _carried(model: S, steps: Sequence[RefinedMesh]) -> S:
     """Return a model after some steps."""
     for step in steps:
         finer = refined(model, step)

@@ -14,7 +14,7 @@ from kratos_lite.analysis.report import RefinementStep
 from kratos_lite.analysis.result import Result
 from kratos_lite.assembly.gauss_point_fields import totals
 from kratos_lite.errors import ModelError
-from kratos_lite.mesh.finer import Finer
+from kratos_lite.mesh.refined_mesh import RefinedMesh
 from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array, Ints
 
@@ -38,7 +38,7 @@ class Level:
 
     model: Structure
     result: Result
-    steps: Sequence[Finer]
+    steps: Sequence[RefinedMesh]
     before: Level | None
 
     @cached_property

@@ -14,9 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from kratos_lite.assembly.polynomial_fit import Lists, distinct, integers, lists
-from kratos_lite.mesh import Block
+from kratos_lite.mesh import Block, Mesh
 from kratos_lite.mesh.blocks import NO_ROWS
-from kratos_lite.mesh.cells import Cells
 from kratos_lite.mesh.topology import corners as corners_of
 from kratos_lite.mesh.topology import faces_of
 from kratos_lite.native import kernels
@@ -115,7 +114,7 @@ def _decayed(points: Array, owner: Ints, element: Ints, corners: Ints) -> Array:
     return np.asarray(ratio ** (DECAY // 2))
 
 
-def outer_corners(cells: Cells, material: Ints) -> tuple[Ints, Ints]:
+def outer_corners(cells: Mesh, material: Ints) -> tuple[Ints, Ints]:
     """Return material and corner node of the faces that no element of the same material (m,) shares."""
     faces = cells.all_faces
     alone, behind = np.ones(len(faces.element), dtype=bool), material[faces.element]

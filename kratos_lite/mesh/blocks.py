@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import MeshError
 from kratos_lite.shapes import Shape
 from kratos_lite.tabular import names_of
-from kratos_lite.typing import Ints, Mask, Numbers, Rows
+from kratos_lite.typing import Array, Ints, Mask, Numbers, Rows
 from kratos_lite.validation import instance, read_only, short, whole_numbers
 
 if TYPE_CHECKING:
@@ -151,6 +151,27 @@ class Part:
     def __str__(self) -> str:
         counts = {what: len(getattr(self, what)) for what in ("nodes", "elements", "conditions")}
         return ", ".join(f"{count} {what}" for what, count in counts.items() if count) or "empty"
+
+
+class Cells(Protocol):
+    """Points and blocks of elements on them, as a `Mesh` has them."""
+
+    points: Array
+    node_ids: Ints
+    blocks: tuple[Block, ...]
+    source: str
+    whole: bool
+
+    @property
+    def element_ids(self) -> Ints:
+        """Ids of the elements (m,)."""
+
+    @property
+    def extent(self) -> Array:
+        """Lowest and highest coordinates (2, 3)."""
+
+    def place(self, block: Block, cell: int) -> str:
+        """Return a cell in words."""
 
 
 def blocks_of(given: Any, what: str = "blocks") -> tuple[Block, ...]:

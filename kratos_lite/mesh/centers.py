@@ -20,20 +20,22 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 Keys: TypeAlias = "NDArray[np.uint64]"
-_MIX = (np.uint64(0x9E3779B97F4A7C15), np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB))
+
+
+def mixed(x: Keys) -> Keys:
+    """Return numbers that look random: SplitMix64, Steele, Lea & Flood, OOPSLA (2014) 453-472."""
+    x = x + np.uint64(0x9E3779B97F4A7C15)
+    x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return x ^ (x >> np.uint64(31))
 
 
 def keys_of(corners: Ints | Rows) -> Keys:
     """Return a number for each set of nodes (..., k), the same in whatever order they stand.
 
-    It is the sum of well-mixed numbers of the nodes, of 64 bits: two sets share it by accident alone.
-    Source: Steele, Lea & Flood, Fast splittable pseudorandom number generators, OOPSLA 2014.
+    It is the sum of the mixed numbers of the nodes, of 64 bits: two sets share it by accident alone.
     """
-    with np.errstate(over="ignore"):
-        z = (np.asarray(corners).astype(np.uint64) + np.uint64(1)) * _MIX[0]
-        z = (z ^ (z >> np.uint64(30))) * _MIX[1]
-        z = (z ^ (z >> np.uint64(27))) * _MIX[2]
-        return (z ^ (z >> np.uint64(31))).sum(axis=-1, dtype=np.uint64)
+    return mixed(np.asarray(corners).astype(np.uint64)).sum(axis=-1, dtype=np.uint64)
 
 
 @remembered

@@ -6,20 +6,25 @@ import numpy as np
 
 from kratos_lite.mesh.blocks import NO_ROWS, select, with_rows
 from kratos_lite.mesh.boxes import cell_boxes, is_solid
-from kratos_lite.mesh.cells import Cells
 from kratos_lite.mesh.locate import locate
+from kratos_lite.mesh.mesh import Mesh
 from kratos_lite.typing import Array, Ints
 
 SHORT = 1e-10
 """Share of the line that a crossing is known to; points are located no closer."""
 
 
-def crossings(mesh: Cells, a: Array, b: Array) -> Array:
+def crossings(mesh: Mesh, a: Array, b: Array) -> Array:
     """Return where on the line from a to b elements begin and end: 0 = t_0 < t_1 < … < t_k = 1.
 
     Between two of them the line lies in one element, if no face curves out of it and back.
     """
-    near = Cells(mesh.points, select(mesh.blocks, _near(mesh, a, b)), mesh.node_ids, mesh.source)
+    near = Mesh(
+        mesh.points,
+        select(mesh.blocks, _near(mesh, a, b)),
+        node_ids=mesh.node_ids,
+        source=mesh.source,
+    )
 
     def element(t: Array) -> Ints:
         return locate(near if len(near.blocks) else mesh, a + t[:, None] * (b - a)).require().rows
@@ -34,7 +39,7 @@ def crossings(mesh: Cells, a: Array, b: Array) -> Array:
     return np.concatenate([[0.0], (t[changes] + t[changes + 1]) / 2, [1.0]])
 
 
-def _near(mesh: Cells, a: Array, b: Array) -> Ints:
+def _near(mesh: Mesh, a: Array, b: Array) -> Ints:
     """Return the rows of the elements whose boxes, as spheres, reach the line."""
     length = np.linalg.norm(b - a)
     found = [NO_ROWS]

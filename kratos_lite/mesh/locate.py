@@ -10,10 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kratos_lite.errors import InputError, MeshError
-from kratos_lite.mesh.blocks import NO_ROWS, with_rows
-from kratos_lite.mesh.boxes import BoxTree, cell_boxes, curvature, is_solid
-from kratos_lite.mesh.cells import Cells
-from kratos_lite.mesh.nearest import nearest_element
+from kratos_lite.mesh.blocks import NO_ROWS, Cells, with_rows
+from kratos_lite.mesh.boxes import BoxTree, cell_boxes, curvature, is_solid, nearest_element
 from kratos_lite.shapes import Shape
 from kratos_lite.shapes.inverse import inverse_map, outside_by
 from kratos_lite.typing import Array, Ints, Mask, Rows

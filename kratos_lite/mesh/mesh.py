@@ -1,17 +1,17 @@
-"""Mesh: cells with conditions and named parts; it does not change."""
+"""Mesh: points, blocks of elements and conditions on them, and named parts; it does not change."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property, partial
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
 from kratos_lite.errors import MeshError
-from kratos_lite.mesh.blocks import NO_ROWS, Block, Part, blocks_of, select
-from kratos_lite.mesh.cells import Cells
+from kratos_lite.mesh.blocks import NO_ROWS, Block, Part, blocks_of, ids_of, rows_of_ids, select
 from kratos_lite.mesh.selection import (
     Where,
     WhereElements,
@@ -19,10 +19,10 @@ from kratos_lite.mesh.selection import (
     find_nodes,
     find_part,
 )
-from kratos_lite.mesh.topology import inverted, mirror
+from kratos_lite.mesh.topology import Faces, inverted, mirror
 from kratos_lite.tabular import Tabular
-from kratos_lite.typing import Array, Ints
-from kratos_lite.validation import instance, whole_numbers
+from kratos_lite.typing import Array, Ints, Mask
+from kratos_lite.validation import finite, instance, read_only, whole_numbers
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 PART = "kl.Part(nodes=[4, 5])"
 
 
-class Mesh(Cells, Tabular):
+class Mesh(Tabular):
     """Points (n, 3) in m, element blocks, condition blocks and named parts.
 
     A mesh does not change, and its arrays are read-only; `replace` makes another one from it.
@@ -63,8 +63,14 @@ class Mesh(Cells, Tabular):
     (4, 1)
     """
 
+    points: Array
+    node_ids: Ints
+    blocks: tuple[Block, ...]
     conditions: tuple[Block, ...]
     _parts: dict[str, Part]
+    source: str
+    hanging: HangingNodes | None
+    whole: bool
 
     def __init__(
         self,
@@ -78,15 +84,51 @@ class Mesh(Cells, Tabular):
         hanging: HangingNodes | None = None,
         whole: bool = True,
     ) -> None:
-        super().__init__(points, blocks, node_ids, source, hanging, whole)
+        X = finite(points, "points", ("n", 3), error=MeshError)
+        n = len(X)
+        ids = np.arange(1, n + 1) if node_ids is None else node_ids
         named = instance(parts or {}, "parts", Mapping, f"{{'top': {PART}}}", error=MeshError)
-        vars(self).update(conditions=blocks_of(conditions, "conditions"), _parts=dict(named))
-        self._check_rows(self.conditions)
+        vars(self).update(
+            points=read_only(np.ascontiguousarray(X)),
+            node_ids=read_only(whole_numbers(ids, "node_ids", (n,), error=MeshError)),
+            blocks=blocks_of(blocks),
+            conditions=blocks_of(conditions, "conditions"),
+            _parts=dict(named),
+            source=source,
+            hanging=hanging,
+            whole=whole,
+        )
+        if not self._is_counting:
+            ordered = self.node_ids[self._node_order]
+            twice = ordered[1:][ordered[1:] == ordered[:-1]]
+            if len(twice):
+                raise MeshError(f"node id {twice[0]} occurs more than once; give every node its own")
+        self._check_rows((*self.blocks, *self.conditions))
         self._check_parts()
 
+    def _arguments(self) -> dict[str, Any]:
+        """Return what an equal mesh is made of."""
+        names = ("points", "blocks", "node_ids", "conditions", "source", "hanging", "whole")
+        return {"parts": self._parts, **{name: getattr(self, name) for name in names}}
+
     def __reduce__(self) -> tuple[Any, ...]:  # copies and unpickled meshes are made as all others are
-        state = (self.points, self.blocks, self.node_ids, self.conditions, self._parts, self.source)
-        return _remade, (*state, self.hanging, self.whole)
+        return partial(Mesh, **self._arguments()), ()
+
+    def __setattr__(self, name: str, value: Any) -> NoReturn:
+        raise MeshError(f"a mesh does not change; make another one, as in mesh = mesh.replace({name}=...)")
+
+    def __delattr__(self, name: str) -> NoReturn:
+        self.__setattr__(name, None)
+
+    def _check_rows(self, blocks: Sequence[Block]) -> None:
+        """Raise MeshError for cells with rows of points that do not exist."""
+        for block in blocks:
+            if block.nodes.max(initial=-1) >= self.n_nodes:
+                cell = int(np.argmax((block.nodes >= self.n_nodes).any(axis=1)))
+                raise MeshError(
+                    f"{self.place(block, cell)} uses node rows {block.nodes[cell].tolist()}; "
+                    f"rows are 0 … {self.n_nodes - 1}"
+                )
 
     def _check_parts(self) -> None:
         """Raise MeshError for rows of parts that do not exist."""
@@ -130,21 +172,107 @@ class Mesh(Cells, Tabular):
         >>> mesh.replace(points=mesh.points * [1, 1, 2]).points.max(axis=0)
         array([1., 1., 2.])
         """
-        return Mesh(
-            self.points if points is None else points,
-            self.blocks if blocks is None else blocks,
-            node_ids=self.node_ids,
-            conditions=self.conditions if conditions is None else conditions,
-            parts=self._parts if parts is None else parts,
-            source=self.source,
-            hanging=self.hanging,
-            whole=self.whole if whole is None else whole,
-        )
+        changes = {
+            "points": points,
+            "blocks": blocks,
+            "conditions": conditions,
+            "parts": parts,
+            "whole": whole,
+        }
+        kept = {name: value for name, value in changes.items() if value is not None}
+        return Mesh(**{**self._arguments(), **kept})
+
+    # ---- nodes and elements ----------------------------------------------------------------
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes."""
+        return len(self.points)
+
+    @property
+    def n_elements(self) -> int:
+        """Number of elements in all blocks."""
+        return sum(len(block) for block in self.blocks)
 
     @property
     def n_conditions(self) -> int:
         """Number of conditions in all blocks."""
         return sum(len(block) for block in self.conditions)
+
+    @property
+    def element_ids(self) -> Ints:
+        """(m,) element ids through all blocks in order."""
+        return ids_of(self.blocks)
+
+    @cached_property
+    def _node_order(self) -> Ints:
+        return np.argsort(self.node_ids, kind="stable")
+
+    def node_rows(self, ids: ArrayLike) -> Ints:
+        """Return the rows of nodes by their ids.
+
+        Parameters
+        ----------
+        ids : (...) int.
+
+        Returns
+        -------
+        (...) int
+            Rows of `points`; -1 where there is no such id.
+
+        Raises
+        ------
+        MeshError
+            Ids are no whole numbers.
+        """
+        ids = whole_numbers(ids, "ids of nodes", error=MeshError)
+        if self._is_counting:
+            return np.where((ids >= 1) & (ids <= self.n_nodes), ids - 1, -1)
+        return rows_of_ids(self.node_ids, ids, self._node_order)
+
+    @cached_property
+    def _is_counting(self) -> bool:
+        """Whether the ids are 1 … n in order."""
+        return bool((self.node_ids == np.arange(1, self.n_nodes + 1)).all())
+
+    def place(self, block: Block, cell: int) -> str:
+        """Return a readable place of a cell for messages: ``cube.mdpa:22: element 1 (…3D8N)``.
+
+        Parameters
+        ----------
+        block : an element block.
+        cell : row of the cell in the block.
+
+        Returns
+        -------
+        str
+        """
+        line = f":{block.lines[cell]}" if block.lines is not None else ""
+        where = f"{self.source}{line}: " if self.source else ""
+        return f"{where}element {block.ids[cell]} ({block.name})"
+
+    def used_nodes(self) -> Mask:
+        """Return which nodes belong to an element.
+
+        Returns
+        -------
+        (n,) bool
+        """
+        used = np.zeros(self.n_nodes, dtype=bool)
+        for block in self.blocks:
+            used[block.nodes] = True
+        return used
+
+    @cached_property
+    def extent(self) -> Array:
+        """(2, 3) float, m, the lowest and the highest coordinates of the nodes.
+
+        Without nodes they are infinite.
+        """
+        columns = self.points.T  # one by one, which is faster
+        low = np.array([x.min(initial=np.inf) for x in columns])
+        high = np.array([x.max(initial=-np.inf) for x in columns])
+        return read_only(np.stack([low, high]))
 
     # ---- parts -----------------------------------------------------------------------------
 
@@ -336,6 +464,19 @@ class Mesh(Cells, Tabular):
 
     # ---- faces -----------------------------------------------------------------------------
 
+    @cached_property
+    def all_faces(self) -> Faces:
+        """All faces of the elements, and which coincide."""
+        return Faces(self.blocks, self.hanging)
+
+    @property
+    def boundary(self) -> list[Block]:
+        """Faces that belong to one element only, outward, one block per face shape.
+
+        ``ids`` holds the row of the parent element.
+        """
+        return self.all_faces.boundary
+
     def reoriented(self) -> Mesh:
         """Return the mesh in which inverted elements have the node order of their mirror image.
 
@@ -371,26 +512,3 @@ class Mesh(Cells, Tabular):
         inside[self.nodes(where)] = True
         chosen = [block.take(np.asarray(inside[block.nodes].all(axis=1))) for block in self.boundary]
         return [block for block in chosen if len(block)]
-
-
-def _remade(
-    points: Array,
-    blocks: Any,
-    node_ids: Ints,
-    conditions: Any,
-    parts: Any,
-    source: str,
-    hanging: Any,
-    whole: bool = True,
-) -> Mesh:
-    """Return a mesh from what it was made of."""
-    return Mesh(
-        points,
-        blocks,
-        node_ids=node_ids,
-        conditions=conditions,
-        parts=parts,
-        source=source,
-        hanging=hanging,
-        whole=whole,
-    )

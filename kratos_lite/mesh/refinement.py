@@ -1,4 +1,4 @@
-"""Refinement: cells cut into smaller ones, where they are marked, with hanging nodes at their borders.
+"""Refinement: cells cut into smaller ones, where they are marked, or raised to quadratic ones.
 
 Neighbors that share an edge or a face differ by one level at most; more cells are cut where needed.  New
 points and nodal values follow the isoparametric map of the cell that they are made in.
@@ -6,15 +6,15 @@ points and nodal values follow the isoparametric map of the cell that they are m
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import MeshError
 from kratos_lite.mesh.blocks import Block, with_rows
 from kratos_lite.mesh.centers import Centers, Keys, keys_of
-from kratos_lite.mesh.finer import Finer
-from kratos_lite.mesh.growth import Cut, Growth, name_of
 from kratos_lite.mesh.hanging import (
     entity_keys,
     existing_keys,
@@ -24,17 +24,29 @@ from kratos_lite.mesh.hanging import (
     split_faces,
 )
 from kratos_lite.mesh.mesh import Mesh
-from kratos_lite.mesh.subdivision import across, pieces, shortest_diagonal
+from kratos_lite.mesh.refine_cells import CellRefiner, Cut, name_of
+from kratos_lite.mesh.refined_mesh import RefinedMesh
+from kratos_lite.mesh.subdivision import across, pieces, shortest_diagonal, unchanged
 from kratos_lite.shapes import Shape
+from kratos_lite.shapes.faces import Line3, Quadrilateral8, Quadrilateral9, Triangle6
+from kratos_lite.shapes.hexahedra import Hexahedron20
+from kratos_lite.shapes.pyramids import Pyramid13
 from kratos_lite.shapes.tetrahedra import Tetrahedron4, Tetrahedron10
+from kratos_lite.shapes.wedges import Wedge15
 from kratos_lite.typing import Array, Ints, Mask
 from kratos_lite.validation import finite, whole_numbers
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+QUADRATIC: dict[str, type[Shape]] = {
+    shape.cell: shape
+    for shape in (Line3, Triangle6, Quadrilateral8, Tetrahedron10, Pyramid13, Wedge15, Hexahedron20)
+}
+"""The quadratic shape of each family with the fewest nodes."""
 
-def refine(mesh: Mesh, elements: ArrayLike | None = None, keep: ArrayLike | None = None) -> Finer:
+
+def refine(mesh: Mesh, elements: ArrayLike | None = None, keep: ArrayLike | None = None) -> RefinedMesh:
     """Return a mesh in which elements are cut into smaller ones of the same kind.
 
     A hexahedron, tetrahedron or wedge gives 8, a pyramid 6 and 4 tetrahedra.  Where a neighbor stays as it
@@ -44,12 +56,12 @@ def refine(mesh: Mesh, elements: ArrayLike | None = None, keep: ArrayLike | None
     centers = known_centers(mesh.blocks, mesh.hanging)
     if mesh.hanging is not None:
         marked = _closed(mesh, centers, marked)
-    growth = Growth(mesh, centers, _target)
+    refiner = CellRefiner(mesh, centers, _target)
     direction = None if keep is None else finite(keep, "keep", (3,), error=MeshError)
-    growth.elements(lambda block, at: _cuts(mesh, block, np.flatnonzero(marked[at]), direction))
+    refiner.elements(lambda block, at: _cuts(mesh, block, np.flatnonzero(marked[at]), direction))
     cut = _cut_entities(mesh, marked)
-    growth.conditions(lambda block, at: _condition_cuts(mesh, block, cut, direction))
-    return growth.finer()
+    refiner.conditions(lambda block, at: _condition_cuts(mesh, block, cut, direction))
+    return refiner.refined_mesh()
 
 
 def _mask(mesh: Mesh, elements: ArrayLike | None) -> Mask:
@@ -188,3 +200,43 @@ def _cut_entities(mesh: Mesh, marked: Mask) -> Keys:
         if block.shape is not None and marked[at].any()
     ]
     return np.unique(np.concatenate([np.zeros(0, dtype=np.uint64), *keys]))
+
+
+# ---- order -------------------------------------------------------------------------------------------
+
+
+def raised(mesh: Mesh, element_of: Callable[[str], str] | None = None) -> RefinedMesh:
+    """Return the same cells as quadratic elements; conditions follow the faces that they lie on."""
+    if mesh.hanging is not None:
+        raise MeshError("a mesh with hanging nodes keeps its order: raise the order first, then refine")
+    names = {block.name: (element_of or quadratic)(block.name) for block in mesh.blocks}
+    centered = any(len(ELEMENTS[name].nodes) == 27 for name in names.values())
+
+    def target(block: Block, cell: str) -> tuple[str, type[Shape]]:
+        if block.name in names:
+            return names[block.name], ELEMENTS[names[block.name]].shape
+        shape = Quadrilateral9 if centered and cell == "quadrilateral" else QUADRATIC[cell]
+        return name_of(block.name, shape), shape
+
+    def whole(block: Block, at: slice) -> list[Cut]:
+        shape = block.shape
+        if shape is None or shape.cell == "point" or not len(block):
+            return []
+        if ELEMENTS[names[block.name]].shape.cell != shape.cell if block.name in names else False:
+            raise MeshError(f"{names[block.name]} cannot take the place of {block.name}")
+        return [(np.arange(len(block)), [unchanged(shape.cell)])]
+
+    refiner = CellRefiner(mesh, known_centers(mesh.blocks, None), target)
+    refiner.elements(whole)
+    refiner.conditions(whole)
+    return refiner.refined_mesh()
+
+
+def quadratic(name: str) -> str:
+    """Return the name of the quadratic element of the same family as an element.
+
+    >>> quadratic("KinematicLinear3D6N")
+    'KinematicLinear3D15N'
+    """
+    shape = ELEMENTS[name].shape
+    return name if len(shape.nodes) > shape.corners else name_of(name, QUADRATIC[shape.cell])

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from kratos_lite.errors import MeshError, nearest
-from kratos_lite.mesh.blocks import NO_ROWS, Part, distinct, without_repeats
-from kratos_lite.mesh.cells import Cells
+from kratos_lite.mesh.blocks import NO_ROWS, Cells, Part, distinct, without_repeats
 from kratos_lite.typing import Array, Ints
 from kratos_lite.validation import finite, whole_numbers
 
@@ -129,9 +128,9 @@ def find_elements(where: WhereElements, part: Part | None, mesh: Cells) -> Ints:
     return whole_numbers(rows, "element rows", size=sum(map(len, mesh.blocks)), error=MeshError)
 
 
-def elements_among(nodes: Ints, cells: Cells) -> Ints:
+def elements_among(nodes: Ints, mesh: Cells) -> Ints:
     """Return the rows of the elements that have all their nodes among these."""
-    inside = np.zeros(len(cells.points), dtype=bool)
+    inside = np.zeros(len(mesh.points), dtype=bool)
     inside[nodes] = True
-    rows = (inside[block.nodes].all(axis=1) for block in cells.blocks)
+    rows = (inside[block.nodes].all(axis=1) for block in mesh.blocks)
     return np.flatnonzero(np.concatenate([NO_ROWS, *rows]))

@@ -9,14 +9,12 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from kratos_lite.mesh.blocks import NO_ROWS, Block, with_rows
-from kratos_lite.mesh.centers import keys_of
+from kratos_lite.mesh.centers import Keys, keys_of, mixed
 from kratos_lite.native import kernels
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array, Ints, Mask, Numbers, Rows
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from kratos_lite.mesh.hanging import HangingNodes
 
 Sets: TypeAlias = "tuple[Numbers, Sequence[Sequence[int]]]"
@@ -52,7 +50,7 @@ def _table(columns: Sequence[Sequence[int]]) -> Rows:
     return table
 
 
-def set_keys(groups: Sequence[Sets]) -> NDArray[np.uint64]:
+def set_keys(groups: Sequence[Sets]) -> Keys:
     """Return a number for each set: the sum of mixed numbers of its nodes, equal for equal sets."""
     highest = max((int(cells.max(initial=-1)) for cells, _ in groups), default=-1)
     key = mixed(np.arange(highest + 1, dtype=np.uint64))
@@ -60,15 +58,7 @@ def set_keys(groups: Sequence[Sets]) -> NDArray[np.uint64]:
     return np.concatenate([np.zeros(0, np.uint64), *sums])
 
 
-def mixed(x: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    """Return numbers that look random: SplitMix64, Steele, Lea & Flood, OOPSLA (2014) 453-472."""
-    x = x + np.uint64(0x9E3779B97F4A7C15)
-    x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return x ^ (x >> np.uint64(31))
-
-
-def _equal_keys(keys: NDArray[np.uint64]) -> tuple[Ints, Ints]:
+def _equal_keys(keys: Keys) -> tuple[Ints, Ints]:
     order = np.argsort(keys, kind="stable")
     same = np.flatnonzero(keys[order][1:] == keys[order][:-1])
     one, other = order[same], order[same + 1]

@@ -6,16 +6,13 @@ Source of the node orders: VTK User's Guide, "VTK File Formats".
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from kratos_lite.errors import InputError, KratosLiteError
-from kratos_lite.mesh.blocks import Block
+from kratos_lite.mesh.blocks import Block, Cells
 from kratos_lite.typing import Mask, Numbers
-
-if TYPE_CHECKING:
-    from kratos_lite.mesh.cells import Cells
 
 
 def mesh_fields(mesh: Cells) -> tuple[dict[str, Numbers], dict[str, Numbers]]:

@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.mesh.finer import Finer
+from kratos_lite.mesh.refined_mesh import RefinedMesh
 from kratos_lite.model.structure import Structure
 from kratos_lite.model.supports import DirichletCondition
 from kratos_lite.quadrature import Rule
@@ -17,11 +17,11 @@ from kratos_lite.quadrature import Rule
 S = TypeVar("S", bound=Structure)
 
 
-def refined(structure: S, finer: Finer) -> S:
+def refined(structure: S, finer: RefinedMesh) -> S:
     """Return a structure on a finer mesh.
 
-    Parts and predicates choose nodes anew, sets of rows grow as `Finer.grown` says; prescribed values and
-    nodal loads are interpolated unless they are functions of places, forces on nodes stay there.
+    Parts and predicates choose nodes anew, sets of nodes are those of `RefinedMesh.refined_nodes`; prescribed
+    values and nodal loads are interpolated unless they are functions of places, forces on nodes stay there.
     """
     if structure.motion is not None:
         raise ModelError(
@@ -50,7 +50,7 @@ def refined(structure: S, finer: Finer) -> S:
     return new
 
 
-def _carry_rules(structure: Structure, new: Structure, finer: Finer) -> None:
+def _carry_rules(structure: Structure, new: Structure, finer: RefinedMesh) -> None:
     """Give elements the rules of those that they have come from; refuse those of another shape."""
     rule_of = structure._rule_of[finer.elements]
     new._rules, new._rule_of = dict(structure._rules), rule_of
@@ -67,7 +67,7 @@ def _carry_rules(structure: Structure, new: Structure, finer: Finer) -> None:
         )
 
 
-def _refined_condition(condition: DirichletCondition, finer: Finer) -> DirichletCondition:
+def _refined_condition(condition: DirichletCondition, finer: RefinedMesh) -> DirichletCondition:
     """Return what a Dirichlet condition means on the finer mesh."""
     where, value = finer.where(condition.where), condition.value
     nodes = finer.mesh.nodes(where)
@@ -80,14 +80,14 @@ def _refined_condition(condition: DirichletCondition, finer: Finer) -> Dirichlet
     return replace(condition, where=where, nodes=nodes[known], value=nodal[known], override=True)
 
 
-def _carry_constraints(structure: Structure, new: Structure, finer: Finer) -> None:
+def _carry_constraints(structure: Structure, new: Structure, finer: RefinedMesh) -> None:
     """Carry over constraints of nodes; refuse those that tie edges on which new nodes lie."""
     every = structure.supports.constraints
     own = every.take(np.arange(len(every)) >= len(structure.supports.hanging))
     if not len(own):
         return
     tied = np.unique(own.dependents // 3)
-    if len(finer.grown(tied)) > len(tied):
+    if len(finer.refined_nodes(tied)) > len(tied):
         raise ModelError(
             f"{len(own)} constraints tie nodes of edges that are cut, but not their new nodes; constrain "
             "a finer mesh instead"

@@ -13,14 +13,14 @@ A, B, RHO = 0.3, 1.0, 7620.0
 
 
 def spinning_load(r, rate):
-    """Growth of a free plane annulus under the centrifugal load alone (a1)."""
+    """CellRefiner of a free plane annulus under the centrifugal load alone (a1)."""
     n, squares = NU_PLANE, A * A + B * B
     shape = (3 + n) * (1 - n) * squares + (1 + n) * (3 + n) * (A * B / r) ** 2 - (1 - n * n) * r * r
     return RHO * rate**2 * r / (8 * E_PLANE) * shape
 
 
 def with_softening(r, rate, c_p, clamped):
-    """Growth with the inertia of the growth itself (a2): u = -r + C1 J1(kr) + C2 Y1(kr)."""
+    """CellRefiner with the inertia of the growth itself (a2): u = -r + C1 J1(kr) + C2 Y1(kr)."""
     lam, mu, k = 1.211538461538462e8, 8.076923076923077e7, rate / c_p
 
     def stress(f, x):  # of u = f(1, k x)

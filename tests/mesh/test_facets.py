@@ -5,7 +5,7 @@ import pytest
 
 import kratos_lite as kl
 from kratos_lite.mesh.facets import facets
-from kratos_lite.mesh.order import raised
+from kratos_lite.mesh.refinement import raised
 from kratos_lite.verification.meshes import shaped, warped
 
 

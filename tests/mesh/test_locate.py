@@ -9,8 +9,7 @@ from kratos_lite.bodies.rotations import exp
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import InputError, MeshError
 from kratos_lite.mesh import Block, Mesh
-from kratos_lite.mesh.boxes import BoxTree, cell_boxes
-from kratos_lite.mesh.nearest import distance_to_cell
+from kratos_lite.mesh.boxes import BoxTree, cell_boxes, distance_to_cell
 from kratos_lite.shapes.faces import Quadrilateral4
 from kratos_lite.shapes.inverse import inverse_map
 

@@ -5,8 +5,7 @@ import pytest
 
 import kratos_lite as kl
 from kratos_lite.elements.surface import area_vectors, face_rule
-from kratos_lite.mesh.order import raised
-from kratos_lite.mesh.refinement import refine
+from kratos_lite.mesh.refinement import raised, refine
 
 KINDS = ("4N", "5N", "6N", "8N", "10N", "13N", "15N", "20N", "27N")
 QUADRATIC = ("10N", "13N", "15N", "20N", "27N")

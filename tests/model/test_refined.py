@@ -5,8 +5,7 @@ import pytest
 
 import kratos_lite as kl
 from kratos_lite.analysis.nodal_loads import external_loads
-from kratos_lite.mesh.order import raised
-from kratos_lite.mesh.refinement import refine
+from kratos_lite.mesh.refinement import raised, refine
 from kratos_lite.model.loads import Load
 from kratos_lite.model.loads.conditions import ConditionLoads
 from kratos_lite.model.refined import refined

@@ -120,7 +120,7 @@ CASES: Case = {
     ("Mesh.elements", "where"): (CUBE.elements, [0]),
     ("Mesh.faces", "where"): (CUBE.faces, NODES),
     ("Mesh.add_part", "where"): (lambda v: CUBE.replace().add_part("a", v), NODES),
-    ("Cells.node_rows", "ids"): (CUBE.node_rows, NODES),
+    ("Mesh.node_rows", "ids"): (CUBE.node_rows, NODES),
     ("Mesh.locate", "points"): (lambda v: CUBE.locate(v).rows, [POINT]),
     ("box", "size"): (lambda v: kl.box(v).points, POINT),
     ("box", "cells"): (lambda v: kl.box(cells=v).n_elements, (1, 2, 1)),

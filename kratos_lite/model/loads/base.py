@@ -18,7 +18,7 @@ from kratos_lite.validation import finite, short, takes
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from kratos_lite.mesh.finer import Finer
+    from kratos_lite.mesh.refined_mesh import RefinedMesh
 
 OfPlace: TypeAlias = "Callable[[Array], ArrayLike]"
 """A function of places (m, 3) in m."""
@@ -84,7 +84,7 @@ class Load(ABC):
         """
         return []
 
-    def refined(self, finer: Finer) -> Load:
+    def refined(self, finer: RefinedMesh) -> Load:
         """Return the same load on a finer mesh.
 
         Parameters
@@ -192,7 +192,7 @@ class TimeDependentLoad(Load):
         """Return the nodal forces (n, 3) in N at the time 0."""
         return self.history(lambda load: load.forces(mesh, groups))(0.0) + np.zeros_like(mesh.points)
 
-    def refined(self, finer: Finer) -> Load:
+    def refined(self, finer: RefinedMesh) -> Load:
         """Return a load whose function gives those of this one on a finer mesh."""
 
         def function(time: float) -> Load | None:
@@ -252,7 +252,7 @@ class ScaledLoad(TimeDependentLoad):
         """Return what may be wrong with the load."""
         return self.load.warnings(mesh, groups)
 
-    def refined(self, finer: Finer) -> Load:
+    def refined(self, finer: RefinedMesh) -> Load:
         """Return the load on a finer mesh, with the same amplitude."""
         return ScaledLoad(self.load.refined(finer), self.amplitude)
 

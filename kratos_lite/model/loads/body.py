@@ -17,7 +17,7 @@ from kratos_lite.typing import Array, Mask
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from kratos_lite.mesh.finer import Finer
+    from kratos_lite.mesh.refined_mesh import RefinedMesh
 
 
 class BodyForce(DistributedLoad):
@@ -100,7 +100,7 @@ class BodyForce(DistributedLoad):
                 total += gauss_point_fields.body_force(points, part, scale * force)
         return total
 
-    def refined(self, finer: Finer) -> Load:
+    def refined(self, finer: RefinedMesh) -> Load:
         """Return the load on a finer mesh; nodal values are interpolated."""
         nodal = not callable(self.force) and self.force.ndim == 2
         force = finer.interpolate(self.force) if nodal else self.force

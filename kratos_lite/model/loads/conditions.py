@@ -15,7 +15,7 @@ from kratos_lite.model.loads.base import Load
 from kratos_lite.model.loads.surface import SURFACES
 
 if TYPE_CHECKING:
-    from kratos_lite.mesh.finer import Finer
+    from kratos_lite.mesh.refined_mesh import RefinedMesh
 from kratos_lite.typing import Array
 
 
@@ -55,7 +55,7 @@ class ConditionLoads(Load):
                 add_nodal(total, block.nodes, surface_pressure(block.shape, X, pressure))
         return total
 
-    def refined(self, finer: Finer) -> Load:
+    def refined(self, finer: RefinedMesh) -> Load:
         """Return the loads on a finer mesh: conditions keep those of their parents, nodes interpolate."""
         return ConditionLoads(
             self.force[finer.conditions],

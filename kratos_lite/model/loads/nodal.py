@@ -17,7 +17,7 @@ from kratos_lite.typing import Array, Ints
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from kratos_lite.mesh.finer import Finer
+    from kratos_lite.mesh.refined_mesh import RefinedMesh
 
 
 class PointLoad(Load):
@@ -75,7 +75,7 @@ class PointLoad(Load):
         total[rows] += self.force
         return total
 
-    def refined(self, finer: Finer) -> Load:
+    def refined(self, finer: RefinedMesh) -> Load:
         """Return the load on a finer mesh: on the same nodes or point."""
         same = finer.coarse.nodes(self.where) if self._point is None else self.where
         return PointLoad(same, self.force)
@@ -119,7 +119,7 @@ class NodalForces(Load):
             raise InputError(f"nodal forces need shape {mesh.points.shape}; got {self.values.shape}")
         return self.values.copy()
 
-    def refined(self, finer: Finer) -> Load:
+    def refined(self, finer: RefinedMesh) -> Load:
         """Return the load on a finer mesh: on the same nodes."""
         new = np.zeros((finer.mesh.n_nodes - len(self.values), 3))
         return NodalForces(np.concatenate([self.values, new]))

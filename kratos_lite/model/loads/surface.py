@@ -19,7 +19,7 @@ from kratos_lite.validation import number
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from kratos_lite.mesh.finer import Finer
+    from kratos_lite.mesh.refined_mesh import RefinedMesh
 
 SURFACES = ("triangle", "quadrilateral")
 
@@ -75,7 +75,7 @@ class Traction(FaceLoad):
             t = at_places(self.traction, what, (3,)) if callable(self.traction) else self.traction
             yield block, surface_load(block.shape, mesh.points[block.nodes], t, factors)
 
-    def refined(self, finer: Finer) -> Load:
+    def refined(self, finer: RefinedMesh) -> Load:
         """Return the load on a finer mesh: on the faces or lines that have come from those of the old one."""
         return type(self)(finer.where(self.where), self.traction)
 
@@ -125,7 +125,7 @@ class Pressure(FaceLoad):
                 forces *= outward(mesh, block)[:, None, None]
             yield block, forces
 
-    def refined(self, finer: Finer) -> Load:
+    def refined(self, finer: RefinedMesh) -> Load:
         """Return the load on a finer mesh: on the faces that have come from those of the old one."""
         return Pressure(finer.where(self.where), self.pressure, self.normal)
 

@@ -1,4 +1,4 @@
-"""Growth: makes a finer mesh from a coarser one, cell by cell."""
+"""CellRefiner: makes a finer mesh from a coarser one, cell by cell."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import numpy as np
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.mesh.blocks import NO_ROWS, Block, with_rows
 from kratos_lite.mesh.centers import Centers, Keys, corners_around, keys_of, surroundings
-from kratos_lite.mesh.finer import Finer
 from kratos_lite.mesh.hanging import hanging_nodes
 from kratos_lite.mesh.mesh import Mesh
+from kratos_lite.mesh.refined_mesh import RefinedMesh
 from kratos_lite.mesh.subdivision import Piece
 from kratos_lite.shapes import LINEAR, Shape
 from kratos_lite.typing import Array, Ints
@@ -61,8 +61,8 @@ def _joined(blocks: Sequence[Block]) -> Block:
     )
 
 
-class Growth:
-    """A finer mesh while it is made.
+class CellRefiner:
+    """A refined mesh while it is made.
 
     Parameters
     ----------
@@ -80,13 +80,13 @@ class Growth:
 
     def elements(self, cuts: Callable[[Block, slice], Sequence[Cut]]) -> None:
         """Take up all elements: cut as `cuts` says of each block and its rows, or as they are."""
-        self._grow(self.mesh.blocks, self._elements, cuts)
+        self._refine(self.mesh.blocks, self._elements, cuts)
 
     def conditions(self, cuts: Callable[[Block, slice], Sequence[Cut]]) -> None:
         """Take up all conditions likewise, after the elements."""
-        self._grow(self.mesh.conditions, self._conditions, cuts)
+        self._refine(self.mesh.conditions, self._conditions, cuts)
 
-    def _grow(
+    def _refine(
         self, blocks: Sequence[Block], into: _Cells, cuts: Callable[[Block, slice], Sequence[Cut]]
     ) -> None:
         for block, at in with_rows(blocks):
@@ -167,13 +167,13 @@ class Growth:
                 self.centers.add(keys[known, column], own[known])
                 self.centers.sort()
 
-    def finer(self) -> Finer:
-        """Return the mesh that has grown."""
+    def refined_mesh(self) -> RefinedMesh:
+        """Return the refined mesh."""
         blocks, n = self._elements.blocks(), self._n_nodes
         start, nodes, weights = _compressed(self._sources)
         old = self.mesh
         first = int(old.node_ids.max(initial=0)) + 1
-        bare = Finer(
+        bare = RefinedMesh(
             old,
             old,
             self._elements.parents(),

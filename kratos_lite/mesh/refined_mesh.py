@@ -1,4 +1,4 @@
-"""Finer: a mesh made from another one, and what becomes of nodes, elements, conditions and parts."""
+"""RefinedMesh: a mesh made from another one, and what becomes of nodes, elements, conditions and parts."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from kratos_lite.validation import finite
 
 
 @dataclass(frozen=True, eq=False)
-class Finer:
+class RefinedMesh:
     """A mesh made from a coarser one, whose nodes are the first of its own.
 
     Attributes
@@ -43,7 +43,7 @@ class Finer:
         """Return nodal values (n, ...) of the coarse mesh on all nodes of the finer one."""
         return np.concatenate([values, _interpolated(values, self.start, self.nodes, self.weights)])
 
-    def onto(self, geometry: Mapping[str, Callable[[Array], Array]]) -> Finer:
+    def onto(self, geometry: Mapping[str, Callable[[Array], Array]]) -> RefinedMesh:
         """Return the same with the new nodes of parts moved onto the true surfaces.
 
         Hanging nodes stay on the edges and faces of those they depend on.
@@ -57,7 +57,7 @@ class Finer:
             points = self.mesh.hanging.interpolate(points)
         return replace(self, mesh=self.mesh.replace(points=points))
 
-    def grown(self, rows: Ints) -> Ints:
+    def refined_nodes(self, rows: Ints) -> Ints:
         """Return the nodes of the finer mesh that belong to a set of nodes of the coarse one.
 
         A set of nodes on the surface means the boundary faces of elements that have all their nodes in it;
@@ -78,7 +78,7 @@ class Finer:
         """Return what nodes of the coarse mesh are chosen by, as a choice of nodes of the finer one."""
         if isinstance(where, str) or callable(where):
             return where
-        return self.grown(self.coarse.nodes(where))
+        return self.refined_nodes(self.coarse.nodes(where))
 
     def where_elements(self, where: WhereElements) -> WhereElements:
         """Return likewise a choice of elements."""
@@ -91,7 +91,10 @@ class Finer:
         conditions = _descendants(self.conditions, part.conditions, self.coarse.n_conditions)
         elements = part.elements if len(part.elements) else elements_among(part.nodes, self.coarse)
         return replace(
-            part, nodes=self.grown(part.nodes), elements=self.children(elements), conditions=conditions
+            part,
+            nodes=self.refined_nodes(part.nodes),
+            elements=self.children(elements),
+            conditions=conditions,
         )
 
 
@@ -112,7 +115,7 @@ def _descendants(parents: Ints, rows: Ints, size: int) -> Ints:
 
 
 def _keys_among(mesh: Mesh, rows: Ints) -> Keys:
-    """Return the keys of the edges, faces and cells that a set of nodes means; see `Finer.grown`."""
+    """Return the keys of the edges, faces and cells that a set of nodes means; see `RefinedMesh.grown`."""
     inside = np.zeros(mesh.n_nodes, dtype=bool)
     inside[rows] = True
     keys: list[Keys] = [np.zeros(0, dtype=np.uint64)]
