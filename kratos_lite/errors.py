@@ -129,8 +129,7 @@ def nearest(name: str, known: Iterable[str], count: int = 3) -> str:
     known = list(dict.fromkeys(known))
     if RENAMED.get(name) in known:
         return f" It is called {RENAMED[name]} here."
+    plain = {_plain(word): word for word in known}
     close = get_close_matches(name, known, n=count, cutoff=0.6)
-    if not close:
-        plain = {_plain(word): word for word in known}
-        close = [plain[word] for word in get_close_matches(_plain(name), list(plain), n=count, cutoff=0.6)]
+    close = close or [plain[word] for word in get_close_matches(_plain(name), list(plain), count, 0.6)]
     return f" Did you mean {' or '.join(close)}?" if close else ""

@@ -37,24 +37,20 @@ def vector_rates(
     velocity: Sequence[Factor], acceleration: Sequence[Factor] | None, what: str
 ) -> tuple[Rate, Rate, Rate]:
     """Return the rates of three components, each a number, `TimeSeries` or function of time."""
-    accelerations = (
-        (None, None, None) if acceleration is None else _three(acceleration, f"{what} acceleration")
-    )
-    pairs = zip(_three(velocity, f"{what} velocity"), accelerations, strict=True)
-    x, y, z = (Rate(one, other, f"{what} velocity") for one, other in pairs)
-    return x, y, z
+    x, y, z = _components(velocity, f"{what} velocity")
+    accelerations = (None,) * 3 if acceleration is None else _components(acceleration, f"{what} acceleration")
+    name = f"{what} velocity"
+    return Rate(x, accelerations[0], name), Rate(y, accelerations[1], name), Rate(z, accelerations[2], name)
 
 
-def _three(values: Sequence[Factor], what: str) -> list[Factor]:
+def _components(values: Sequence[Factor], what: str) -> tuple[Factor, Factor, Factor]:
     try:
-        found = list(values)
-    except TypeError:
-        found = []
-    if len(found) != 3 or isinstance(values, str):
+        x, y, z = values
+    except (TypeError, ValueError):
         raise InputError(
             f"{what} has three components, each a number, TimeSeries or function of time; got {values!r:.80}"
-        )
-    return found
+        ) from None
+    return x, y, z
 
 
 def _accelerated(start: float, acceleration: float | TimeSeries | None) -> Callable[[float], float]:

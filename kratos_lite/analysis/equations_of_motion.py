@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from kratos_lite.ale import Motion, MotionMatrices
-from kratos_lite.ale.rotational_symmetry import check_materials
+from kratos_lite.ale.checks import check_materials
 from kratos_lite.analysis.time_dependent_loads import AppliedLoads, PrescribedDisplacement
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.errors import InputError, ModelError

@@ -13,7 +13,7 @@ from kratos_lite.assembly.element_groups import ElementGroup, element_class
 from kratos_lite.assembly.gauss_point_fields import clearly_positive
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.tables import gradients_at_nodes, tabulate
-from kratos_lite.errors import MAX_PROBLEMS, InputError, MeshError, ModelError, SolveError
+from kratos_lite.errors import MAX_PROBLEMS, InputError, MeshError, ModelError, Problems, SolveError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.model.loads import Load
@@ -30,7 +30,7 @@ LIGHTEST, HEAVIEST = 0.01, 2.26e6
 HEAVY, HARD = 2300.0, 1e7
 """Above this density in kg/m³ there are concrete, rock and metals, all far stiffer than this E in Pa."""
 FOLD = 0.2
-"""Share of the mean det J by which it may be negative at a node; two swapped nodes give 0.7 and more."""
+"""Fraction of the mean det J by which it may be negative at a node; two swapped nodes give 0.7 and more."""
 LOADS_ON_SUPPORTS = "all loads act on fixed components, so nothing moves"
 """The warning of loads that only supports carry."""
 
@@ -52,21 +52,17 @@ def checked_material(material: object) -> LinearMaterial:
 def check_geometry(mesh: Mesh, formulation: str | None = None) -> list[str]:
     """Check coordinates, node lists and det J of all elements, whatever their material; return warnings.
 
-    Raises MeshError, or InputError for elements of unknown kinds.
+    Raises MeshError, or InputError for elements of unknown types.
     """
-    kinds = [element_class(mesh, block, formulation) for block in mesh.blocks]
-    check_widths(mesh, kinds)
-    check_repeated_nodes(mesh)
-    return check_jacobians(mesh, kinds)
-
-
-def check_widths(mesh: Mesh, kinds: Sequence[type[KinematicLinear]]) -> None:
-    """Raise MeshError if cells do not have as many nodes as their kind."""
-    for block, kind in zip(mesh.blocks, kinds, strict=True):
-        if block.nodes.shape[1] != len(kind.nodes):
+    elements = [element_class(mesh, block, formulation) for block in mesh.blocks]
+    for block, element in zip(mesh.blocks, elements, strict=True):
+        if block.nodes.shape[1] != len(element.nodes):
             raise MeshError(
-                f"block {block.name}: nodes must have shape (m, {len(kind.nodes)}); got {block.nodes.shape}"
+                f"block {block.name}: nodes must have shape (m, {len(element.nodes)}); "
+                f"got {block.nodes.shape}"
             )
+    check_repeated_nodes(mesh)
+    return check_jacobians(mesh, elements)
 
 
 def check_repeated_nodes(mesh: Mesh) -> None:
@@ -83,43 +79,37 @@ def check_repeated_nodes(mesh: Mesh) -> None:
             )
 
 
-def check_jacobians(mesh: Mesh, kinds: Sequence[type[KinematicLinear]]) -> list[str]:
+def check_jacobians(mesh: Mesh, elements: Sequence[type[KinematicLinear]]) -> list[str]:
     """Raise MeshError for elements with det J ≤ 0 at a Gauss point or clearly < 0 at a node.
 
-    `kinds` holds the element class of each block.  det J = 0 at a corner node alone (quarter-point
+    `elements` holds the class of each block.  det J = 0 at a corner node alone (quarter-point
     elements) is allowed and noted; so is a slight fold at a node, at most FOLD of the mean det J,
     which badly shaped but useful elements have.
     """
-    problems: list[str] = []
-    counts = np.zeros(3, dtype=np.int64)
-    for block, kind in zip(mesh.blocks, kinds, strict=True):
-        shape, g = kind.shape, len(kind.rule)
-        dN = np.concatenate([tabulate(shape, kind.rule)[1], gradients_at_nodes(shape)])
+    problems = Problems(kind=MeshError)
+    flat = folded = 0
+    for block, element in zip(mesh.blocks, elements, strict=True):
+        shape, g = element.shape, len(element.rule)
+        dN = np.concatenate([tabulate(shape, element.rule)[1], gradients_at_nodes(shape)])
         limit = np.where(np.arange(len(dN)) < g, 0.0, -FOLD)
-        doubtful = np.flatnonzero(~clearly_positive(mesh.points, block.nodes, kind, dN, g))
+        doubtful = np.flatnonzero(~clearly_positive(mesh.points, block.nodes, element, dN, g))
         step = max(1, 4_000_000 // (72 * len(dN)))
         for start in range(0, len(doubtful), step):
             cells = doubtful[start : start + step]
-            det = kind(mesh.points[block.nodes[cells]]).determinants(dN)
+            det = element(mesh.points[block.nodes[cells]]).determinants(dN)
             scale = np.abs(det[:, :g]).mean(axis=1, keepdims=True)
             bad = np.where(np.arange(len(dN)) < g, det <= limit * scale, det < limit * scale).any(axis=1)
-            flat = (np.abs(det[:, g:]) <= 1e-10 * scale).any(axis=1)
-            folded = (det[:, g:] < -1e-10 * scale).any(axis=1)
-            counts += [mask.sum() for mask in (bad, flat, folded)]
-            for e in np.flatnonzero(bad)[: MAX_PROBLEMS - len(problems)]:
-                problems.append(_describe_inverted(mesh, block, int(cells[e]), det[e], g))
-    return _verdict(problems, *counts.tolist())
-
-
-def _verdict(problems: list[str], wrong: int, flat: int, folded: int) -> list[str]:
-    """Raise MeshError for elements that are wrong, or return notes of those that are badly shaped."""
-    if wrong:
-        more = f"\n… and {wrong - len(problems)} more" if wrong > len(problems) else ""
-        raise MeshError("\n".join(problems) + more)
-    notes = [f"{flat} elements have det J = 0 at a corner node (singular corner)"] if flat else []
+            flat += int((np.abs(det[:, g:]) <= 1e-10 * scale).any(axis=1).sum())
+            folded += int((det[:, g:] < -1e-10 * scale).any(axis=1).sum())
+            wrong = np.flatnonzero(bad)
+            for e in wrong[:MAX_PROBLEMS]:
+                problems.add(_describe_inverted(mesh, block, int(cells[e]), det[e], g))
+            problems.count += len(wrong[MAX_PROBLEMS:])
+    problems.raise_if_any()
+    warnings = [f"{flat} elements have det J = 0 at a corner node (singular corner)"] if flat else []
     if folded:
-        notes.append(f"{folded} elements have det J slightly < 0 at a node: badly shaped, so less accurate")
-    return notes
+        warnings.append(f"{folded} elements have det J slightly < 0 at a node: badly shaped, less accurate")
+    return warnings
 
 
 def _describe_inverted(mesh: Mesh, block: Block, cell: int, det: Array, g: int) -> str:
@@ -213,20 +203,20 @@ def young_moduli(material: LinearMaterial) -> tuple[float, float]:
 
 
 def check_rounding(
-    noise: float, loads: Array, initial: Array, reactions: Array, supports: Supports
+    roundoff: float, loads: Array, initial: Array, reactions: Array, supports: Supports
 ) -> list[str]:
-    """Warn where rounding of the internal forces, `noise` in N per node, is not small beside the loads.
+    """Warn where rounding of the internal forces, `roundoff` in N per node, is not small beside the loads.
 
     Raises SolveError where it is as large as the loads, to two digits: the solution means nothing.
     """
     size = float(max(np.abs(part).max(initial=0.0) for part in (loads, initial, reactions)))
-    if supports.values.any() or noise <= 1e-6 * size:
+    if supports.values.any() or roundoff <= 1e-6 * size:
         return []
     text = (
-        f"rounding errors may reach {noise / size:.0e} of the loads: something hardly resists them; "
+        f"rounding errors may reach {roundoff / size:.0e} of the loads: something hardly resists them; "
         "look for nearly free parts, spurious modes or a large stiffness contrast"
     )
-    if noise > 1e-2 * size:
+    if roundoff > 1e-2 * size:
         raise SolveError(text)
     return [text]
 
@@ -261,18 +251,18 @@ def equilibrium(
     loads: Array,
     reactions: Array,
     internal: Array,
-    noise: float = 0.0,
+    roundoff: float = 0.0,
 ) -> tuple[float, float]:
     """Return what forces and moments miss to equilibrium, relative to the sizes of loads and reactions.
 
     The larger of the sum over all nodes and of what nodes miss one by one, beside the internal load of
-    the stresses.  Forces that are together below `noise` in N are rounding, and in balance.
+    the stresses.  Forces that are together below `roundoff` in N are rounding, and in balance.
     """
     total = loads + reactions
     X = points - points.mean(axis=0)
     size = float(np.abs(loads).sum() + np.abs(reactions).sum())
     arm = float(np.abs(X).max(initial=0.0))
-    if size <= noise:
+    if size <= roundoff:
         return 0.0, 0.0
     nodal = float(np.abs(total - internal).sum()) / size
     force = float(np.abs(total.sum(axis=0)).max() / size)

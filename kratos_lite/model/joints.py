@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from kratos_lite.mesh import NO_ROWS, Mesh, equal_sets, with_rows
-from kratos_lite.mesh.topology import Sets, corners, faces_of, set_keys
+from kratos_lite.mesh.centers import keys_of
+from kratos_lite.mesh.topology import corners, faces_of
 from kratos_lite.solvers.constraints import Constraints
 from kratos_lite.typing import Array, Ints
 
@@ -50,28 +51,16 @@ def _pairs(mesh: Mesh, one: Ints, other: Ints) -> tuple[int, str]:
 
 def _halved_squares(mesh: Mesh) -> Ints:
     """Return the elements of four-sided faces of which three corners are a triangular face."""
-    sizes = {len(corners(face)) for block in mesh.blocks if len(block) for face in faces_of(block)}
-    if sizes != {3, 4}:
+    faces = [(block, at, corners(f)) for block, at in with_rows(mesh.blocks) for f in faces_of(block)]
+    if {len(face) for block, _, face in faces if len(block)} != {3, 4}:
         return NO_ROWS
-    triangles: list[Sets] = []
-    thirds: list[Sets] = []
+    known = np.concatenate([keys_of(block.nodes[:, face]) for block, _, face in faces if len(face) == 3])
     elements = [NO_ROWS]
-    for block, at in with_rows(mesh.blocks):
-        found = [corners(face) for face in faces_of(block)]
-        triangles.append((block.nodes, [face for face in found if len(face) == 3]))
-        for square in found:
-            if len(square) != 4:
-                continue
-            thirds.append((block.nodes, [square[:i] + square[i + 1 :] for i in range(4)]))
-            elements.append(np.arange(at.start, at.stop))
-    keys = set_keys(triangles + thirds)
-    n_triangles = sum(len(cells) * len(columns) for cells, columns in triangles)
-    meets, start = [], n_triangles
-    for cells, columns in thirds:
-        stop = start + len(cells) * len(columns)
-        meets.append(np.isin(keys[start:stop].reshape(4, -1), keys[:n_triangles]).any(axis=0))
-        start = stop
-    return np.concatenate(elements)[np.concatenate(meets)]
+    for block, at, face in faces:
+        if len(face) == 4:
+            thirds = [keys_of(np.delete(block.nodes[:, face], i, axis=1)) for i in range(4)]
+            elements.append(at.start + np.flatnonzero(np.isin(thirds, known).any(axis=0)))
+    return np.concatenate(elements)
 
 
 def check_coincident(mesh: Mesh, constraints: Constraints | None = None) -> list[str]:

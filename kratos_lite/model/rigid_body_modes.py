@@ -22,11 +22,11 @@ from kratos_lite.solvers.constraint_map import rigid_modes
 from kratos_lite.typing import Array, Ints
 
 FREE = 1e-7
-"""Singular value, as a share of the largest and of 1, the size of an equation, up to which a mode is free."""
+"""Singular value, as a fraction of the largest and of 1, the size of an equation, of a free mode at most."""
 SAMPLE = 48
-"""_Constraints for each body that are looked at first: a few of very many show that nothing is free."""
+"""Equations for each body that are looked at first: a few of very many show that nothing is free."""
 SOFT = 1e-13
-"""Share of the largest squared singular value that is added to those of many bodies."""
+"""Fraction of the largest squared singular value that is added to those of many bodies."""
 PASSES, PROBES = 12, 12
 """Passes that leave of a motion nothing but what is free, and motions at random that make them."""
 REST = 1e-6

@@ -60,26 +60,17 @@ class Attachment(ABC):
 
 
 class Structure(Tabular):
-    """What is analyzed: a mesh with materials, supports, loads and motion; it knows no analysis.
+    """What is analyzed: a mesh with materials, supports, loads and motion; `Model` adds the analyses.
 
     Parameters
     ----------
-    mesh : points, elements and named parts.
-    material : one material for all elements, or materials by part name or property id.
-    formulation : of the elements, in place of what their names in the mesh say; see `formulation`.
+    mesh, material, formulation : as for a `Model`, with the same errors.
 
     Attributes
     ----------
     supports : what is prescribed; see `fix`, `release` and `constrain`.
     loads : those added; the list may be changed.
     notes : what readers of files remarked, for the report.
-
-    Raises
-    ------
-    InputError
-        `mesh` is not a Mesh, `material` not a material, or an element of the mesh has no such formulation.
-    MeshError
-        A part or property of `material` does not exist.
     """
 
     def __init__(
@@ -147,7 +138,7 @@ class Structure(Tabular):
         Parameters
         ----------
         material : such as `Isotropic3D`.
-        where : elements by part name, property id or rows; all if not given.
+        where : elements by part name, property id or indices; all if not given.
 
         Raises
         ------
@@ -173,7 +164,7 @@ class Structure(Tabular):
         Parameters
         ----------
         rule : a Rule, or an INTEGRATION_ORDER 1 … 5 of Kratos.
-        where : elements by part name, property id or rows; all if not given.
+        where : elements by part name, property id or indices; all if not given.
 
         Raises
         ------
@@ -190,7 +181,7 @@ class Structure(Tabular):
         self._changes += 1
 
     def element_groups(self, unnamed: str = NON_LOCKING) -> list[ElementGroup]:
-        """Return the elements grouped by kind, rule and material.
+        """Return the elements grouped by type, rule and material.
 
         Parameters
         ----------
@@ -205,7 +196,7 @@ class Structure(Tabular):
         ModelError
             An element has no material, or there are no elements.
         InputError
-            An element has an unknown kind, or a rule does not fit it.
+            An element has an unknown type, or a rule does not fit it.
         """
         return element_groups_of(
             self.mesh,
@@ -229,13 +220,13 @@ class Structure(Tabular):
         -------
         Such as ``non_locking, as the mesh names none: EnhancedStrain3D8N``.
         """
-        found = dict.fromkeys(_kind(group) for group in groups)
+        names = dict.fromkeys(_element_name(group) for group in groups)
         unnamed = any(is_unnamed(block.name) for block in self.mesh.blocks if len(block))
         if self.formulation is None and not unnamed:
             return ""
         why = "as the mesh names none" if self.formulation is None else "as asked for"
-        kinds = f": {', '.join(found)}" if found else ""
-        return f"{self.formulation or NON_LOCKING}, {why}{kinds}"
+        elements = f": {', '.join(names)}" if names else ""
+        return f"{self.formulation or NON_LOCKING}, {why}{elements}"
 
     # ---- initial stress -----------------------------------------------------------------------
 
@@ -274,7 +265,7 @@ class Structure(Tabular):
         Parameters
         ----------
         stress : (6,) or (m, 6) Pa, in the order xx yy zz xy yz zx.
-        where : m elements by part name, property id or rows; all if not given.
+        where : m elements by part name, property id or indices; all if not given.
 
         Raises
         ------
@@ -627,7 +618,7 @@ class Structure(Tabular):
         return f"{name}({self.mesh.n_nodes} nodes, {self.mesh.n_elements} elements, {len(self.loads)} loads)"
 
 
-def _kind(group: ElementGroup) -> str:
+def _element_name(group: ElementGroup) -> str:
     """Return the name of the element of a group, with its material where that decides about it."""
     name = group.element.__name__
     return f"{name} for {group.material}" if is_nearly_incompressible(group.material.C) else name
