@@ -248,7 +248,7 @@ SECTIONS = {
     "goal": ("From `.mdpa` to a result file, whole processes", goals),
     "case": ("Real scenes, whole processes", goals),
     "error": ("Run time against error", errors),
-    "growth": ("CellRefiner: the clamped block up to the memory", growth),
+    "growth": ("Growth: the clamped block up to the memory", growth),
     "stall": ("Scenes on which multigrid may stall", stall.tables),
     "assembly": ("Assembly alone", lambda rows: compared(rows, ("pattern", "matrix", "matrix, again"))),
     "parse": ("Reading an `.mdpa` file", lambda rows: compared(rows, ("read", "process"))),

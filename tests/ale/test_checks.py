@@ -56,18 +56,16 @@ def test_rates_near_the_critical_one(wheels):
     assert rayleigh_speed(wheels.c_p, wheels.c_s) == pytest.approx(95.481345662, rel=1e-10)
 
 
-@pytest.mark.parametrize("damping", [0.0, 20.0])
 @pytest.mark.parametrize(
-    ("rate", "words"),
+    ("rate", "damping", "words"),
     [
-        (35.0, ""),
-        (41.0, "the rate 41 rad/s is near the critical one, 43.6 rad/s on this mesh"),
-        (-43.7, "the rate 43.7 rad/s is above the critical one, 43.6 rad/s on this mesh"),
-        (1e6, "the rate 1e+06 rad/s is above the critical one, 43.6 rad/s on this mesh"),
-        (64.0, "the rate 64 rad/s is above the critical one, 43.6 rad/s on this mesh"),
+        (35.0, 0.0, ""),
+        (41.0, 20.0, "the rate 41 rad/s is near the critical one, 43.6 rad/s on this mesh"),
+        (-43.7, 0.0, "the rate 43.7 rad/s is above the critical one, 43.6 rad/s on this mesh"),
+        (1e6, 20.0, "the rate 1e+06 rad/s is above the critical one, 43.6 rad/s on this mesh"),
     ],
 )
-def test_a_thick_wheel_bends_at_less_than_half_the_rate_of_waves(rate, words, damping, wheels):
+def test_a_thick_wheel_bends_at_less_than_half_the_rate_of_waves(rate, damping, words, wheels):
     mesh = kl.annulus(0.3, 1.0, 0.25, (3, 32, 1), "KinematicLinear3D20N")
     model = kl.Model(mesh, wheels.steel)
     model.fix("inner")
@@ -141,7 +139,7 @@ def test_no_density():
         model.solve()
 
 
-@pytest.mark.parametrize("sectors", [1, 2, 3, 4, 5, 6, 7, 8])
+@pytest.mark.parametrize("sectors", [1, 3, 8])
 @pytest.mark.parametrize(
     ("other", "what"),
     [(kl.Isotropic3D(210e6, 0.3, 3 * 7620.0), "density"), (kl.Isotropic3D(21e6, 0.3, 7620.0), "stiffness")],
@@ -289,19 +287,3 @@ def test_periodic_ends_need_opposite_nodes(wheels):
 def test_arguments(make, text):
     with pytest.raises(InputError, match=text):
         make()
-
-
-def test_density_must_be_axisymmetric():
-    mesh = kl.annulus(inner=0.3, outer=1.0, width=0.2, cells=(2, 12, 1), element="KinematicLinear3D8N")
-    light, heavy = (kl.Isotropic3D(E=210e6, nu=0.3, density=rho) for rho in (7000.0, 8000.0))
-    model = kl.Model(mesh, light)
-    model.fix("inner")
-    middles = np.concatenate([mesh.points[block.nodes].mean(axis=1) for block in mesh.blocks])
-    ring = np.hypot(middles[:, 0], middles[:, 1]) > 0.65
-    model.assign(heavy, np.flatnonzero(ring))
-    model.add(kl.ale.Rotation("z", rate=10.0))
-    model.solve()  # a heavy ring is one of revolution
-    model.assign(light)
-    model.assign(heavy, np.flatnonzero(middles[:, 0] > 0))
-    with pytest.raises(kl.ModelError, match="not spread evenly about its axis"):
-        model.solve()
