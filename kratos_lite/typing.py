@@ -22,4 +22,4 @@ Numbers: TypeAlias = "NDArray[Any]"
 Mask: TypeAlias = "NDArray[np.bool_]"
 """Which of many."""
 Progress: TypeAlias = Callable[[str, float], None]
-"""Called with the phase and the share done, 0 … 1."""
+"""Called with the phase and the fraction done, 0 … 1."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -187,20 +186,10 @@ def blocks_of(given: Any, what: str = "blocks") -> tuple[Block, ...]:
     found = tuple(given) if isinstance(given, Sequence) else (given,)
     if not all(isinstance(block, Block) for block in found):
         raise MeshError(
-            f"{what} must be nodes by element name, as in kl.Mesh(points, {{'{_likely(given)}': nodes}}), "
+            f"{what} must be nodes by element name, as in kl.Mesh(points, {{'KinematicLinear3D8N': nodes}}), "
             f"or a list of kl.Block(name, nodes); got {short(given)}"
         )
     return found
-
-
-def _likely(given: Any) -> str:
-    """Return the name of the elements that rows of nodes alone may be, by their number of nodes."""
-    with suppress(TypeError, ValueError, IndexError):
-        shape = np.shape(given)
-        for name in (f"KinematicLinear3D{shape[-1]}N", f"KinematicLinear3D{shape[0]}N"):
-            if len(shape) <= 2 and name in list(ELEMENTS):
-                return name
-    return "KinematicLinear3D8N"
 
 
 def _elements_of(width: int) -> str:
@@ -219,10 +208,8 @@ def with_rows(blocks: Iterable[Block]) -> Iterator[tuple[Block, slice]]:
 
 def select(blocks: Sequence[Block], rows: Ints) -> list[Block]:
     """Return the cells with these rows, block by block."""
-    mine = [
-        (block, rows[(rows >= at.start) & (rows < at.stop)] - at.start) for block, at in with_rows(blocks)
-    ]
-    return [block.take(keep) for block, keep in mine if len(keep)]
+    inside = ((block, at, (rows >= at.start) & (rows < at.stop)) for block, at in with_rows(blocks))
+    return [block.take(rows[here] - at.start) for block, at, here in inside if here.any()]
 
 
 def distinct(values: Ints) -> Ints:

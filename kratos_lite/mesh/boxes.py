@@ -51,7 +51,7 @@ def _deviations(shape: type[Shape], X: Array) -> Array:
 
 
 def curvature(shape: type[Shape], X: Array) -> Array:
-    """Return how far the nodes of cells X (m, n, 3) lie from the straight cell, (m,), as share of an edge.
+    """Return how far the nodes of cells X (m, n, 3) lie from the straight cell, (m,), as fraction of an edge.
 
     It is measured in reference coordinates, so stretching a cell does not change it; 0 for linear shapes.
     """

@@ -50,8 +50,8 @@ class HangingNodes:
         for node, first, last in zip(self.nodes.tolist(), self.start, self.start[1:], strict=False):
             yield node, self.independents[first:last], self.weights[first:last]
 
-    def among(self, nodes: Ints, n_nodes: int) -> HangingNodes:
-        """Return those among some nodes (a,) of all, numbered by these; other independents are left out."""
+    def select(self, nodes: Ints, n_nodes: int) -> HangingNodes:
+        """Return those of some nodes (a,), numbered by these, without other independents."""
         if len(nodes) == n_nodes:
             return self
         number = np.full(n_nodes, -1)
@@ -72,23 +72,22 @@ class HangingNodes:
     def interpolate(self, values: Array) -> Array:
         """Return nodal values (n, ...) in which hanging nodes take what their independents give them."""
         values = values.copy()
-        for mine in self._levels(len(values)):
-            first, take = self._rows(mine)
+        for level in self._levels(len(values)):
+            first, take = self._rows(level)
             weights = self.weights[take].reshape(-1, *[1] * (values.ndim - 1))
-            values[self.nodes[mine]] = np.add.reduceat(weights * values[self.independents[take]], first)
+            values[self.nodes[level]] = np.add.reduceat(weights * values[self.independents[take]], first)
         return values
 
     def gather(self, forces: Array) -> Array:
         """Return nodal forces (n, ...) with those on hanging nodes passed on to their independents."""
         forces = forces.copy()
-        for mine in reversed(self._levels(len(forces))):
-            first, take = self._rows(mine)
+        for level in reversed(self._levels(len(forces))):
+            first, take = self._rows(level)
             count = np.diff(np.append(first, len(take)))
             weights = self.weights[take].reshape(-1, *[1] * (forces.ndim - 1))
-            np.add.at(
-                forces, self.independents[take], weights * np.repeat(forces[self.nodes[mine]], count, axis=0)
-            )
-            forces[self.nodes[mine]] = 0.0
+            passed_on = weights * np.repeat(forces[self.nodes[level]], count, axis=0)
+            np.add.at(forces, self.independents[take], passed_on)
+            forces[self.nodes[level]] = 0.0
         return forces
 
     def _levels(self, n: int) -> list[Ints]:
@@ -105,11 +104,11 @@ class HangingNodes:
             waiting = waiting[held]
         return levels
 
-    def _rows(self, mine: Ints) -> tuple[Ints, Ints]:
+    def _rows(self, chosen: Ints) -> tuple[Ints, Ints]:
         """Return where the independents of some hanging nodes begin, one after the other, and these."""
-        count = np.diff(self.start)[mine]
+        count = np.diff(self.start)[chosen]
         first = np.cumsum(count) - count
-        take = np.repeat(self.start[mine] - first, count) + np.arange(int(count.sum()))
+        take = np.repeat(self.start[chosen] - first, count) + np.arange(int(count.sum()))
         return first, take
 
 
@@ -317,9 +316,9 @@ def known_centers(blocks: Sequence[Block], hanging: HangingNodes | None) -> Cent
     centers = Centers(blocks)
     if hanging is not None:
         for around in (2, 4):
-            mine = np.flatnonzero(hanging.around == around)
-            corners = hanging.independents[hanging.start[mine][:, None] + np.arange(around)]
-            centers.add(keys_of(corners), hanging.nodes[mine])
+            chosen = np.flatnonzero(hanging.around == around)
+            corners = hanging.independents[hanging.start[chosen][:, None] + np.arange(around)]
+            centers.add(keys_of(corners), hanging.nodes[chosen])
         centers.sort()
     return centers
 

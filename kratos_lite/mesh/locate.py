@@ -95,7 +95,7 @@ class Located:
         if values.shape[:1] != (len(self.mesh.points),):
             raise InputError(f"nodal values must have shape ({len(self.mesh.points)}, …); got {values.shape}")
         out = np.full((self.rows.size, *values.shape[1:]), np.nan)
-        for at, nodes, N in self._shares():
+        for at, nodes, N in self._by_block():
             out[at] = np.einsum("ma,ma...->m...", N, values[nodes])
         return out.reshape((*self.rows.shape, *values.shape[1:]))
 
@@ -112,10 +112,10 @@ class Located:
         from scipy.sparse import csr_array
 
         self.require()
-        shares = list(self._shares())
-        rows = np.concatenate([NO_ROWS, *(np.repeat(at, nodes.shape[1]) for at, nodes, _ in shares)])
-        columns = np.concatenate([NO_ROWS, *(nodes.ravel() for _, nodes, _ in shares)])
-        entries = np.concatenate([np.zeros(0), *(N.ravel() for _, _, N in shares)])
+        parts = list(self._by_block())
+        rows = np.concatenate([NO_ROWS, *(np.repeat(at, nodes.shape[1]) for at, nodes, _ in parts)])
+        columns = np.concatenate([NO_ROWS, *(nodes.ravel() for _, nodes, _ in parts)])
+        entries = np.concatenate([np.zeros(0), *(N.ravel() for _, _, N in parts)])
         return csr_array((entries, (rows, columns)), shape=(self.rows.size, len(self.mesh.points)))
 
     def nodes_and_weights(self, point: int = 0) -> tuple[Ints, Array]:
@@ -127,10 +127,10 @@ class Located:
         ([0, 4, 6, 2, 1, 5, 7, 3], [0.125, 0.125, 0.125, 0.125, 0.125, 0.125, 0.125, 0.125])
         """
         one = self[point] if self.rows.ndim else self
-        _, nodes, N = next(one.require()._shares())
+        _, nodes, N = next(one.require()._by_block())
         return nodes[0].astype(np.int64), N[0]
 
-    def _shares(self) -> Iterator[tuple[Ints, Rows, Array]]:
+    def _by_block(self) -> Iterator[tuple[Ints, Rows, Array]]:
         """Yield, for each block, points (m,) in it, counted through, nodes (m, k) and N (m, k)."""
         numbers, cells, xi = np.ravel(self.block), np.ravel(self.cell), self.xi.reshape(-1, 3)
         for number, block in enumerate(self.mesh.blocks):
@@ -221,10 +221,10 @@ class _Search:
         numbers = self.block_of(rows)
         hits, where = np.zeros(len(at), dtype=bool), np.zeros((len(at), 3))
         for number, block in enumerate(self.mesh.blocks):
-            mine = np.flatnonzero(numbers == number)
-            if len(mine) and block.shape is not None:
-                inverse = inverse_map(block.shape, self._nodes(number, rows[mine]), x[at[mine]])
-                hits[mine], where[mine] = inverse.inside, inverse.xi
+            chosen = np.flatnonzero(numbers == number)
+            if len(chosen) and block.shape is not None:
+                inverse = inverse_map(block.shape, self._nodes(number, rows[chosen]), x[at[chosen]])
+                hits[chosen], where[chosen] = inverse.inside, inverse.xi
         found[at[hits]], xi[at[hits]] = rows[hits], where[hits]
 
     def _nodes(self, number: int, rows: Ints) -> Array:
@@ -235,18 +235,18 @@ class _Search:
         """Try strongly curved cells again from elsewhere; from the middle Newton may reach another xi."""
         numbers = self.block_of(rows)
         for number, block in enumerate(self.mesh.blocks):
-            mine = np.flatnonzero(numbers == number)
-            if not len(mine) or block.shape is None or len(block.shape.nodes) == block.shape.corners:
+            chosen = np.flatnonzero(numbers == number)
+            if not len(chosen) or block.shape is None or len(block.shape.nodes) == block.shape.corners:
                 continue
             pyramid = block.shape.cell == "pyramid"
-            curved = curvature(block.shape, self._nodes(number, rows[mine])) > (0 if pyramid else CURVED)
-            mine = mine[curved]
+            curved = curvature(block.shape, self._nodes(number, rows[chosen])) > (0 if pyramid else CURVED)
+            chosen = chosen[curved]
             starts = _starts(block.shape)
-            images = block.shape.N(starts) @ self._nodes(number, rows[mine])
-            order = ((images - x[at[mine], None]) ** 2).sum(axis=2).argsort(axis=1)
+            images = block.shape.N(starts) @ self._nodes(number, rows[chosen])
+            order = ((images - x[at[chosen], None]) ** 2).sum(axis=2).argsort(axis=1)
             for start in order.T[: len(starts) if pyramid else STARTS]:
-                left = found[at[mine]] < 0
-                pairs = mine[left]
+                left = found[at[chosen]] < 0
+                pairs = chosen[left]
                 X = self._nodes(number, rows[pairs])
                 inverse = inverse_map(
                     block.shape, X, x[at[pairs]], max_iterations=15, start=starts[start[left]]
@@ -259,9 +259,9 @@ class _Search:
         near = np.zeros(len(found), dtype=bool)
         numbers = np.where(found >= 0, self.block_of(found), -1)
         for number, block in enumerate(self.mesh.blocks):
-            mine = np.flatnonzero(numbers == number)
-            if len(mine) and block.shape is not None:
-                near[mine] = outside_by(block.shape.cell, xi[mine]) > -NEAR_EDGE
+            chosen = np.flatnonzero(numbers == number)
+            if len(chosen) and block.shape is not None:
+                near[chosen] = outside_by(block.shape.cell, xi[chosen]) > -NEAR_EDGE
         return near
 
 

@@ -104,14 +104,14 @@ class CellRefiner:
         corners = self._corners(block, cells, pieces)
         for family in dict.fromkeys(piece.cell for piece in pieces):
             name, shape = self.target(block, family)
-            mine = [i for i, piece in enumerate(pieces) if piece.cell == family]
-            nodes = np.stack([corners[i] for i in mine], axis=1)
+            chosen = [i for i, piece in enumerate(pieces) if piece.cell == family]
+            nodes = np.stack([corners[i] for i in chosen], axis=1)
             if around := surroundings(shape):
-                places = np.stack([pieces[i].places(shape)[shape.corners :] for i in mine])
+                places = np.stack([pieces[i].places(shape)[shape.corners :] for i in chosen])
                 keys = np.stack([keys_of(nodes[:, :, list(among)]) for among in around], axis=2)
                 middles = self._nodes(block, cells, keys, places.reshape(-1, places.shape[2]))
                 nodes = np.concatenate([nodes, middles], axis=2)
-            parents = np.repeat(cells, len(mine))
+            parents = np.repeat(cells, len(chosen))
             lines = None if block.lines is None else block.lines[parents]
             flat = nodes.reshape(len(parents), -1)
             made = Block(name, flat, block.ids[parents], block.properties[parents], shape, lines)
@@ -145,8 +145,8 @@ class CellRefiner:
         self._sources.append((nodes, np.where(np.abs(weights) < 1e-14, 0.0, weights)[place]))
         inside = np.zeros(len(new), dtype=np.uint64)
         for i in np.flatnonzero(np.bincount(place, minlength=len(places))).tolist():
-            mine = place == i
-            inside[mine] = keys_of(nodes[mine][:, list(corners_around(shape.cell, places[i]))])
+            chosen = place == i
+            inside[chosen] = keys_of(nodes[chosen][:, list(corners_around(shape.cell, places[i]))])
         self._inside.append(inside)
         return self.centers.find(keys)
 

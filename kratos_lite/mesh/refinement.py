@@ -186,9 +186,9 @@ def _keys_by_element(mesh: Mesh) -> tuple[Keys, Ints]:
     keys, element = [], []
     for block, at in with_rows(mesh.blocks):
         if block.shape is not None and len(block):
-            mine = entity_keys(block)
-            keys.append(mine.ravel())
-            element.append(np.repeat(np.arange(at.start, at.stop), mine.shape[1]))
+            of_block = entity_keys(block)
+            keys.append(of_block.ravel())
+            element.append(np.repeat(np.arange(at.start, at.stop), of_block.shape[1]))
     return np.concatenate(keys), np.concatenate(element)
 
 

@@ -21,9 +21,9 @@ WhereElements: TypeAlias = "str | int | ArrayLike | None"
 """Elements by part name, by property id, by element rows, or all."""
 
 AT_NODE = 1e-6
-"""Distance from a point up to which a node lies at it, as share of the size of the mesh."""
+"""Distance from a point up to which a node lies at it, as fraction of the size of the mesh."""
 ONE_PLACE = 1e-9
-"""Distance between nodes at one place, as share of the size of the mesh."""
+"""Distance between nodes at one place, as fraction of the size of the mesh."""
 SIDES = {letter + sign: (axis, end) for axis, letter in enumerate("xyz") for end, sign in enumerate("-+")}
 """Names of the sides of the bounding box: axis and end."""
 

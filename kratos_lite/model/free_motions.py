@@ -103,8 +103,8 @@ class FreeMotions:
         return self._less(u, *self._pair[::-1]) if self.any else u
 
     def _less(self, values: Array, tested: Array, taken: Array) -> Array:
-        shares = self._by_part(_products(tested, values))[self.part]
-        return values - (taken @ shares[..., None])[..., 0]
+        components = self._by_part(_products(tested, values))[self.part]
+        return values - (taken @ components[..., None])[..., 0]
 
     @cached_property
     def held(self) -> Mask:
@@ -142,8 +142,8 @@ class FreeMotions:
         for forces in loads:
             total += forces
             size += np.linalg.norm(forces, axis=1)
-        noise = self._rounding * self._by_part(size)
-        limit = noise[:, None] * self._by_part(np.linalg.norm(R, axis=1), largest=True)
+        roundoff = self._rounding * self._by_part(size)
+        limit = roundoff[:, None] * self._by_part(np.linalg.norm(R, axis=1), largest=True)
         off = (np.abs(self._by_part(_products(R, total))) > limit).any(axis=1)
         wrong = (self.counts > 0) & (off | self._is_hinged | ~np.asarray(moving))
         if not wrong.any():
@@ -154,7 +154,7 @@ class FreeMotions:
         p = int(off.argmax())
         center, arm = (values[self.group_of == p][0] for values in self.frames)
         moment = self._by_part(np.cross(self.mesh.points - center, total))[p]
-        force, turn = _text(self._by_part(total)[p], noise[p]), _text(moment, noise[p] * arm)
+        force, turn = _text(self._by_part(total)[p], roundoff[p]), _text(moment, roundoff[p] * arm)
         raise ModelError(
             f"{text}, and its loads do not balance: together they are {force} N and {turn} N m about "
             f"{_text(center)}. Fix more nodes or components, or {cure}"
@@ -162,7 +162,7 @@ class FreeMotions:
 
     @cached_property
     def _rounding(self) -> Array:
-        """What rounding may be, as a share of all loads on a part, (p,)."""
+        """What rounding may be, as a fraction of all loads on a part, (p,)."""
         far = self._by_part(np.abs(self.mesh.points), largest=True).max(axis=1)
         size = np.zeros(len(far))
         np.maximum.at(size, self.group_of, self.frames[1])
@@ -214,9 +214,9 @@ def _products(R: Array, values: Array) -> Array:
     return np.asarray((values[:, None] @ R)[:, 0])
 
 
-def _text(values: Array, noise: float = 0.0) -> str:
+def _text(values: Array, roundoff: float = 0.0) -> str:
     """Return a vector in words, without what is rounding."""
-    return "(" + " ".join(f"{v:.6g}" if abs(v) > noise else "0" for v in values.tolist()) + ")"
+    return "(" + " ".join(f"{v:.6g}" if abs(v) > roundoff else "0" for v in values.tolist()) + ")"
 
 
 def _motions(free: Array) -> str:

@@ -19,7 +19,7 @@ from kratos_lite.quadrature import Rule
 from kratos_lite.registry import remembered
 
 NO_ENERGY = 1e-9
-"""Eigenvalues of an element stiffness up to this share of the largest one are 0."""
+"""Eigenvalues of an element stiffness up to this fraction of the largest one are 0."""
 DISTORTION = 0.04
 """Of the size of the reference cell by which nodes move in the distorted one."""
 

@@ -39,10 +39,10 @@ def free_motions(mesh: Mesh, supports: Supports, groups: Sequence[ElementGroup])
     frames = found.frames(mesh)
     equations = _equations(mesh, found, supports)
     group_of = _groups(len(frames[0]), equations)
-    members, mine = _by_group(group_of, equations)
+    members, their_equations = _by_group(group_of, equations)
     free = [
         (_free_modes if len(group) <= FEW else _free_modes_of_many)(mesh, frames, group, some)
-        for group, some in zip(members, mine, strict=True)
+        for group, some in zip(members, their_equations, strict=True)
     ]
     counts = np.array([one.shape[2] for one in free], dtype=np.int64)
     modes = np.zeros((len(group_of), 6, int(counts.max(initial=0))))
@@ -99,8 +99,8 @@ def _by_group(group_of: Ints, equations: _Constraints) -> tuple[list[Ints], list
     groups = np.split(members, np.searchsorted(group_of[members], numbers))
     owner = group_of[equations.body]
     order = np.argsort(owner, kind="stable")
-    mine = np.split(order, np.searchsorted(owner[order], numbers))
-    return groups, [equations.take(rows) for rows in mine]
+    taken = np.split(order, np.searchsorted(owner[order], numbers))
+    return groups, [equations.take(rows) for rows in taken]
 
 
 def _free_modes(mesh: Mesh, frames: tuple[Array, Array], group: Ints, equations: _Constraints) -> Array:
@@ -115,8 +115,8 @@ def _free_modes(mesh: Mesh, frames: tuple[Array, Array], group: Ints, equations:
         chosen = np.linspace(0, len(rows) - 3, count).astype(np.int64) + np.arange(count) % 3
         some = np.full(len(rows), -1)
         some[chosen] = np.arange(count)
-        mine = np.flatnonzero(some[row] >= 0)
-        least = _spectrum(mesh, frames, group, equations.take(mine), some[row[mine]])[0].min()
+        sample = np.flatnonzero(some[row] >= 0)
+        least = _spectrum(mesh, frames, group, equations.take(sample), some[row[sample]])[0].min()
         # further equations lift the smallest value; the largest is at most the root of all squares
         if least > 2 * FREE * (6 * len(group) * len(rows)) ** 0.5:
             return np.zeros((len(group), 6, 0))

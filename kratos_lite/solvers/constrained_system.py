@@ -53,7 +53,7 @@ class ConstrainedSystem:
         self.points = points[self.nodes]
         self.constraint_map = constraints(self.nodes)
         self.tolerance, self.progress = tolerance, progress
-        self._hanging = hanging if hanging is None else hanging.among(self.nodes, self.n_nodes)
+        self._hanging = hanging if hanging is None else hanging.select(self.nodes, self.n_nodes)
         self.skipped: list[str] = []
         self.warnings: list[str] = []
         self._patterns = patterns or PatternCache()

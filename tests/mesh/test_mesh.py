@@ -106,18 +106,9 @@ def test_a_part_stays_what_it_is():
     assert mesh.nodes("tip").tolist() == mesh.nodes("x+").tolist()
 
 
-@pytest.mark.parametrize(
-    ("cells", "name"),
-    [
-        ([[0, 1, 2, 3]], "KinematicLinear3D4N"),
-        (np.arange(8)[None], "KinematicLinear3D8N"),
-        ([0, 1, 2, 3, 4, 5], "KinematicLinear3D6N"),
-        ([[0, 1, 2, 3], [1, 2]], "KinematicLinear3D8N"),
-        (3, "KinematicLinear3D8N"),
-    ],
-)
-def test_rows_of_nodes_without_a_name_are_refused_with_the_call_that_is_meant(cells, name):
-    with pytest.raises(kl.MeshError, match=rf"kl\.Mesh\(points, \{{'{name}': nodes\}}\)"):
+@pytest.mark.parametrize("cells", [[[0, 1, 2, 3]], np.arange(8)[None], [[0, 1, 2, 3], [1, 2]], 3])
+def test_rows_of_nodes_without_a_name_are_refused_with_the_call_that_is_meant(cells):
+    with pytest.raises(kl.MeshError, match=r"kl\.Mesh\(points, \{'KinematicLinear3D8N': nodes\}\)"):
         kl.Mesh(kl.box().points, cells)
 
 

@@ -56,7 +56,7 @@ def test_uniform_refinement_has_no_hanging_nodes_and_the_nodes_of_a_finer_box(ki
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_hanging_nodes_lie_where_their_masters_put_them(kind):
+def test_hanging_nodes_lie_where_their_independents_put_them(kind):
     mesh = thrice(block(kind))
     assert len(mesh.hanging) > 0
     assert np.abs(mesh.hanging.interpolate(mesh.points) - mesh.points).max() < 1e-12
@@ -132,7 +132,7 @@ def test_cells_without_edges_along_a_direction_are_refused(kind):
         refine(block(kind), None, (1.0, 1.0, 0.0))
 
 
-def test_reactions_at_hanging_nodes_go_to_their_masters():
+def test_reactions_at_hanging_nodes_go_to_their_independents():
     """A column under its weight: the support carries it all, and inner nodes carry nothing."""
     mesh = thrice(block("8N", (2, 2, 2)))
     model = kl.Model(mesh, kl.Isotropic3D(E=1e6, nu=0.3, density=2.0))

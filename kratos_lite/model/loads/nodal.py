@@ -82,7 +82,7 @@ class PointLoad(Load):
 
 
 def _around(mesh: Mesh, point: Array) -> tuple[Ints, Array]:
-    """Return the nodes (k,) on which a force on a point acts, and its share (k,) on each."""
+    """Return the nodes (k,) on which a force on a point acts, and its fraction (k,) on each."""
     nodes, nearby = nodes_at(point, mesh.points)
     nodes = nodes[mesh.used_nodes()[nodes]][:1]
     size = float(np.linalg.norm(mesh.extent[1] - mesh.extent[0]))
