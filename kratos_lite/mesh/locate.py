@@ -68,13 +68,7 @@ class Located:
         return Located(self.mesh, *(np.asarray(part[chosen]) for part in parts))
 
     def require(self) -> Located:
-        """Return itself if all points lie in the mesh.
-
-        Raises
-        ------
-        MeshError
-            If one does not; the text names it, its distance from the mesh and the nearest element.
-        """
+        """Return itself if all points lie in the mesh; MeshError that names the first that does not."""
         outside = np.argwhere(~np.asarray(self.inside))
         if not len(outside):
             return self

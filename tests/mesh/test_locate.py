@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from meshes import joined
+from meshes import four_cells, joined
 
 import kratos_lite as kl
 from kratos_lite.bodies.rotations import exp
@@ -53,21 +53,6 @@ def points_of(mesh, per_cell=4, seed=0):
             rows += [start + cell] * per_cell
         start += len(part)
     return np.vstack(X), np.array(rows)
-
-
-def mixed():
-    """Return a hexahedron, a pyramid on it, a wedge beside it and a tetrahedron, a block each."""
-    points = np.vstack([
-        ELEMENTS["KinematicLinear3D8N"].nodes,
-        [[0.1, -0.1, 2.5], [3.0, -1.0, 0.1], [3.1, 1.2, 0.0], [0.0, 3.0, 3.0]],
-    ])  # fmt: skip
-    blocks = [
-        block("KinematicLinear3D8N", [0, 1, 2, 3, 4, 5, 6, 7], 10),
-        block("KinematicLinear3D5N", [4, 5, 6, 7, 8], 20),
-        block("KinematicLinear3D6N", [1, 5, 9, 2, 6, 10], 30),
-        block("KinematicLinear3D4N", [6, 7, 8, 11], 40),
-    ]
-    return Mesh(points, blocks)
 
 
 # ---- there and back --------------------------------------------------------------------------------
@@ -178,7 +163,7 @@ def test_quarter_point_elements_locate_their_points_and_the_singular_node():
 
 
 def test_a_mixed_mesh():
-    mesh = mixed()
+    mesh = four_cells()
     X, rows = points_of(mesh, 50)
     found = mesh.locate(X)
     assert found.inside.all()
@@ -191,13 +176,13 @@ def test_a_mixed_mesh():
 
 
 def test_blocks_without_a_shape_without_cells_or_of_faces_contain_nothing():
-    mesh = mixed()
+    mesh = four_cells()
     nodes = mesh.blocks[0].nodes
     strange = Block("Spring", nodes[:, :2], np.array([1]), np.array([1]), None)
     empty = block("KinematicLinear3D8N", np.zeros((0, 8)))
     shell = Block("Shell", nodes[:, :4], np.array([1]), np.array([1]), Quadrilateral4)
     mesh = Mesh(mesh.points, [strange, empty, shell, *mesh.blocks, empty])
-    X, rows = points_of(mixed(), 20)
+    X, rows = points_of(four_cells(), 20)
     found = mesh.locate(X)
     assert found.rows.tolist() == (rows + 2).tolist()
     assert found.block.tolist() == (rows + 3).tolist()
@@ -420,7 +405,7 @@ def test_weights_interpolate_and_their_transpose_keeps_force_and_moment(name):
 
 
 def test_nodes_and_weights_of_one_point():
-    mesh = mixed()
+    mesh = four_cells()
     X = np.array([[0.1, 0.2, 0.3], [0.0, 0.0, 1.5]])
     found = mesh.locate(X)
     for i, row in enumerate((0, 1)):

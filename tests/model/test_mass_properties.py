@@ -4,6 +4,7 @@ from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
 import pytest
+from meshes import four_cells
 
 import kratos_lite as kl
 from kratos_lite.assembly.element_groups import ElementGroup
@@ -163,21 +164,9 @@ def test_a_ball_of_curved_elements_converges_with_the_fourth_power():
 # ---- several cells, materials, places --------------------------------------------------------------
 
 
-def mixed():
-    """Return points and cells of a hexahedron, a pyramid, a wedge and a tetrahedron that share nodes."""
-    hexahedron = ELEMENTS["KinematicLinear3D8N"].nodes
-    points = np.vstack([hexahedron, [[0.1, -0.1, 2.5], [3.0, -1.0, 0.1], [3.1, 1.2, 0.0], [0.0, 3.0, 3.0]]])
-    cells = {
-        "KinematicLinear3D8N": [0, 1, 2, 3, 4, 5, 6, 7],
-        "KinematicLinear3D5N": [4, 5, 6, 7, 8],
-        "KinematicLinear3D6N": [1, 5, 9, 2, 6, 10],
-        "KinematicLinear3D4N": [6, 7, 8, 11],
-    }
-    return points, cells
-
-
 def test_a_mixed_mesh_with_a_density_per_block_is_the_sum_of_its_cells():
-    points, cells = mixed()
+    mesh = four_cells()
+    points, cells = mesh.points, {block.name: block.nodes[0] for block in mesh.blocks}
     densities = dict(zip(cells, (1.0, 20.0, 3.0, 400.0), strict=True))
     body = MassProperties.of(points, [group(name, nodes, densities[name]) for name, nodes in cells.items()])
     alone = [of_cell(name, points[nodes], densities[name]) for name, nodes in cells.items()]
@@ -201,8 +190,7 @@ def test_the_center_is_that_of_the_mass_not_of_the_volume():
 
 
 def test_a_batch_without_elements_does_not_count():
-    points, cells = mixed()
-    full = group("KinematicLinear3D8N", cells["KinematicLinear3D8N"])
+    points, full = four_cells().points, group("KinematicLinear3D8N", range(8))
     empty = replace(full, nodes=full.nodes[:0], rows=full.rows[:0])
     assert_same(MassProperties.of(points, [empty, full]), MassProperties.of(points, [full]))
 
@@ -297,7 +285,7 @@ def test_a_ball_in_closed_form():
 
 # ---- what is refused -------------------------------------------------------------------------------
 
-EYE = np.eye(3)
+EYE, BALL = np.eye(3), MassProperties.ball(1.0, 1.0)
 
 
 @pytest.mark.parametrize(
@@ -328,17 +316,23 @@ def test_wrong_values_are_refused(values, kind, words):
         MassProperties(**values)
 
 
-def test_wrong_boxes_balls_and_stacks_are_refused():
-    with pytest.raises(ModelError, match="side of a body must be > 0 m; got 0"):
-        MassProperties.box((1.0, 0.0, 1.0), 1.0)
-    with pytest.raises(InputError, match="sides of a box"):
-        MassProperties.box((1.0, 1.0), 1.0)
-    with pytest.raises(ModelError, match="density of a body must be > 0 kg/m³; got -1"):
-        MassProperties.ball(1.0, -1.0)
-    with pytest.raises(InputError, match="got none"):
-        MassProperties.stack([])
-    with pytest.raises(InputError, match="same leading axes"):
-        MassProperties.stack([MassProperties.ball(1.0, 1.0), MassProperties.ball([1.0], 1.0)])
+@pytest.mark.parametrize(
+    ("make", "kind", "words"),
+    [
+        (lambda: MassProperties.box((1.0, 0.0, 1.0), 1.0), ModelError, "side of a body must be > 0 m; got 0"),
+        (lambda: MassProperties.box((1.0, 1.0), 1.0), InputError, "sides of a box"),
+        (lambda: MassProperties.ball(1.0, -1.0), ModelError, "density of a body must be > 0 kg/m³; got -1"),
+        (lambda: MassProperties.stack([]), InputError, "got none"),
+        (
+            lambda: MassProperties.stack([BALL, MassProperties.ball([1.0], 1.0)]),
+            InputError,
+            "same leading axes",
+        ),
+    ],
+)
+def test_wrong_boxes_balls_and_stacks_are_refused(make, kind, words):
+    with pytest.raises(kind, match=words):
+        make()
 
 
 def test_broken_meshes_are_refused():

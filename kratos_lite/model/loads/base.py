@@ -54,17 +54,7 @@ class Load(ABC):
         """
 
     def check(self, mesh: Mesh) -> None:
-        """Check that what the load acts on exists; `Structure.add` asks for it.
-
-        Parameters
-        ----------
-        mesh : points, elements and named parts.
-
-        Raises
-        ------
-        MeshError
-            The load has an attribute `where`, and there is no such part or node.
-        """
+        """Raise MeshError if `where` of the load names no part or node; `Structure.add` asks for it."""
         where = getattr(self, "where", None)
         if isinstance(where, str):
             mesh.part(where)
@@ -72,34 +62,11 @@ class Load(ABC):
             mesh.nodes(where)
 
     def warnings(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
-        """Return what may be wrong with the load on a mesh, though it acts.
-
-        Parameters
-        ----------
-        mesh, groups : as for `forces`.
-
-        Returns
-        -------
-        Sentences.
-        """
+        """Return what may be wrong with the load on a mesh, though it acts."""
         return []
 
     def refined(self, finer: RefinedMesh) -> Load:
-        """Return the same load on a finer mesh.
-
-        Parameters
-        ----------
-        finer : the mesh, and how it has come from that of the load.
-
-        Returns
-        -------
-        Load
-
-        Raises
-        ------
-        ModelError
-            The load cannot be carried over.
-        """
+        """Return the same load on a finer mesh; ModelError if it cannot be carried over."""
         raise ModelError(
             f"{type(self).__name__} cannot be carried over to a finer mesh: its class defines no "
             "refined(finer); add the load to a model of the finer mesh instead"

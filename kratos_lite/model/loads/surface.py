@@ -29,17 +29,7 @@ class FaceLoad(DistributedLoad):
 
     @abstractmethod
     def on_faces(self, mesh: Mesh, factors: int = FUNCTION) -> Iterator[tuple[Block, Array]]:
-        """Yield blocks of faces with the forces on the nodes of each face.
-
-        Parameters
-        ----------
-        mesh : points (n, 3), elements, conditions and named parts.
-        factors : a function of places is taken at the points of a rule exact for so many shape functions.
-
-        Returns
-        -------
-        Blocks of m faces, and (m, k, 3) in N.
-        """
+        """Yield blocks of m faces with the forces (m, k, 3) in N on the nodes of each face."""
 
     factors = FUNCTION
 
