@@ -53,7 +53,7 @@ class Motion(Attachment):
     acceleration : likewise; the derivative of the rate if not given, and 0 in a steady state.  A number or
         `TimeSeries` changes a rate that is a number as time goes on.
     damping : α in 1/s, mass-proportional damping relative to the rigid motion.
-    part : the elements that move, by part name, property id or rows; all if not given.
+    part : the elements that move, by part name, property id or indices; all if not given.
 
     Attributes
     ----------

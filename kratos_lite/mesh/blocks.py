@@ -28,7 +28,7 @@ class Block:
     Parameters
     ----------
     name : kind as registered or as written in the file, e.g. ``KinematicLinear3D8N``.
-    nodes : (m, k) int, rows of ``mesh.points``, in Kratos order.
+    nodes : (m, k) int, indices of ``mesh.points``, in Kratos order.
     ids : (m,) int, ids of the cells; 1 … m if not given.
     properties : int or (m,) int, property id of the cells.
     shape : the reference cell; if not given, that of the registered element of this name, or None for a
@@ -71,7 +71,7 @@ class Block:
             nodes = np.zeros((0, len(shape.nodes)), dtype=np.int32)
         vars(self).update(name=name, shape=shape, nodes=_column(name, "nodes", nodes, ("m", width), np.int32))
         if self.nodes.min(initial=0) < 0:
-            raise MeshError(f"block {name}: nodes are rows of points, from 0; got {self.nodes.min()}")
+            raise MeshError(f"block {name}: nodes are indices of points, from 0; got {self.nodes.min()}")
         m = len(self.nodes)
         if isinstance(properties, (int, np.integer)) and not isinstance(properties, bool):
             properties = np.full(m, properties)
@@ -113,13 +113,13 @@ def _column(
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A named part (Kratos: SubModelPart): rows of what belongs to it, in read-only arrays.
+    """A named part (Kratos: SubModelPart): indices of what belongs to it, in read-only arrays.
 
-    Rows of elements and conditions count through all blocks in order.
+    Those of elements and conditions count through all blocks in order.
 
     Parameters
     ----------
-    nodes, elements, conditions : (k,) int, rows.
+    nodes, elements, conditions : (k,) int, indices.
     geometries, constraints : (k,) int, ids as a file gives them.
     properties, tables : ids as a file gives them.
     data : variables of the part by name.

@@ -40,7 +40,7 @@ def crossings(mesh: Mesh, a: Array, b: Array) -> Array:
 
 
 def _near(mesh: Mesh, a: Array, b: Array) -> Ints:
-    """Return the rows of the elements whose boxes, as spheres, reach the line."""
+    """Return the indices of the elements whose boxes, as spheres, reach the line."""
     length = np.linalg.norm(b - a)
     found = [NO_ROWS]
     for block, at in with_rows(mesh.blocks):

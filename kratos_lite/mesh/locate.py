@@ -190,7 +190,7 @@ class _Search:
         return np.searchsorted(self.starts, rows, side="right") - 1
 
     def find(self, x: Array) -> tuple[Ints, Array]:
-        """Return element rows (m,) and xi (m, 3) of points (m, 3); -1 and nan outside."""
+        """Return element indices (m,) and xi (m, 3) of points (m, 3); -1 and nan outside."""
         at, row = self.around(x)
         distance = ((x[at] - self.middle[row]) ** 2).sum(axis=1) / self.size[row] ** 2
         order = np.lexsort((row, distance, at))

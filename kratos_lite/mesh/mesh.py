@@ -41,7 +41,7 @@ class Mesh(Tabular):
     Parameters
     ----------
     points : (n, 3) float, m.
-    blocks : cells (m, k) by element name, rows of `points` from 0; or a list of `Block`.
+    blocks : cells (m, k) by element name, indices of `points` from 0; or a list of `Block`.
     node_ids : (n,) int, ids of the nodes; 1 … n if not given.
     conditions : condition blocks.
     parts : named parts; a child of part ``A`` is named ``A.b``.
@@ -121,23 +121,23 @@ class Mesh(Tabular):
         self.__setattr__(name, None)
 
     def _check_rows(self, blocks: Sequence[Block]) -> None:
-        """Raise MeshError for cells with rows of points that do not exist."""
+        """Raise MeshError for cells with indices of points that do not exist."""
         for block in blocks:
             if block.nodes.max(initial=-1) >= self.n_nodes:
                 cell = int(np.argmax((block.nodes >= self.n_nodes).any(axis=1)))
                 raise MeshError(
-                    f"{self.place(block, cell)} uses node rows {block.nodes[cell].tolist()}; "
-                    f"rows are 0 … {self.n_nodes - 1}"
+                    f"{self.place(block, cell)} uses node indices {block.nodes[cell].tolist()}; "
+                    f"indices are 0 … {self.n_nodes - 1}"
                 )
 
     def _check_parts(self) -> None:
-        """Raise MeshError for rows of parts that do not exist."""
+        """Raise MeshError for indices of parts that do not exist."""
         sizes = {"nodes": self.n_nodes, "elements": self.n_elements, "conditions": self.n_conditions}
         for name, part in self.parts.items():
             instance(part, f"part {name!r}", Part, PART, error=MeshError)
             for what, size in sizes.items():
                 whole_numbers(
-                    getattr(part, what), f"part {name!r}: rows of {what}", size=size, error=MeshError
+                    getattr(part, what), f"part {name!r}: indices of {what}", size=size, error=MeshError
                 )
 
     def replace(
@@ -209,7 +209,7 @@ class Mesh(Tabular):
         return np.argsort(self.node_ids, kind="stable")
 
     def node_rows(self, ids: ArrayLike) -> Ints:
-        """Return the rows of nodes by their ids.
+        """Return the indices of nodes by their ids.
 
         Parameters
         ----------
@@ -308,7 +308,7 @@ class Mesh(Tabular):
         Parameters
         ----------
         name : of the new part.  A part does not change, as supports and loads may rely on it.
-        where : part name, point (x, y, z) in m, predicate on the points (n, 3), mask (n,) or rows.
+        where : part name, point (x, y, z) in m, predicate on the points (n, 3), mask (n,) or indices.
 
         Raises
         ------
@@ -337,11 +337,11 @@ class Mesh(Tabular):
         self._parts[name] = Part(nodes=rows)
 
     def nodes(self, where: Where) -> Ints:
-        """Return the rows of nodes, each once and in the order in which they are given.
+        """Return the indices of nodes, each once and in the order in which they are given.
 
         Parameters
         ----------
-        where : part name, point (x, y, z) in m, predicate on the points (n, 3), mask (n,) or rows.
+        where : part name, point (x, y, z) in m, predicate on the points (n, 3), mask (n,) or indices.
 
         Returns
         -------
@@ -361,13 +361,13 @@ class Mesh(Tabular):
         return self.part(where).nodes if isinstance(where, str) else find_nodes(where, self)
 
     def elements(self, where: WhereElements = None) -> Ints:
-        """Return the rows of elements.
+        """Return the indices of elements.
 
         A part without elements of its own gives the elements that have all their nodes in it.
 
         Parameters
         ----------
-        where : part name, property id, rows, or None for all.
+        where : part name, property id, indices, or None for all.
 
         Returns
         -------
@@ -498,7 +498,7 @@ class Mesh(Tabular):
 
         Parameters
         ----------
-        where : part name, point (x, y, z) in m, predicate on the points (n, 3), mask (n,) or rows.
+        where : part name, point (x, y, z) in m, predicate on the points (n, 3), mask (n,) or indices.
 
         Returns
         -------

@@ -1,4 +1,4 @@
-"""Selection: which part, nodes or elements of a mesh a name, a predicate, a mask or rows mean."""
+"""Selection: which part, nodes or elements of a mesh a name, a predicate, a mask or indices mean."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 Where: TypeAlias = "str | Callable[[Array], ArrayLike] | ArrayLike"
 """Nodes by part name, by a point (x, y, z) in m, by a predicate on the points (n, 3), by rows or a mask."""
 WhereElements: TypeAlias = "str | int | ArrayLike | None"
-"""Elements by part name, by property id, by element rows, or all."""
+"""Elements by part name, by property id, by element indices, or all."""
 
 AT_NODE = 1e-6
 """Distance from a point up to which a node lies at it, as fraction of the size of the mesh."""
@@ -54,7 +54,7 @@ def _side(mesh: Cells, axis: int, end: int) -> Ints:
 
 
 def find_nodes(where: Callable[[Array], ArrayLike] | ArrayLike, mesh: Cells) -> Ints:
-    """Return the rows of nodes by a point, predicate, mask or rows, each once and in the order given."""
+    """Return the indices of nodes by a point, predicate, mask or indices, each once and in the order given."""
     points = mesh.points
     if (point := point_of(where)) is not None:
         rows, nearby = nodes_at(point, points)
@@ -69,9 +69,9 @@ def find_nodes(where: Callable[[Array], ArrayLike] | ArrayLike, mesh: Cells) -> 
         if np.shape(chosen) != (n,):
             raise MeshError(f"a node mask must have shape ({n},); got {np.shape(chosen)}")
         return np.flatnonzero(chosen)
-    known = "nodes are chosen by part name, point (x, y, z), predicate, mask or rows; rows"
+    known = "nodes are chosen by part name, point (x, y, z), predicate, mask or indices; these"
     rows = whole_numbers(chosen, known, error=MeshError)
-    return without_repeats(whole_numbers(rows, "node rows", size=n, error=MeshError).ravel())
+    return without_repeats(whole_numbers(rows, "node indices", size=n, error=MeshError).ravel())
 
 
 def point_of(where: Any) -> Array | None:
@@ -82,8 +82,8 @@ def point_of(where: Any) -> Array | None:
         if all(type(x) is int for x in where):
             point = ", ".join(f"{x}.0" for x in where)
             raise MeshError(
-                f"{where} may be a point or three node rows: write ({point}) for the point in m, "
-                f"np.array({list(where)}) for the rows"
+                f"{where} may be a point or three node indices: write ({point}) for the point in m, "
+                f"np.array({list(where)}) for the indices"
             )
         if not any(isinstance(x, (float, np.floating)) for x in where):
             return None
@@ -111,7 +111,7 @@ def _flags(chosen: Sequence[Any]) -> bool:
 
 
 def find_elements(where: WhereElements, part: Part | None, mesh: Cells) -> Ints:
-    """Return the rows of elements by a part, property id or rows."""
+    """Return the indices of elements by a part, property id or indices."""
     if isinstance(where, (int, np.integer)) and not isinstance(where, bool):
         ids = np.concatenate([NO_ROWS, *(block.properties for block in mesh.blocks)])
         rows = np.flatnonzero(ids == where)
@@ -123,13 +123,13 @@ def find_elements(where: WhereElements, part: Part | None, mesh: Cells) -> Ints:
         if mesh.whole and not len(rows):
             raise MeshError(f"part {where!r} has no elements")
         return rows
-    what = "elements are chosen by part name, property id or rows; rows"
+    what = "elements are chosen by part name, property id or indices; these"
     rows = whole_numbers(where, what, ("k",), error=MeshError)
-    return whole_numbers(rows, "element rows", size=sum(map(len, mesh.blocks)), error=MeshError)
+    return whole_numbers(rows, "element indices", size=sum(map(len, mesh.blocks)), error=MeshError)
 
 
 def elements_among(nodes: Ints, mesh: Cells) -> Ints:
-    """Return the rows of the elements that have all their nodes among these."""
+    """Return the indices of the elements that have all their nodes among these."""
     inside = np.zeros(len(mesh.points), dtype=bool)
     inside[nodes] = True
     rows = (inside[block.nodes].all(axis=1) for block in mesh.blocks)

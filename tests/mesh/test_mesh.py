@@ -31,8 +31,8 @@ def test_sides_are_measured_along_their_own_axis():
         (([[0, 0]],), r"shape \(n, 3\)"),
         (([[0, 0, 0]], [], {"node_ids": ["a"]}), "whole numbers"),
         (([[0, 0, 0], [1, 0, 0]], [], {"node_ids": [4, 4]}), "node id 4 occurs more than once"),
-        (([[0, 0, 0]], [], {"parts": {"A": kl.Part(nodes=np.array([1]))}}), "'A': rows of nodes"),
-        (([[0, 0, 0]], [], {"parts": {"A": kl.Part(nodes=np.array([-1]))}}), "'A': rows of nodes"),
+        (([[0, 0, 0]], [], {"parts": {"A": kl.Part(nodes=np.array([1]))}}), "'A': indices of nodes"),
+        (([[0, 0, 0]], [], {"parts": {"A": kl.Part(nodes=np.array([-1]))}}), "'A': indices of nodes"),
     ],
 )
 def test_wrong_arguments_are_mesh_errors(arguments, text):

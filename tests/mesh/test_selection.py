@@ -32,7 +32,7 @@ def test_three_whole_numbers_are_refused_with_both_readings(where):
     ]
     for call in calls:
         with pytest.raises(
-            kl.MeshError, match=r"point or three node rows: write \(.\.0, 1\.0, .*np\.array\(\["
+            kl.MeshError, match=r"point or three node indices: write \(.\.0, 1\.0, .*np\.array\(\["
         ):
             call(where)
 

@@ -215,9 +215,9 @@ def test_broken_coordinates_and_node_lists_are_named():
     twice = with_block(mesh, nodes=changed_at(nodes, (0, 1), nodes[0, 0]))
     with pytest.raises(kl.MeshError, match=r"element 1 \(KinematicLinear3D8N\) uses node 1 more than once"):
         model_of(twice).solve()
-    with pytest.raises(kl.MeshError, match=r"element 1 .* uses node rows \[.*\]; rows are 0 … 7"):
+    with pytest.raises(kl.MeshError, match=r"element 1 .* uses node indices \[.*\]; indices are 0 … 7"):
         with_block(mesh, nodes=changed_at(nodes, (0, 6), 8))
-    with pytest.raises(kl.MeshError, match="nodes are rows of points, from 0; got -1"):
+    with pytest.raises(kl.MeshError, match="nodes are indices of points, from 0; got -1"):
         with_block(mesh, nodes=changed_at(nodes, (0, 6), -1))
 
 

@@ -27,7 +27,7 @@ class BodyForce(DistributedLoad):
     ----------
     force : (3,) float, or (n, 3) interpolated from the nodes; N/m³; or a function of places (m, 3) that
         returns either, taken at quadrature points.
-    where : elements that carry it: part name, property id or rows; all if not given.
+    where : elements that carry it: part name, property id or indices; all if not given.
     """
 
     what: ClassVar[tuple[str, str]] = "a body force", "(3,) or (n, 3) in N/m³"
@@ -114,7 +114,7 @@ class Gravity(BodyForce):
     ----------
     acceleration : (3,) float, or (n, 3) interpolated from the nodes; m/s²; or a function of places (m, 3)
         that returns either, taken at quadrature points.
-    where : elements that carry it: part name, property id or rows; all if not given.
+    where : elements that carry it: part name, property id or indices; all if not given.
 
     Examples
     --------
