@@ -31,8 +31,8 @@ from kratos_lite.analysis.solution_checks import (
 )
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model import checks
-from kratos_lite.model.equal import equal_loads
 from kratos_lite.model.loads import Load
+from kratos_lite.model.loads.base import equal_loads
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem, select
 from kratos_lite.solvers.linear_solver import Solution

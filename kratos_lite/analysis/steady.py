@@ -12,7 +12,7 @@ from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.small_deformations import check_deformation
 from kratos_lite.analysis.solution_checks import Phases, check_arguments, judge, quality
 from kratos_lite.model.checks import check_loads, equilibrium
-from kratos_lite.model.equal import equal_loads
+from kratos_lite.model.loads.base import equal_loads
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.direct import Factorization
 from kratos_lite.solvers.linear_solver import LinearSolver

@@ -16,7 +16,7 @@ from kratos_lite.analysis.rate_watch import RateWatch
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.state import MODEL_FIELDS, State, check_state
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.model.equal import equal_loads
+from kratos_lite.model.loads.base import equal_loads
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.blas import one_thread
 from kratos_lite.typing import Array, Progress

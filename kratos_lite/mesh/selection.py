@@ -54,7 +54,7 @@ def _side(mesh: Cells, axis: int, end: int) -> Ints:
 
 
 def find_nodes(where: Callable[[Array], ArrayLike] | ArrayLike, mesh: Cells) -> Ints:
-    """Return the indices of nodes by a point, predicate, mask or indices, each once and in the order given."""
+    """Return the indices of nodes by a point, predicate, mask or indices, each once and in this order."""
     points = mesh.points
     if (point := point_of(where)) is not None:
         rows, nearby = nodes_at(point, points)

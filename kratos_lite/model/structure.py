@@ -21,11 +21,11 @@ from kratos_lite.errors import InputError, MeshError, ModelError, nearest
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Mesh, Where, WhereElements, distinct
 from kratos_lite.model import checks
-from kratos_lite.model.equal import key_of
 from kratos_lite.model.free_motions import FreeMotions
 from kratos_lite.model.hourglass_modes import check_rules
 from kratos_lite.model.joints import check_coincident, check_joints
 from kratos_lite.model.loads import Load, ScaledLoad
+from kratos_lite.model.loads.base import key_of
 from kratos_lite.model.locking import check_locking
 from kratos_lite.model.rigid_body_modes import free_motions
 from kratos_lite.model.spurious_modes import check_spurious_modes

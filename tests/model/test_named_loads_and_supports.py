@@ -5,7 +5,7 @@ import pytest
 
 import kratos_lite as kl
 from kratos_lite.mesh.refinement import refine
-from kratos_lite.model.equal import equal_loads
+from kratos_lite.model.loads.base import equal_loads
 from kratos_lite.model.refined import refined
 
 STEEL = kl.Isotropic3D(E=210e9, nu=0.3, density=7850.0)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from types import FunctionType
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh
-from kratos_lite.time_series import Factor, function_of
+from kratos_lite.time_series import Factor, TimeSeries, function_of
 from kratos_lite.typing import Array
 from kratos_lite.validation import finite, short, takes
 
@@ -25,6 +26,8 @@ OfPlace: TypeAlias = "Callable[[Array], ArrayLike]"
 
 MOST_CHANGE = 0.01
 """Of the forces of a function, by the next quadrature rule; more is a warning."""
+DEEPEST = 8
+"""Levels of values inside values that are compared; what lies deeper is compared as an object."""
 
 
 class Load(ABC):
@@ -255,3 +258,40 @@ def at_places(function: OfPlace, what: str, width: tuple[int, ...]) -> Callable[
         return np.broadcast_to(values, (m, *width)).reshape(*X.shape[:-1], *width)
 
     return checked
+
+
+# ---- what is equal, as a cell of a notebook makes it that is run twice ------------------------------------
+
+
+def key_of(value: Any, depth: int = 0) -> Hashable:
+    """Return a key that equal things share: loads by class and all values, functions by their code.
+
+    >>> key_of({"a": [1, 2.0]}) == key_of({"a": [1, 2.0]}), key_of(lambda x: x) == key_of(lambda x: 2 * x)
+    (True, False)
+    """
+    deeper = depth + 1
+    if isinstance(value, np.ndarray):
+        return "array", value.shape, value.dtype.kind, hash(value.tobytes())
+    if isinstance(value, Mapping):
+        value = [*value, *value.values()]
+    if isinstance(value, (list, tuple)):
+        return tuple(key_of(item, deeper) for item in value)
+    if isinstance(value, FunctionType) and depth <= DEEPEST:
+        closed = [cell.cell_contents for cell in value.__closure__ or ()]
+        return value.__code__, key_of(value.__defaults__, deeper), key_of(closed, deeper)
+    if isinstance(value, (Load, TimeSeries)):
+        return type(value), key_of(vars(value), deeper)
+    return value if isinstance(value, Hashable) and depth <= DEEPEST else id(value)
+
+
+def equal_loads(loads: Sequence[Load]) -> list[str]:
+    """Return a warning for each load that acts more than once."""
+    alike: dict[Hashable, list[Load]] = {}
+    for load in loads:
+        alike.setdefault(key_of(load), []).append(load)
+    return [
+        f"{len(same)} equal loads {same[0]!r}, which add up; if one alone is meant, give it a name, "
+        "model.add(load, name=...), so that it is not added twice"
+        for same in alike.values()
+        if len(same) > 1
+    ]
