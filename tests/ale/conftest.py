@@ -5,14 +5,18 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.sparse import eye_array, kron
+from scipy.sparse.linalg import splu, spsolve
 
 import kratos_lite as kl
 from kratos_lite.ale import MotionMatrices
+from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.elements.surface import area_vectors, face_rule
 from kratos_lite.solvers.mass import Mass
 
 STEEL = kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0)
+A = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
 
 
 def disk(element: str, radial: int, around: int, hub: str = "clamped") -> kl.Model:
@@ -83,10 +87,55 @@ def rim_load(mesh: kl.Mesh, pressure: Callable[[np.ndarray], np.ndarray]) -> np.
     return total
 
 
+def lagrangian(model, angle, rate, acceleration, load, h, steps):
+    """Move the same body in axes that turn with it, M w'' + 2 rate M A w' + … by the trapezoidal rule.
+
+    Returns w (n, 3): the displacement in those axes of the material that starts at each node.
+    """
+    e = EquationsOfMotion(model)
+    free, K = e.system.constraint_map.free, e.K.scipy().tocsr()
+    M, scalar = kron(e.mass.scalar, eye_array(3)).tocsr(), e.mass.scalar
+    MA, MAA = kron(scalar, A).tocsr(), kron(scalar, A @ A).tocsr()
+    X = model.mesh.points
+    take = lambda matrix: matrix[free][:, free]  # noqa: E731
+
+    def terms(t):
+        C = 2 * rate(t) * MA
+        return take(C), take(K + acceleration(t) * MA + rate(t) ** 2 * MAA)
+
+    def force(t):
+        own = -(scalar @ (X @ (rate(t) ** 2 * A @ A + acceleration(t) * A).T))
+        return (load(angle(t), t) + own).ravel()[free]
+
+    Mf = take(M)
+    u = v = np.zeros(len(free))
+    a = spsolve(Mf.tocsc(), force(0.0))
+    kept = None
+    for k in range(1, steps + 1):
+        t = k * h
+        C, S = terms(t)
+        if kept is None or acceleration(t) or kept[0] != rate(t):
+            kept = rate(t), splu((Mf + h / 2 * C + h * h / 4 * S).tocsc())
+        guess_v, guess_u = v + h / 2 * a, u + h * v + h * h / 4 * a
+        a = kept[1].solve(force(t) - C @ guess_v - S @ guess_u)
+        u, v = guess_u + h * h / 4 * a, guess_v + h / 2 * a
+    out = np.zeros(e.size)
+    out[free] = u
+    return e.system.scatter(out)
+
+
 @pytest.fixture(scope="session")
 def wheels() -> SimpleNamespace:
     """Steel, its wave speeds, and the functions of this module."""
     C, rho = STEEL.C, STEEL.density
-    speeds = {"c_p": np.sqrt(C[0, 0] / rho), "c_s": np.sqrt(C[3, 3] / rho)}
-    tools: dict[str, Callable] = {"disk": disk, "bar": bar, "matrices": matrices, "polar": polar}
-    return SimpleNamespace(steel=STEEL, rim_load=rim_load, **speeds, **tools)
+    return SimpleNamespace(
+        steel=STEEL,
+        c_p=np.sqrt(C[0, 0] / rho),
+        c_s=np.sqrt(C[3, 3] / rho),
+        disk=disk,
+        bar=bar,
+        matrices=matrices,
+        polar=polar,
+        rim_load=rim_load,
+        lagrangian=lagrangian,
+    )

@@ -5,8 +5,7 @@ import pytest
 from meshes import elsewhere
 from rounding import EPS
 from scipy.integrate import solve_ivp
-from scipy.sparse import eye_array, kron
-from scipy.sparse.linalg import splu, spsolve
+from scipy.sparse.linalg import spsolve
 
 import kratos_lite as kl
 from kratos_lite.ale import Rotation, Translation
@@ -171,43 +170,6 @@ def contact(wheels, mesh, turned=0.0):
     return wheels.rim_load(mesh, pressure)
 
 
-def lagrangian(model, angle, rate, acceleration, load, h, steps):
-    """Move the same body in axes that turn with it, M w'' + 2 rate M A w' + … by the trapezoidal rule.
-
-    Returns w (n, 3): the displacement in those axes of the material that starts at each node.
-    """
-    e = EquationsOfMotion(model)
-    free, K = e.system.constraint_map.free, e.K.scipy().tocsr()
-    M, scalar = kron(e.mass.scalar, eye_array(3)).tocsr(), e.mass.scalar
-    MA, MAA = kron(scalar, A).tocsr(), kron(scalar, A @ A).tocsr()
-    X = model.mesh.points
-    take = lambda matrix: matrix[free][:, free]  # noqa: E731
-
-    def terms(t):
-        C = 2 * rate(t) * MA
-        return take(C), take(K + acceleration(t) * MA + rate(t) ** 2 * MAA)
-
-    def force(t):
-        own = -(scalar @ (X @ (rate(t) ** 2 * A @ A + acceleration(t) * A).T))
-        return (load(angle(t), t) + own).ravel()[free]
-
-    Mf = take(M)
-    u = v = np.zeros(len(free))
-    a = spsolve(Mf.tocsc(), force(0.0))
-    kept = None
-    for k in range(1, steps + 1):
-        t = k * h
-        C, S = terms(t)
-        if kept is None or acceleration(t) or kept[0] != rate(t):
-            kept = rate(t), splu((Mf + h / 2 * C + h * h / 4 * S).tocsc())
-        guess_v, guess_u = v + h / 2 * a, u + h * v + h * h / 4 * a
-        a = kept[1].solve(force(t) - C @ guess_v - S @ guess_u)
-        u, v = guess_u + h * h / 4 * a, guess_v + h / 2 * a
-    out = np.zeros(e.size)
-    out[free] = u
-    return e.system.scatter(out)
-
-
 @pytest.mark.parametrize(
     ("element", "cells", "start", "spin", "T", "steps", "tolerance"),
     [
@@ -228,7 +190,7 @@ def test_the_same_in_axes_that_turn_with_the_material(
 
     model = wheels.disk(element, *cells)
     plain = wheels.disk(element, *cells)
-    w = lagrangian(
+    w = wheels.lagrangian(
         plain,
         lambda t: start * t + spin * t * t / 2,
         rate,
