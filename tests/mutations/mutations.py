@@ -424,8 +424,8 @@ MUTATIONS = [
     # ---- supports, mass
     Mutation(
         "model/free_motions.py",
-        "return values - (taken @ shares",
-        "return values + (taken @ shares",
+        "return values - (taken @ components",
+        "return values + (taken @ components",
         "tests/analysis/test_free_bodies.py",
     ),
     Mutation(
