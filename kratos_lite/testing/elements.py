@@ -13,7 +13,7 @@ from kratos_lite.quadrature import Rule
 from kratos_lite.shapes import Shape
 from kratos_lite.solvers.constraint_map import rigid_modes
 from kratos_lite.testing import patches
-from kratos_lite.testing.cells import C_ISOTROPIC, affine, anisotropic, distorted, linear_field, rotations
+from kratos_lite.testing.patches import C_ISOTROPIC, affine, anisotropic, distorted, linear_field, rotations
 from kratos_lite.testing.report import Finding, Measured, difference, failures, run, run_after, worst
 from kratos_lite.testing.rules import check_rule
 from kratos_lite.testing.shapes import check_functions, problems, unsaved
