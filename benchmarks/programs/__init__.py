@@ -1,4 +1,4 @@
-"""The programs compared: one small module each, run as ``python -m benchmarks.programs NAME job.json``."""
+"""The programs compared, run as ``python -m benchmarks.programs NAME job.json``."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Program:
 
     Attributes
     ----------
-    module : of this package.
+    module : of this package, and its function if that is not `work`.
     kinds : element kinds that it has.
     curved : those of them that follow curved edges as ours do.
     environment : variables of its process.
@@ -50,32 +50,35 @@ AS_ANYONE = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1
 SHARED = {"OMPI_MCA_rmaps_base_oversubscribe": "1", "OMPI_MCA_hwloc_base_binding_policy": "none"}
 QUADRATIC = ("10N", "20N", "27N")
 CALCULIX = ("4N", "6N", "8N", "10N", "15N", "20N", "20N reduced")
+TORCH = ("4N", "8N", "10N", "20N reduced")
 OWN = ALL + tuple(FORMULATIONS)
 PROGRAMS = {
     "kratos_lite": Program("lite", OWN, OWN),
     "kratos_lite adaptive": Program("adaptive", OWN, OWN),
     "kratos_lite NumPy": Program("lite", OWN, OWN, {"KRATOS_LITE_KERNELS": "numpy"}),
     "Kratos": Program("kratos", kinds=(*ALL, *MORE), curved=(*ALL, *MORE)),
-    "scikit-fem": Program("scikit_fem", curved=("10N", "27N"), environment=ONE_BLAS_THREAD),
-    "FElupe": Program("felupe_", curved=QUADRATIC, environment=ONE_BLAS_THREAD),
-    "fedoo": Program("fedoo_", ("4N", "8N", "10N", "20N"), ("20N",), ONE_BLAS_THREAD),
-    "SfePy": Program("sfepy_", ("4N", "8N", "10N", "27N"), environment=ONE_BLAS_THREAD),
-    "NGSolve": Program("ngsolve_", ("4N", "8N"), environment=ONE_BLAS_THREAD),
+    "scikit-fem": Program("libraries.scikit_fem", curved=("10N", "27N"), environment=ONE_BLAS_THREAD),
+    "FElupe": Program("libraries.felupe", curved=QUADRATIC, environment=ONE_BLAS_THREAD),
+    "fedoo": Program("libraries.fedoo", ("4N", "8N", "10N", "20N"), ("20N",), ONE_BLAS_THREAD),
+    "SfePy": Program("libraries.sfepy", ("4N", "8N", "10N", "27N"), environment=ONE_BLAS_THREAD),
+    "NGSolve": Program("libraries.ngsolve", ("4N", "8N"), environment=ONE_BLAS_THREAD),
     "CalculiX": Program("calculix", CALCULIX, CALCULIX, digits=6),
     "GetFEM": Program("getfem_"),
-    "torch-fem": Program("torch_fem_", ("4N", "8N", "10N", "20N reduced"), ("10N", "20N reduced"), digits=8),
-    "JAX-FEM": Program("jax_fem_", ("4N", "8N", "10N", "27N"), ("10N", "27N"), ONE_BLAS_THREAD),
+    "torch-fem": Program(
+        "libraries.torch_fem", ("4N", "8N", "10N", "20N reduced"), ("10N", "20N reduced"), digits=8
+    ),
+    "JAX-FEM": Program("libraries.jax_fem", ("4N", "8N", "10N", "27N"), ("10N", "27N"), ONE_BLAS_THREAD),
 }
 """Every program that solves, by the name shown."""
 PEERS = ("scikit-fem", "FElupe", "fedoo", "SfePy", "NGSolve", "GetFEM", "torch-fem", "JAX-FEM")
 """Those of them that are Python libraries."""
 HELPERS = {
-    "pyamg": Program("pyamg_"),
-    "PETSc GAMG": Program("petsc_", environment=AS_ANYONE, launcher=("mpiexec", "-n", "2")),
-    "PETSc BoomerAMG": Program("petsc_", environment=AS_ANYONE, launcher=("mpiexec", "-n", "2")),
-    "PARDISO": Program("direct"),
-    "CHOLMOD": Program("direct"),
-    "meshio": Program("meshio_"),
+    "pyamg": Program("linear.pyamg"),
+    "PETSc GAMG": Program("linear.petsc", environment=AS_ANYONE, launcher=("mpiexec", "-n", "2")),
+    "PETSc BoomerAMG": Program("linear.petsc", environment=AS_ANYONE, launcher=("mpiexec", "-n", "2")),
+    "PARDISO": Program("linear.factorized"),
+    "CHOLMOD": Program("linear.factorized"),
+    "meshio": Program("libraries.meshio"),
     "import numpy": Program("", code="import numpy"),
 }
 """What else is timed: solvers on our matrix, a reader, and the least that NumPy takes to start."""

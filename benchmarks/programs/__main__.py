@@ -34,7 +34,8 @@ def batch(work: Work, jobs: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    work = importlib.import_module(f"benchmarks.programs.{sys.argv[1]}").work
+    module, _, function = sys.argv[1].partition(".")
+    work = getattr(importlib.import_module(f"benchmarks.programs.{module}"), function or "work")
     path = Path(sys.argv[2])
     given = json.loads(path.read_text())
     if isinstance(given, list):

@@ -82,6 +82,12 @@ class Job:
         """The elements in the node order of VTK."""
         return self.nodes[:, self.vtk_order]
 
+    @property
+    def lame(self) -> tuple[float, float]:
+        """Lamé's constants."""
+        E, nu = self.elasticity.tolist()
+        return E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 * (1 + nu))
+
     def fastest(self, name: str, action: Callable[[], Any]) -> Any:
         """Run an action `repeat` times; keep its first time as `name` and its shortest as ``name, again``."""
         times = []

@@ -35,9 +35,8 @@ def work(job: Job) -> Array | None:
         places = rows_of(field.basic_dof_nodes()[:, ::3].T, job.points)
 
     def stiffness() -> Any:
-        E, nu = job.elasticity.tolist()
         ones = np.ones(coefficients.nbdof())
-        lam, mu = E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 * (1 + nu))
+        lam, mu = job.lame
         return getfem.asm_linear_elasticity(rule, field, coefficients, lam * ones, mu * ones)
 
     K = job.fastest("matrix", stiffness)

@@ -30,7 +30,7 @@ from kratos_lite.typing import Array, Ints, Mask, Numbers, Rows
 from kratos_lite.validation import whole_number
 
 if TYPE_CHECKING:
-    from kratos_lite.elements.strain_tables import StrainTables
+    from kratos_lite.elements.tables import StrainTables
 
 CHUNK_BYTES = 4_000_000
 """Memory of the element matrices computed at once: small enough for the cache."""

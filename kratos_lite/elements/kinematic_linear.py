@@ -17,7 +17,7 @@ import numpy as np
 from kratos_lite import voigt
 from kratos_lite.elements import arguments, custom, stiffness
 from kratos_lite.elements.mass import CellMass
-from kratos_lite.elements.tables import lame_constants, reference_products, tabulate
+from kratos_lite.elements.tables import StrainTables, lame_constants, reference_products, tabulate
 from kratos_lite.errors import InputError
 from kratos_lite.quadrature import Rule
 from kratos_lite.registry import Registry
@@ -26,8 +26,6 @@ from kratos_lite.validation import short
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
-
-    from kratos_lite.elements.strain_tables import StrainTables
 
 ELEMENTS: Registry[type[KinematicLinear]] = Registry("element")
 """Every element by its class name and by the names that mean the same in files."""

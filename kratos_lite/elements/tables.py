@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from kratos_lite.quadrature import Rule
@@ -9,6 +11,16 @@ from kratos_lite.registry import remembered
 from kratos_lite.shapes import Shape
 from kratos_lite.shapes.base import at_points
 from kratos_lite.typing import Array
+
+
+class StrainTables(NamedTuple):
+    """What kernels need to add to the strain of the displacements; see `KinematicLinear.strain_tables`."""
+
+    center: Array  # (n, 3), dN at the center
+    functions: Array  # (g, 6) enhanced monomials; N - N(center) (g, n), or (g, 0), of a dilatation
+    C: Array | None  # (6, 6) Pa, which enhanced modes depend on; None of a dilatation
+    fraction: float  # of the dilatation that is projected
+
 
 NEXT, AFTER = np.array([1, 2, 0]), np.array([2, 0, 1])
 

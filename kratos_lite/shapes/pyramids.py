@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kratos_lite.shapes.base import LINEAR, Shape, mid_edges, quadratic_faces
+from kratos_lite.shapes.tensor import edge_factors, gradient, linear_factors
 from kratos_lite.typing import Array
 
 if TYPE_CHECKING:
@@ -33,19 +34,20 @@ def _collapse(xi: ArrayLike) -> tuple[Array, Array, Array, Array]:
     return x[..., :1], x[..., 1:2], d, ab
 
 
+def _in_section(factors: tuple[Array, Array]) -> tuple[Array, Array, Array]:
+    """Return the product F of factors in a and b, and its derivatives in a and b, each (..., 4)."""
+    Fa, Fb = np.moveaxis(gradient(*factors), -1, 0)
+    return factors[0].prod(axis=-1), Fa, Fb
+
+
 def _corner(ab: Array) -> tuple[Array, Array, Array]:
     """Return F = (1 + p a)(1 + q b) and its derivatives in a and b, each (..., 4)."""
-    A, B = 1 + _P * ab[..., :1], 1 + _Q * ab[..., 1:]
-    return A * B, _P * B, _Q * A
+    return _in_section(linear_factors(ab, _CORNERS[:4, :2]))
 
 
 def _base_middle(ab: Array) -> tuple[Array, Array, Array]:
     """Return F = (1 - a²)(1 ± b) or (1 ± a)(1 - b²) and its derivatives, each (..., 4)."""
-    p, q = _MIDDLE.T
-    a, b = ab[..., :1], ab[..., 1:]
-    A, B = np.where(p == 0, 1 - a * a, 1 + p * a), np.where(q == 0, 1 - b * b, 1 + q * b)
-    dA, dB = np.where(p == 0, -2 * a, p + 0 * a), np.where(q == 0, -2 * b, q + 0 * b)
-    return A * B, dA * B, A * dB
+    return _in_section(edge_factors(ab, _MIDDLE))
 
 
 def _slope(F: Array, Fa: Array, Fb: Array, ab: Array) -> Array:

@@ -209,6 +209,12 @@ def worst(errors: Mapping[T, float]) -> tuple[float, T]:
     return float(errors[names[i]]), names[i]
 
 
+def largest(errors: Mapping[str, float], limit: float) -> Measured:
+    """Return the largest of errors by what they belong to."""
+    error, detail = worst(errors)
+    return Measured(error, limit, detail)
+
+
 def at(xi: ArrayLike) -> str:
     """Return a point as text."""
     return "(" + ", ".join(f"{x:.6g}" for x in np.asarray(xi, dtype=float).tolist()) + ")"

@@ -2,7 +2,8 @@
 
 ``python -m tests.mutations [numbers]`` takes all mutations, or those of these numbers; it ends with how many
 were killed, survive, and were not run because their tests fail without them.  Kernels that a mutation of
-C++ touches are built again, which needs GCC.
+C++ touches are built again, which needs GCC.  ``python -m tests.mutations --check`` only lists the mutations
+whose text or tests are no longer there.
 """
 
 import os
@@ -25,17 +26,8 @@ LIMIT = 60
 
 def passed(folder: Path, tests: str) -> bool:
     """Return whether the tests pass in a copy of the package; a run that takes too long has not noticed."""
-    command = [
-        sys.executable,
-        "-m",
-        "pytest",
-        "-q",
-        "-x",
-        "-p",
-        "no:cacheprovider",
-        "--no-header",
-        *tests.split(),
-    ]
+    options = ("-q", "-x", "-p", "no:cacheprovider", "--no-header")
+    command = [sys.executable, "-m", "pytest", *options, *tests.split()]
     environment = {**os.environ, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
     done = subprocess.run(
         command,
@@ -54,10 +46,6 @@ def survives(folder: Path, mutation: Mutation) -> bool:
     """Return whether the tests pass with a mutation."""
     file = folder / "kratos_lite" / mutation.file
     text = file.read_text()
-    if text.count(mutation.old) != 1:
-        sys.exit(
-            f"{mutation.file} must have {mutation.old!r} once; it has it {text.count(mutation.old)} times"
-        )
     kernels = users_of(file) if file.suffix in (".cpp", ".hpp") else []
     built = [next(file.parent.glob(f"_{kernel.stem}.*.so")) for kernel in kernels]
     before = [library.read_bytes() for library in built]
@@ -71,6 +59,19 @@ def survives(folder: Path, mutation: Mutation) -> bool:
             library.write_bytes(data)
 
 
+def stale() -> list[str]:
+    """Return what is wrong with mutations: their text is not in its file once, or their tests are gone."""
+    wrong = []
+    for number, (file, old, new, tests) in enumerate(MUTATIONS):
+        path = ROOT / "kratos_lite" / file
+        count = path.read_text().count(old) if path.exists() else 0
+        if count != 1 or new in (old, ""):
+            wrong.append(f"{number} {file}: {old!r} must be there once, and change; it is {count} times")
+        paths = [word for word in tests.split() if word.startswith(("tests", "kratos_lite"))]
+        wrong += [f"{number} {file}: there is no {path}" for path in paths if not (ROOT / path).exists()]
+    return wrong
+
+
 def copy_sources(folder: Path) -> None:
     """Copy what the tests need into a folder."""
     for part in ("kratos_lite", "tests", "examples", "docs", "elements", "materials", "benchmarks"):
@@ -80,8 +81,10 @@ def copy_sources(folder: Path) -> None:
 
 
 def main(numbers: list[int]) -> int:
-    """Try mutations, tell the outcome of each, and return how many were not killed."""
-    outcomes: Counter[str] = Counter()
+    """Try mutations, tell the result of each, and return how many were not killed."""
+    if wrong := stale():
+        sys.exit("\n".join(wrong))
+    results: Counter[str] = Counter()
     begin = time.monotonic()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -89,21 +92,21 @@ def main(numbers: list[int]) -> int:
         sound: dict[str, bool] = {}
         for number in numbers or range(len(MUTATIONS)):
             mutation, start = MUTATIONS[number], time.monotonic()
-            outcome = "SURVIVES" if survives(folder, mutation) else "killed"
-            if outcome == "killed" and mutation.tests not in sound:
+            result = "SURVIVES" if survives(folder, mutation) else "killed"
+            if result == "killed" and mutation.tests not in sound:
                 sound[mutation.tests] = passed(folder, mutation.tests)
             if not sound.get(mutation.tests, True):  # tests that always fail notice nothing
-                outcome = "NOT RUN"
-            outcomes[outcome] += 1
+                result = "NOT RUN"
+            results[result] += 1
             seconds = time.monotonic() - start
             sys.stdout.write(
-                f"{number:3} {outcome:8} {seconds:4.0f} s  {mutation.file}: {mutation.new.strip()}\n"
+                f"{number:3} {result:8} {seconds:4.0f} s  {mutation.file}: {mutation.new.strip()}\n"
             )
             sys.stdout.flush()
-    counts = ", ".join(f"{outcomes[word]} {word.lower()}" for word in ("killed", "SURVIVES", "NOT RUN"))
+    counts = ", ".join(f"{results[word]} {word.lower()}" for word in ("killed", "SURVIVES", "NOT RUN"))
     sys.stdout.write(f"{counts}, {time.monotonic() - begin:.0f} s\n")
-    return outcomes.total() - outcomes["killed"]
+    return results.total() - results["killed"]
 
 
 if __name__ == "__main__":
-    sys.exit(main([int(word) for word in sys.argv[1:]]))
+    sys.exit("\n".join(stale()) or 0 if "--check" in sys.argv else main([int(word) for word in sys.argv[1:]]))

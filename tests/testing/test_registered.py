@@ -51,7 +51,7 @@ def test_each_shape_conforms(name):
     show(name, check_shape(SHAPES[name]))
 
 
-@pytest.mark.parametrize("degree", range(10))
+@pytest.mark.parametrize("degree", [*range(10), 13, 16, 19])
 @pytest.mark.parametrize("cell", list(CELLS))
 def test_each_rule_has_the_degree_that_it_claims(cell, degree):
     rule = rule_for(cell, degree)
