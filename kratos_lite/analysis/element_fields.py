@@ -87,7 +87,8 @@ class ElementFields:
         InputError
             An element class has a strain of its own, but no B-operator; or a stress of its own.
         """
-        from kratos_lite.assembly.point_fields import at_located, recovered_at  # as for the recovery
+        from kratos_lite.assembly.nodal_values import at_located  # as for the recovery
+        from kratos_lite.assembly.recovery import recovered_at
 
         if recovered:
             return recovered_at(self._recovery, located, self._strained, stress=stress)

@@ -18,7 +18,7 @@ from kratos_lite.analysis.state import MODEL_FIELDS, State, check_state
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model.loads.base import equal_loads
 from kratos_lite.model.structure import Structure
-from kratos_lite.solvers.blas import one_thread
+from kratos_lite.solvers.direct import one_thread
 from kratos_lite.typing import Array, Progress
 from kratos_lite.validation import finite, flag, function_or_none
 

@@ -1,4 +1,4 @@
-"""Nodal values: stresses and strains at Gauss points, extrapolated to nodes and averaged there."""
+"""Nodal values: stresses and strains at Gauss points, extrapolated to nodes and averaged there; at points."""
 
 from __future__ import annotations
 
@@ -6,9 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from kratos_lite import voigt
 from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, as_double
 from kratos_lite.assembly.gauss_point_fields import at_gauss, compiled_law, displaced, value_at
 from kratos_lite.elements import KinematicLinear
+from kratos_lite.elements.tables import cofactors, determinant
+from kratos_lite.mesh.locate import Located
 from kratos_lite.quadrature import Rule
 from kratos_lite.registry import remembered
 from kratos_lite.shapes.base import at_points
@@ -67,3 +70,38 @@ def _averages(points: Array, group: ElementGroup, u: Array, stress: bool) -> tup
         means[chunk] = (value * (volume / volume.sum(axis=1, keepdims=True))).sum(axis=1)
         add_nodal(total, group.nodes[chunk], to_nodes @ value)
     return total, means
+
+
+# ---- at points ------------------------------------------------------------------------------------
+
+
+def at_located(groups: Sequence[ElementGroup], located: Located, u: Array, *, stress: bool = True) -> Array:
+    """Return stresses in Pa with prestress, or strains, (..., 6) of displacements u (n, 3) in m at points."""
+    rows, xi = located.rows.ravel(), located.xi.reshape(-1, 3)
+    out = np.zeros((len(rows), 6))
+    for group in groups:
+        number = np.full(sum(map(len, located.mesh.blocks)), -1)
+        number[group.rows] = np.arange(len(group))
+        at = np.flatnonzero((rows >= 0) & (number[rows] >= 0))
+        if not len(at):
+            continue
+        cells = number[rows[at]]
+        X, displaced = (values[group.nodes[cells]] for values in (located.mesh.points, u))
+        value = _strain(group, X, xi[at], displaced)
+        if stress:
+            value = group.stress(value)
+            value = value if group.prestress is None else value + group.prestress[cells]
+        out[at] = value
+    return out.reshape(*located.rows.shape, 6)
+
+
+def _strain(group: ElementGroup, X: Array, xi: Array, u: Array) -> Array:
+    """Return the strain (k, 6) of elements X (k, n, 3) under u (k, n, 3), each at its own xi (k, 3)."""
+    element = group.element
+    if element.has_standard_strain():
+        dN = element.dN(xi)
+        J = np.swapaxes(X, -1, -2) @ dN
+        D = dN @ (cofactors(J) / determinant(J)[..., None, None])
+        return voigt.symmetric_gradient(np.swapaxes(u, -1, -2) @ D)
+    C = group.material.C
+    return np.array([element(x, group.rule).strain_at(t, v, C) for x, t, v in zip(X, xi, u, strict=True)])

@@ -24,6 +24,7 @@ from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.mesh.blocks import NO_ROWS
+from kratos_lite.mesh.locate import Located
 from kratos_lite.native import kernels
 from kratos_lite.quadrature import Rule, hexahedron, rule_for
 from kratos_lite.registry import remembered
@@ -249,6 +250,18 @@ class Recovery:
         fine = _compared_at(group)
         N, _ = tabulate(fine.element.shape, fine.rule)
         return fine, N, volumes(self.points, fine), as_double(np.linalg.inv(fine.material.C))
+
+
+def recovered_at(recovery: Recovery, located: Located, u: Array, *, stress: bool = True) -> Array:
+    """Return recovered stresses in Pa, or strains, (..., 6) at points, between nodes of one material."""
+    out = np.zeros((*located.rows.shape, 6))
+    for region, values in recovery.by_region(u, stress=stress):
+        inside = np.isin(located.rows, np.concatenate([group.rows for group in region.groups]))
+        if inside.any():
+            nodal = np.zeros((len(located.mesh.points), 6))
+            nodal[region.nodes] = values
+            out[inside] = located[inside].interpolate(nodal)
+    return out
 
 
 def _plain(group: ElementGroup) -> ElementGroup:

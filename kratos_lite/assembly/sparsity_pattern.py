@@ -33,6 +33,11 @@ class Pattern:
         return block_rows(self.indptr)
 
     @cached_property
+    def diagonal(self) -> Ints:
+        """Place of the diagonal block of each row, (n,)."""
+        return np.flatnonzero(self.rows() == self.indices)
+
+    @cached_property
     def positions(self) -> list[Rows]:
         """Position of each node pair of each element, (m, k, k) of each number."""
         keys = self.rows() * self.n_nodes + self.indices

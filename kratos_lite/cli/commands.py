@@ -59,7 +59,7 @@ def _solve(options: Namespace, clock: float) -> int:
     from kratos_lite.cli.apply_options import case_of
     from kratos_lite.cli.ranks import part_files_of, solve_parts
     from kratos_lite.io.run import run
-    from kratos_lite.solvers.blas import reserve_buffers
+    from kratos_lite.solvers.direct import reserve_buffers
 
     reserve_buffers()
     seconds = {"import": perf_counter() - clock}

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from kratos_lite.mesh import Block, Faces
 from kratos_lite.solvers.constraint_map import ConstraintMap
 from kratos_lite.typing import Array, Ints, Mask
 
+Dependents: TypeAlias = "tuple[Ints, Ints, Array]"
+"""Degrees of freedom, others on which they depend, and the weights of these, entry by entry."""
+NO_DEPENDENTS: Dependents = np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0)
 FEW = 10
 """Elements a part below which METIS leaves some parts empty."""
 TILT = 1e-3
@@ -33,7 +36,7 @@ class Part:
     number : (n,) int, number of each node among those with equations of all ranks, from 0, ascending by rank;
         -1 for the others.
     free, held : (n, 3) bool, what is free, and what is prescribed; the rest depends on free ones.
-    dependent : by equation (3 · number + axis) of own dependent degrees of freedom, the weights of equations.
+    dependents : of own nodes: equations (3 · number + axis), others on which they depend, and their weights.
     """
 
     points: Array
@@ -42,7 +45,7 @@ class Part:
     number: Ints
     free: Mask
     held: Mask
-    dependent: Mapping[int, Mapping[int, float]]
+    dependents: Dependents
 
 
 class Cut:
@@ -62,15 +65,15 @@ class Cut:
         self.points, self.groups = points, groups
         self.free = np.zeros((len(points), 3), dtype=bool)
         self.free.flat[constraints.free] = True
-        self._dependent = dependent_dofs(constraints)
+        self._dependents = dependents_of(constraints)
         self.held = ~self.free
-        self.held.flat[list(self._dependent)] = False
+        self.held.flat[self._dependents[0]] = False
         equations = ~self.held.all(axis=1)
         owner = np.where(equations, self._owners(size), size)
         order = np.argsort(owner, kind="stable")
         ends = np.searchsorted(owner[order], np.arange(size + 1))
         self.own = [order[a:b] for a, b in itertools.pairwise(ends)]
-        self.is_constrained = bool(self._dependent)
+        self.is_constrained = len(self._dependents[0]) > 0
         self.number = np.full(len(points), -1, dtype=np.int64)
         self.number[order[: ends[-1]]] = np.arange(ends[-1])
 
@@ -96,30 +99,24 @@ class Cut:
         nodes = np.flatnonzero(here)
         place = np.cumsum(here) - 1
         local = [replace(group, nodes=place[group.nodes].astype(np.int32)) for group in groups]
-        dependent = {
-            int(self._equation(dof)): {int(self._equation(one)): weight for one, weight in terms.items()}
-            for dof, terms in self._dependent.items()
-            if own[dof // 3]
-        }
+        dofs, independents, weights = self._dependents
+        at = np.flatnonzero(own[dofs // 3])
+        dependents = self._equations(dofs[at]), self._equations(independents[at]), weights[at]
         masks = self.free[nodes], self.held[nodes]
-        return Part(self.points[nodes], local, place[self.own[rank]], self.number[nodes], *masks, dependent)
+        return Part(self.points[nodes], local, place[self.own[rank]], self.number[nodes], *masks, dependents)
 
-    def _equation(self, dof: int) -> int:
-        return 3 * int(self.number[dof // 3]) + dof % 3
+    def _equations(self, dofs: Ints) -> Ints:
+        return 3 * self.number[dofs // 3] + dofs % 3
 
 
-def dependent_dofs(constraints: ConstraintMap) -> dict[int, dict[int, float]]:
-    """Return the weights of the free degrees of freedom on which others depend."""
+def dependents_of(constraints: ConstraintMap) -> Dependents:
+    """Return dependent degrees of freedom, each as often as there are free ones on which it depends."""
     if constraints.T is None:
-        return {}
-    T, is_free = constraints.T.tocsr(), np.zeros(len(constraints.c), dtype=bool)
+        return NO_DEPENDENTS
+    entries, is_free = constraints.T.tocoo(), np.zeros(len(constraints.c), dtype=bool)
     is_free[constraints.free] = True
-    found = {}
-    for dof in np.flatnonzero(~is_free & (np.diff(T.indptr) > 0)):
-        at = slice(T.indptr[dof], T.indptr[dof + 1])
-        dofs = constraints.free[T.indices[at]]
-        found[int(dof)] = dict(zip(dofs.tolist(), T.data[at].tolist(), strict=True))
-    return found
+    chosen = ~is_free[entries.row]
+    return entries.row[chosen].astype(np.int64), constraints.free[entries.col[chosen]], entries.data[chosen]
 
 
 def parts_of(points: Array, groups: Sequence[ElementGroup], size: int) -> Ints:

@@ -2,27 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from kratos_lite.assembly.sparsity_pattern import Pattern
-from kratos_lite.assembly.stiffness import assemble_stiffness
-from kratos_lite.distributed.communicator import Alone
+from kratos_lite.distributed.communicator import Alone, Ranks
 from kratos_lite.distributed.cut import Part
-from kratos_lite.distributed.krylov import Krylov
-from kratos_lite.distributed.petsc import LIVE, plain_errors
-from kratos_lite.distributed.petsc_matrix import (
-    add_rigid_modes,
-    eliminated,
-    largest_row_sum,
-    petsc_matrix,
-    transformation,
-)
-from kratos_lite.distributed.preconditioner import options_of
-from kratos_lite.distributed.shell import product_of, set_multigrid
+from kratos_lite.distributed.krylov import Krylov, options_of
+from kratos_lite.distributed.petsc import LIVE, petsc, plain_errors
+from kratos_lite.distributed.petsc_matrix import add_rigid_modes, communicator, eliminated, petsc_matrix
 from kratos_lite.distributed.stiffness import SharedStiffness
 from kratos_lite.native import kernels
 from kratos_lite.typing import Array, Progress
@@ -69,43 +57,29 @@ class Equations:
     """
 
     def __init__(self, ranks: Alone, part: Part, method: Method, progress: Progress | None = None) -> None:
-        self.ranks, self._part, self._progress = ranks, part, progress
+        self.ranks, self._progress = ranks, progress
         self._A: Any = None
         self._solver: Any = None
         LIVE.add(self)
-        if method.takes_own_multigrid:
-            own = ranks, part.points, part.groups, part.own, part.number, part.free
-            K = SharedStiffness(*own, progress)
-            skipped, self.norm = K.skipped, K.norm()
-            with plain_errors():
-                self._A = product_of(K)
-                self._solver = self._iteration(method, own_multigrid=True)
-                set_multigrid(self._solver.ksp, K)
-        else:
-            skipped = self._assemble()
-            self._solver = self._iteration(method, own_multigrid=False)
-        self.skipped = sorted({text for some in ranks.gather(skipped) for text in some})
-
-    def _assemble(self) -> set[str]:
-        """Make T^T K T as a matrix of PETSc; return what assembly left out."""
-        ranks, part = self.ranks, self._part
-        pattern = Pattern(len(part.points), [group.nodes for group in part.groups])
-        skipped: set[str] = set()
-        K = assemble_stiffness(part.points, part.groups, pattern, self._progress, skipped)
-        self.norm = float(ranks.max(largest_row_sum(K, part.own)))
+        own = method.takes_own_multigrid
+        K = SharedStiffness(ranks, part, progress, own_rows=not own)
+        self.norm = K.norm()
+        options = options_of(method.name, method.options, not own)
         with plain_errors():
-            self._A = petsc_matrix(ranks, K, part.own, part.number, part.held)
-            del K, pattern
-            if ranks.sum(len(part.dependent)):
-                T = transformation(self._A, part.dependent)
-                self._A = eliminated(self._A, T, np.array(sorted(part.dependent), dtype=np.int64))
-                T.destroy()
-            add_rigid_modes(ranks, self._A, part.points[part.own], part.free[part.own])
-        return skipped
+            self._A = product_of(K) if own else self._matrix(K, part)
+            self._solver = Krylov(self._A, options, method.options, method.most)
+            if own:
+                set_multigrid(self._solver.ksp, K)
+        self.skipped = sorted({text for some in ranks.gather(K.skipped) for text in some})
 
-    def _iteration(self, method: Method, own_multigrid: bool) -> Krylov:
-        options = options_of(method.name, method.options, not own_multigrid)
-        return Krylov(self._A, options, method.options, method.most)
+    def _matrix(self, K: SharedStiffness, part: Part) -> Any:
+        """Return T^T K T as a matrix of PETSc; that of K goes."""
+        A = petsc_matrix(K)
+        del K.K
+        if self.ranks.sum(len(part.dependents[0])):
+            A = eliminated(A, part.dependents)
+        add_rigid_modes(A, K)
+        return A
 
     def solve(
         self, forces: Array, tolerance: float, start: Array | None = None
@@ -139,3 +113,55 @@ class Equations:
         for held in (self._solver and self._solver.ksp, self._A):
             if held is not None:
                 held.incRef()
+
+
+def product_of(K: SharedStiffness) -> Any:
+    """Return a matrix of PETSc that multiplies by K."""
+    PETSc = petsc()
+    sizes = ((K.own, None), (K.own, None))
+    matrix = PETSc.Mat().createPython(sizes, _Product(K), comm=communicator(K.ranks))
+    matrix.setUp()
+    matrix.setOption(PETSc.Mat.Option.SPD, True)
+    return matrix
+
+
+def set_multigrid(ksp: Any, K: SharedStiffness) -> None:
+    """Let the own multigrid of K precondition a solver of PETSc; it is made when the solver is set up."""
+    preconditioner = ksp.getPC()
+    preconditioner.setType("python")
+    preconditioner.setPythonContext(_Cycle(K))
+
+
+class _Product:
+    """K x, as PETSc calls it."""
+
+    def __init__(self, K: SharedStiffness) -> None:
+        self.K = K
+
+    def mult(self, matrix: Any, x: Any, y: Any) -> None:
+        y.setArray(_safely(self.K, self.K.times, x.getArray(readonly=True)))
+
+
+class _Cycle:
+    """One V-cycle, as PETSc calls it."""
+
+    def __init__(self, K: SharedStiffness) -> None:
+        self.K = K
+        self.multigrid: Any = None
+
+    def setUp(self, preconditioner: Any) -> None:
+        if self.multigrid is None:
+            self.multigrid = _safely(self.K, self.K.multigrid)
+
+    def apply(self, preconditioner: Any, x: Any, y: Any) -> None:
+        y.setArray(_safely(self.K, self.multigrid.precondition, x.getArray(readonly=True)))
+
+
+def _safely(K: SharedStiffness, call: Callable[..., Any], *arguments: Any) -> Any:
+    """Return what a call returns; an error ends all ranks, as the others wait for this one in an exchange."""
+    try:
+        return call(*arguments)
+    except Exception as error:
+        if isinstance(K.ranks, Ranks):
+            K.ranks.abort(error)
+        raise

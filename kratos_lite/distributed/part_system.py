@@ -10,10 +10,10 @@ import numpy as np
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.gauss_point_fields import internal_load
 from kratos_lite.distributed.equations import Equations, Method
+from kratos_lite.distributed.krylov import plan_of
 from kratos_lite.distributed.partition import Partition
 from kratos_lite.distributed.petsc import parsed
 from kratos_lite.distributed.petsc_system import CURE, CURE_OF_FACTORS, PATIENCE, unused_words
-from kratos_lite.distributed.preconditioner import plan_of
 from kratos_lite.elements.formulations import bulk_over_shear
 from kratos_lite.errors import SolveError
 from kratos_lite.solvers.linear_solver import Solution

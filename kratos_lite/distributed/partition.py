@@ -13,7 +13,7 @@ import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.distributed.communicator import Alone
-from kratos_lite.distributed.cut import Part
+from kratos_lite.distributed.cut import NO_DEPENDENTS, Part
 from kratos_lite.errors import MeshError
 from kratos_lite.mesh import Mesh
 from kratos_lite.typing import Array, Ints, Mask, Numbers
@@ -155,7 +155,7 @@ class Partition:
             nodes = np.concatenate([group.nodes, halo])
             whole.append(replace(group, nodes=nodes, rows=np.arange(len(nodes))))
         fixed = every[pick, 2:].astype(bool)
-        return Part(at[pick], whole, own, every[pick, 1], ~fixed, fixed, {})
+        return Part(at[pick], whole, own, every[pick, 1], ~fixed, fixed, NO_DEPENDENTS)
 
     def _groups_of_all(self, groups: list[ElementGroup]) -> list[ElementGroup]:
         """Return the groups that any rank has, in the same order on all, empty where this one has none."""

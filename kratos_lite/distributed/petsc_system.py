@@ -15,8 +15,8 @@ from kratos_lite.assembly.gauss_point_fields import internal_load
 from kratos_lite.distributed.communicator import Alone
 from kratos_lite.distributed.cut import Cut, Part
 from kratos_lite.distributed.equations import Equations, Method
+from kratos_lite.distributed.krylov import plan_of
 from kratos_lite.distributed.petsc import parsed
-from kratos_lite.distributed.preconditioner import plan_of
 from kratos_lite.elements.formulations import bulk_over_shear
 from kratos_lite.errors import SolveError
 from kratos_lite.solvers.constrained_system import ConstrainedSystem

@@ -18,6 +18,7 @@ from kratos_lite.assembly.matrix_free import MatrixFree
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import assemble_stiffness
 from kratos_lite.distributed.communicator import Alone
+from kratos_lite.distributed.cut import Part
 from kratos_lite.distributed.ghosts import Ghosts
 from kratos_lite.distributed.multigrid import Level, Multigrid
 from kratos_lite.native import kernels
@@ -26,7 +27,7 @@ from kratos_lite.solvers.constraint_map import rigid_modes
 from kratos_lite.solvers.multigrid import multigrid
 from kratos_lite.solvers.plan import Facts, needs_no_matrix
 from kratos_lite.solvers.plate_level import plate_axes
-from kratos_lite.typing import Array, Ints, Mask, Progress
+from kratos_lite.typing import Array, Mask, Progress
 
 
 class OneProcess:
@@ -71,38 +72,42 @@ class SharedStiffness:
     Parameters
     ----------
     ranks : the communicator.
-    points : (n, 3) m.
-    groups : all elements here, without initial stress.
-    rows : (m,) own nodes with equations.
-    number : (n,) their number over all ranks, -1 without equations.
-    free : (n, 3) bool.
-    progress : called with the phase and the share done.
+    part : nodes and elements of this rank.
+    progress : called with the phase and the fraction done.
+    own_rows : whether only a matrix of own rows is wanted, for PETSc.
+
+    Attributes
+    ----------
+    points, groups, free, held, number : those of the part in the new order of nodes.
+    skipped : what assembly left out, in words.
     """
 
     def __init__(
         self,
         ranks: Alone,
-        points: Array,
-        groups: Sequence[ElementGroup],
-        rows: Ints,
-        number: Ints,
-        free: Mask,
+        part: Part,
         progress: Progress | None = None,
+        own_rows: bool = False,
     ) -> None:
-        self.ranks = ranks
-        offsets = np.concatenate([[0], np.cumsum(ranks.gather(len(rows)))])
-        own = np.zeros(len(points), dtype=bool)
-        own[rows] = True
+        self.ranks, number = ranks, part.number
+        offsets = np.concatenate([[0], np.cumsum(ranks.gather(len(part.own)))])
+        own = np.zeros(len(number), dtype=bool)
+        own[part.own] = True
         others = np.flatnonzero((number >= 0) & ~own)
         others = others[np.argsort(number[others])]
-        order = np.concatenate([rows, others, np.flatnonzero((number < 0) & ~own)])
-        place = np.empty(len(points), dtype=np.int32)
+        order = np.concatenate([part.own, others, np.flatnonzero((number < 0) & ~own)])
+        place = np.empty(len(number), dtype=np.int32)
         place[order] = np.arange(len(order), dtype=np.int32)
         self.ghosts = Ghosts(ranks, offsets, number[others])
-        self.points, self.free = points[order], free[order]
-        self.groups = [replace(group, nodes=place[group.nodes]) for group in groups]
+        self.points, self.free, self.held = part.points[order], part.free[order], part.held[order]
+        self.number = number[order]
+        self.groups = [replace(group, nodes=place[group.nodes]) for group in part.groups]
         self.skipped: set[str] = set()
-        self.K = MatrixFree(self.points, self.groups) if self._needs_no_matrix() else self._matrix(progress)
+        self.K: BlockMatrix | MatrixFree
+        if not own_rows and self._needs_no_matrix():
+            self.K = MatrixFree(self.points, self.groups)
+        else:
+            self.K = self._matrix(progress, own_rows or ranks.size > 1)
 
     def _needs_no_matrix(self) -> bool:
         """Return whether products do on all ranks: quadratic elements of like stiffness, compact cells."""
@@ -118,11 +123,11 @@ class SharedStiffness:
         )
         return needs_no_matrix(facts)
 
-    def _matrix(self, progress: Progress | None) -> BlockMatrix:
-        """Return the rows of own nodes; on one rank all, for the multigrid of one process."""
+    def _matrix(self, progress: Progress | None, own_rows: bool) -> BlockMatrix:
+        """Return the rows of own nodes, or all, for the multigrid of one process."""
         pattern = Pattern(len(self.points), [group.nodes for group in self.groups])
         K = assemble_stiffness(self.points, self.groups, pattern, progress, self.skipped)
-        if self.ranks.size == 1:
+        if not own_rows:
             return K
         stop = int(K.indptr[self.ghosts.own])
         return BlockMatrix(K.data[:stop], K.indices[:stop], K.indptr[: self.ghosts.own + 1])
@@ -158,10 +163,10 @@ class SharedStiffness:
         quadratic = self.ranks.any(has_middle_nodes(self.groups)) and self.ranks.all(has_corners(self.groups))
         linear = self._linear(module, fixed) if quadratic else None
         points, free = (self.points[:own], self.free[:own]) if linear is None else linear[2:]
-        return Multigrid(first, self._modes(points, free), None if linear is None else linear[:2])
+        return Multigrid(first, self.modes(points, free), None if linear is None else linear[:2])
 
-    def _modes(self, points: Array, free: Mask) -> Array:
-        """Return the rigid-body modes (m, 3, 6) at own nodes."""
+    def modes(self, points: Array, free: Mask) -> Array:
+        """Return the rigid-body modes (m, 3, 6) at own nodes, 0 where they are not free."""
         count = max(int(self.ranks.sum(len(points))), 1)
         modes = rigid_modes(points, self.ranks.sum(points.sum(axis=0)) / count)
         return (modes * free.reshape(-1, 1)).reshape(-1, 3, 6)

@@ -11,6 +11,7 @@ import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.gauss_point_fields import internal_load
+from kratos_lite.assembly.matrix_free import MatrixFree
 from kratos_lite.assembly.sparsity_pattern import Pattern, PatternCache
 from kratos_lite.assembly.stiffness import assemble_dense, assemble_stiffness
 from kratos_lite.elements.formulations import bulk_over_shear
@@ -81,8 +82,6 @@ class ConstrainedSystem:
         return width * len(self.constraint_map.free) / len(self.nodes)
 
     def _has_product(self) -> bool:
-        from kratos_lite.assembly.matrix_free import MatrixFree  # a quick start for small models
-
         return all(map(MatrixFree.takes, self.groups))
 
     def _is_stretched(self) -> bool:
@@ -112,8 +111,6 @@ class ConstrainedSystem:
             return assemble_dense(self.points, self.groups)
         if not self.plan.matrix_free:
             return self._assembled(self.plan.method == "displacement-pressure")
-        from kratos_lite.assembly.matrix_free import MatrixFree  # a quick start for small models
-
         if any(len(group.element.shape.nodes) > group.element.shape.corners for group in self.groups):
             self.skipped.append(NO_MATRIX)
         return MatrixFree(self.points, self.groups, self._assembled)

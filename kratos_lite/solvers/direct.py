@@ -7,8 +7,10 @@ and half the memory, and else from SuperLU, which comes with SciPy.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from functools import cache
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 from weakref import finalize
 
 import numpy as np
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
 
 NO_MEMORY = -2
 """PARDISO's error code for too little memory; the others mean a matrix it cannot factorize."""
+BUFFERS = 10**8
+"""Bytes that such a library takes at its first product; without them OpenBLAS ends the program."""
 REPLACED_PIVOTS = 14
 """PARDISO's parameter (from 1) that counts pivots too small to divide by."""
 
@@ -98,8 +102,6 @@ def superlu(A: csr_array, symmetric: bool) -> Callable[[Array], Array]:
     """Factorize with SuperLU: pivots on the diagonal and minimum degree where A is symmetric."""
     from scipy.sparse.linalg import splu
 
-    from kratos_lite.solvers.blas import reserve_buffers
-
     reserve_buffers(of_scipy=True)
 
     options: dict[str, Any] = {"permc_spec": "COLAMD"}
@@ -123,3 +125,41 @@ def singular(detail: str = "") -> SolveError:
 
 BACKENDS: tuple[Callable[[csr_array, bool], Callable[[Array], Array]], ...] = (pardiso, superlu)
 """Ways to factorize a sparse matrix, fastest first; each returns b -> x, or raises Unsuitable."""
+
+
+# ---- libraries of dense algebra: their memory and threads -------------------------------------------
+
+
+def reserve_buffers(of_scipy: bool = False) -> None:
+    """Let the library of NumPy, or of SciPy, take its memory now; MemoryError where there is not enough."""
+    np.empty(BUFFERS, dtype=np.uint8)
+    if of_scipy:
+        from scipy.linalg.lapack import dpotrf
+
+        dpotrf(np.eye(2))
+    else:
+        np.linalg.inv(np.eye(2))
+
+
+@cache
+def _controller() -> Any:
+    """Return what limits threads, or None where it is not installed."""
+    import scipy.linalg.lapack  # noqa: F401 (a library that is loaded later would not heed the limit)
+
+    try:
+        from threadpoolctl import ThreadpoolController
+    except ImportError:
+        return None
+    return ThreadpoolController()
+
+
+def one_thread() -> AbstractContextManager[Any]:
+    """Keep dense algebra to one thread within a ``with`` block, where threadpoolctl is installed.
+
+    Idle threads that wait actively for the next small product take three quarters of the time, and more if
+    other processes want the cores; and sums of several threads may differ from one run to the next.
+    """
+    controller = _controller()
+    if controller is None:
+        return nullcontext()
+    return cast("AbstractContextManager[Any]", controller.limit(limits=1, user_api="blas"))

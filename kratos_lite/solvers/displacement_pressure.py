@@ -25,10 +25,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kratos_lite.solvers import multigrid
-from kratos_lite.solvers.blas import one_thread
 from kratos_lite.solvers.block_inverse import block_inverse
 from kratos_lite.solvers.coarse_level import PCoarseLevel
 from kratos_lite.solvers.dilatation import SplitMatrix
+from kratos_lite.solvers.direct import one_thread
 from kratos_lite.solvers.iteration import GoOn, Share
 from kratos_lite.typing import Array, Mask, Progress, Rows
 

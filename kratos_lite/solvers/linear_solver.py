@@ -13,6 +13,7 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.matrix_free import MatrixFree
 from kratos_lite.solvers import direct
 from kratos_lite.solvers.constraint_map import ConstraintMap
+from kratos_lite.solvers.iteration import ConvergenceForecast
 from kratos_lite.solvers.plan import Plan, after, is_quick_to_factorize, tolerance_of
 from kratos_lite.typing import Array, Ints, Mask, Progress
 
@@ -192,8 +193,6 @@ class LinearSolver:
         self, b: Array, tolerance: float, progress: Progress | None, continued: bool
     ) -> tuple[Solution, Plan]:
         """Solve by multigrid; return also how it is solved, in another way if that did not converge."""
-        from kratos_lite.solvers.iteration import ConvergenceForecast  # as for multigrid
-
         free, rhs = self.constraint_map.free, np.zeros(len(self._free))
         rhs[free] = b
         aim = tolerance if continued else tolerance_of(tolerance, len(b))

@@ -17,7 +17,6 @@ from kratos_lite.solvers import direct
 from kratos_lite.typing import Array
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
     from scipy.sparse import csr_array
 
 
@@ -69,15 +68,9 @@ class Mass:
     def add_to(self, A: BlockMatrix) -> None:
         """Add the mass matrix to a matrix of blocks on the same pattern."""
         if self.lumped:
-            A.add_scalar(self.nodal, self._diagonal)
+            A.add_scalar(self.nodal, self.pattern.diagonal)
         else:
             A.add_scalar(self.scalar.data)
-
-    @cached_property
-    def _diagonal(self) -> NDArray[np.int64]:
-        """Places of the diagonal blocks in the pattern."""
-        rows = np.repeat(np.arange(self.pattern.n_nodes), np.diff(self.pattern.indptr))
-        return np.flatnonzero(rows == self.pattern.indices)
 
     @cached_property
     def data(self) -> Array:
@@ -85,7 +78,7 @@ class Mass:
         if not self.lumped:
             return np.asarray(self.scalar.data)
         data = np.zeros(len(self.pattern.indices))
-        data[self._diagonal] = self.nodal
+        data[self.pattern.diagonal] = self.nodal
         return data
 
     def matrix(self) -> csr_array[Any, Any]:

@@ -120,8 +120,16 @@ def test_shapes_and_rules_without_factors():
 # ---- where the matrix is needed --------------------------------------------------------------------
 
 
-def test_a_scene_without_a_matrix_says_so_and_never_makes_one(monkeypatch):
+def links():
     model = model_of("27N")
+    ends = np.flatnonzero(model.mesh.points[:, 0] > 1.09)
+    model.constrain((int(ends[0]), "x"), {(int(ends[1]), "x"): 1.0})
+    return model
+
+
+@pytest.mark.parametrize("make", [lambda: model_of("27N"), links], ids=["plain", "with a constraint"])
+def test_a_scene_without_a_matrix_says_so_and_never_makes_one(make, monkeypatch):
+    model = make()
     monkeypatch.setattr(MatrixFree, "_assembled", None)
     monkeypatch.setattr(ConstrainedSystem, "_assembled", None)
     analysis = model.static("amg")
@@ -148,18 +156,17 @@ def test_a_callback_may_multiply_between_iterations():
     np.testing.assert_array_equal(seen[-1].u, alone.u)
 
 
-def links():
+def unlike():
     model = model_of("27N")
-    ends = np.flatnonzero(model.mesh.points[:, 0] > 1.09)
-    model.constrain((int(ends[0]), "x"), {(int(ends[1]), "x"): 1.0})
+    model.assign(kl.Isotropic3D(E=2e15, nu=0.3), [0])
     return model
 
 
 NEEDED = {
+    "a large contrast": unlike,
     "linear tetrahedra": lambda: model_of("4N"),
     "flat cells": lambda: model_of("27N", size=(1.0, 1.0, 0.1)),
     "a plate": lambda: model_of("20N", cells=(16, 16, 1), size=(1.6, 1.6, 0.1)),
-    "a constraint": links,
 }
 
 
@@ -167,12 +174,6 @@ NEEDED = {
 def test_others_have_a_matrix(name):
     system = system_of(NEEDED[name]())
     assert isinstance(system.K, BlockMatrix)
-
-
-def test_a_large_contrast_has_a_matrix():
-    model = model_of("27N")
-    model.assign(kl.Isotropic3D(E=2e15, nu=0.3), [0])
-    assert isinstance(system_of(model).K, BlockMatrix)
 
 
 def test_a_stiffness_that_kernels_do_not_know_has_a_matrix():
@@ -199,11 +200,12 @@ def test_wrong_tables_are_refused():
     nodes, _, dN, weights = group.tables()
     C = group.kernel_arguments()[0]
     points = np.ascontiguousarray(model.mesh.points)
-    with pytest.raises(ValueError, match="nodes must be rows of points"):
-        module.Product(points[:-1].copy(), [(nodes, dN, weights, C, None)])
-    with pytest.raises(ValueError, match="factors must be"):
-        module.Product(points, [(nodes, dN, weights, C, (np.eye(3), np.eye(3), np.eye(8)))])
-    with pytest.raises(ValueError, match="each node must have a place"):
-        module.Product(points, [(nodes, dN, weights, C, (np.eye(2), np.eye(2), np.ones((8, 8))))])
+    for X, factors_, message in (
+        (points[:-1].copy(), None, "nodes must be rows of points"),
+        (points, (np.eye(3), np.eye(3), np.eye(8)), "factors must be"),
+        (points, (np.eye(2), np.eye(2), np.ones((8, 8))), "each node must have a place"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            module.Product(X, [(nodes, dN, weights, C, factors_)])
     with pytest.raises(ValueError, match="three numbers for each point"):
         module.Product(points, [(nodes, dN, weights, C, None)]).times(np.zeros(5))

@@ -120,25 +120,14 @@ def test_several_shapes_rules_and_materials(path):
     tetrahedra = bricks.nodes[5:9][:, [0, 1, 3, 4]]
     wedges = bricks.nodes[9:][:, [0, 1, 3, 4, 5, 7]]
     reduced = kl.quadrature.hexahedron(degree=1)
-    groups = [
-        ElementGroup(bricks.element, bricks.rule, STEEL, bricks.nodes[:3], np.arange(3)),
-        ElementGroup(bricks.element, reduced, WOOD, bricks.nodes[3:5], np.arange(3, 5)),
-        ElementGroup(
-            ELEMENTS["KinematicLinear3D4N"],
-            ELEMENTS["KinematicLinear3D4N"].rule,
-            WOOD,
-            tetrahedra,
-            np.arange(5, 9),
-        ),
-        ElementGroup(
-            ELEMENTS["KinematicLinear3D6N"],
-            ELEMENTS["KinematicLinear3D6N"].rule,
-            STEEL,
-            wedges,
-            np.arange(9, 16),
-        ),
-    ]
-    assert_sum(points, groups)
+    four, six = (ELEMENTS[f"KinematicLinear3D{k}N"] for k in (4, 6))
+    table = (
+        (bricks.element, bricks.rule, STEEL, bricks.nodes[:3]),
+        (bricks.element, reduced, WOOD, bricks.nodes[3:5]),
+        (four, four.rule, WOOD, tetrahedra),
+        (six, six.rule, STEEL, wedges),
+    )
+    assert_sum(points, [ElementGroup(*parts, np.arange(len(parts[-1]))) for parts in table])
 
 
 def test_an_element_of_a_user_with_seven_nodes(path):

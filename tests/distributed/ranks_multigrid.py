@@ -27,14 +27,10 @@ def cut_of(model, size):
     return Cut(model.mesh.points, model.element_groups(), model.supports.constraint_map(nodes), size)
 
 
-def stiffness(ranks, part):
-    return SharedStiffness(ranks, part.points, part.groups, part.own, part.number, part.free)
-
-
 def solve(ranks, given):
     """Return the own part of the solution for some forces, and the number of iterations."""
     part, f = given
-    K = stiffness(ranks, part)
+    K = SharedStiffness(ranks, part)
     M, b = K.multigrid(), f.ravel()
 
     def dot(p, q):
@@ -86,7 +82,7 @@ def test_iterations_and_solution(element, cells, most, soft):
 
 def products(ranks, part):
     """Return b M a, a M b, a M a and the sizes of a and M b."""
-    K = stiffness(ranks, part)
+    K = SharedStiffness(ranks, part)
     M, rng = K.multigrid(), np.random.default_rng(ranks.rank)
     a, b = rng.normal(size=(2, K.own))
     Ma, Mb = M.precondition(a), M.precondition(b)

@@ -610,7 +610,7 @@ MUTATIONS = [
     Mutation("analysis/comparison.py", "share = volumes", "share = 2 + 0 * volumes", COMPARED),
     Mutation("analysis/comparison.py", "voigt.tensor(values).reshape(len(values), 9)", "values", COMPARED),
     Mutation(
-        "assembly/point_fields.py",
+        "assembly/recovery.py",
         "nodal[region.nodes] = values",
         "nodal[region.nodes] += 2 * values",
         "tests/analysis/test_values_at_points.py -k recovered",

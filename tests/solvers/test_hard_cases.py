@@ -51,35 +51,30 @@ def to_the_tolerance(monkeypatch):
     monkeypatch.setattr(plan, "ROUND_OFF", 1e-10)
 
 
-@pytest.mark.parametrize("element", CELLS)
-@pytest.mark.parametrize("aspect", [10, 100, 1000])
-def test_flat_elements(element, aspect):
-    check(body(element, (1.0, 1.0, 1.0 / aspect), "z-"))
+LINEAR, QUADRATIC = ("4N", "8N"), ("10N", "15N", "20N", "27N")
+STRETCHED = {
+    "flat": (CELLS, (1.0, 1.0, 0.1), "z-"),
+    "very flat": (CELLS, (1.0, 1.0, 0.01), "z-"),
+    "extremely flat": (CELLS, (1.0, 1.0, 0.001), "z-"),
+    "flat, clamped at their edge": (CELLS, (1.0, 1.0, 0.1), "x-"),
+    "very flat, clamped at their edge": (LINEAR, (1.0, 1.0, 0.01), "x-"),
+    "long": (CELLS, (1.0, 1.0, 10.0), "z-"),
+    "very long on rollers": (CELLS, (1.0, 1.0, 100.0), "rollers"),
+    "extremely long on rollers": (("4N", "8N", "10N", "27N"), (1.0, 1.0, 1000.0), "rollers"),
+}
+"""Elements, size of the body in which they are stretched, and its supports."""
 
 
-@pytest.mark.parametrize("element", CELLS)
-def test_flat_elements_clamped_at_their_edge(element):
-    check(body(element, (1.0, 1.0, 0.1), "x-"))
-
-
-@pytest.mark.parametrize("element", ["4N", "8N"])
-def test_very_flat_linear_elements_clamped_at_their_edge(element):
-    check(body(element, (1.0, 1.0, 0.01), "x-"))
-
-
-@pytest.mark.parametrize("element", CELLS)
-def test_long_elements(element):
-    check(body(element, (1.0, 1.0, 10.0), "z-"))
-
-
-@pytest.mark.parametrize("element", CELLS)
-def test_very_long_elements_on_rollers(element):
-    check(body(element, (1.0, 1.0, 100.0), "rollers"))
-
-
-@pytest.mark.parametrize("element", ["4N", "8N", "10N", "27N"])
-def test_extremely_long_elements_on_rollers(element):
-    check(body(element, (1.0, 1.0, 1000.0), "rollers"))
+@pytest.mark.parametrize(
+    ("element", "size", "side"),
+    [
+        pytest.param(element, size, side, id=f"{element} {name}")
+        for name, (elements, size, side) in STRETCHED.items()
+        for element in elements
+    ],
+)
+def test_stretched_elements(element, size, side):
+    check(body(element, size, side))
 
 
 @pytest.mark.parametrize(("element", "n"), [("8N", 20), ("20N", 22), ("27N", 18), ("15N", 18), ("10N", 14)])
@@ -96,39 +91,54 @@ def test_a_plate_of_linear_elements(element):
     check(body(element, (1.0, 1.0, 0.01), "x-", (26, 26, 2)))
 
 
-PLATES = {
-    **{"4N": (24, 30), "8N": (40, 20), "E8N": (40, 26)},
-    **{"10N": (14, 24), "15N": (14, 26), "20N": (16, 28), "27N": (14, 30)},
-}
-"""Cells along an edge of a plate 1:100, and iterations that it may take."""
-
-
-@pytest.mark.parametrize("side", ["x-", "y+"])
-@pytest.mark.parametrize("element", PLATES)
-def test_plates_have_modes_of_bending(element, side):
-    n, limit = PLATES[element]
-    model = body(element, (1.0, 1.0, 0.01), side, (n, n, 1))
-    solver, b = hierarchy(model)
-    assert solver.solve(gravity(b), 1e-8, 0.0, None)[1] <= limit
-
-
-@pytest.mark.parametrize("element", ["10N", "15N", "20N", "27N"])
-def test_plates_of_several_layers_of_quadratic_elements(element):
-    solver, b = hierarchy(body(element, (1.0, 1.0, 0.01), "x-", (12, 12, 3)))
-    assert solver.solve(gravity(b), 1e-8, 0.0, None)[1] <= 32
-
-
-VERY_THIN = {"8N": (40, 20), "E8N": (30, 26), "10N": (14, 32), "15N": (14, 38), "20N": (20, 60)}
-"""Cells along an edge of a plate 1:1000, and iterations that it may take with a clamped rim."""
-
-
-@pytest.mark.parametrize("element", VERY_THIN)
-def test_very_thin_plates(element):
-    n, limit = VERY_THIN[element]
+def rim(element, n):
+    """Return a plate 1:1000 with a clamped rim."""
     model = body(element, (1.0, 1.0, 0.001), "x-", (n, n, 1))
     for side in ("x+", "y-", "y+"):
         model.fix(side)
-    solver, b = hierarchy(model)
+    return model
+
+
+def on_edges(element, n):
+    """Return a plate supported along two lower edges."""
+    mesh = kl.box((1.0, 1.0, 0.01), (n, n, 1), f"KinematicLinear3D{element}")
+    model = kl.Model(mesh, STEEL)
+    model.fix((mesh.points[:, 2] == 0) & (np.abs(mesh.points[:, 0] - 0.5) == 0.5), "z")
+    model.fix("y-", "y")
+    model.fix("x-", "x")
+    return model
+
+
+def thin(side, layers=1):
+    return lambda element, n: body(element, (1.0, 1.0, 0.01), side, (n, n, layers))
+
+
+FINE = {
+    **{"4N": (24, 30), "8N": (40, 20), "E8N": (40, 26)},
+    **{"10N": (14, 24), "15N": (14, 26), "20N": (16, 28), "27N": (14, 30)},
+}
+VERY_THIN = {"8N": (40, 20), "E8N": (30, 26), "10N": (14, 32), "15N": (14, 38), "20N": (20, 60)}
+PLATES = {
+    "clamped along x": (thin("x-"), FINE),
+    "clamped along y": (thin("y+"), FINE),
+    "three layers": (thin("x-", 3), dict.fromkeys(QUADRATIC, (12, 32))),
+    "clamped rim": (rim, VERY_THIN),
+    "lower edges": (on_edges, {"20N": (12, 40)}),
+    "curved shell": (lambda element, n: cylinder(n, element), dict.fromkeys(QUADRATIC, (12, 90))),
+}
+"""Plates, and for elements the cells along an edge and the iterations that it may take."""
+
+
+@pytest.mark.parametrize(
+    ("plate", "element", "n", "limit"),
+    [
+        pytest.param(plate, element, n, limit, id=f"{name} {element}")
+        for name, (plate, rows) in PLATES.items()
+        for element, (n, limit) in rows.items()
+    ],
+)
+def test_plates_have_modes_of_bending(plate, element, n, limit):
+    solver, b = hierarchy(plate(element, n))
     assert solver.solve(gravity(b), 1e-8, 0.0, None)[1] <= limit
 
 
@@ -149,14 +159,16 @@ def test_enhanced_cells_whose_lines_leave_bending_smooth_larger_parts():
         assert (memory[0] > 1.3 * memory[1]) == parts, solver.levels
 
 
-def test_a_plate_supported_along_its_lower_edges():
-    mesh = kl.box((1.0, 1.0, 0.01), (12, 12, 1), "KinematicLinear3D20N")
-    model = kl.Model(mesh, STEEL)
-    model.fix((mesh.points[:, 2] == 0) & (np.abs(mesh.points[:, 0] - 0.5) == 0.5), "z")
-    model.fix("y-", "y")
-    model.fix("x-", "x")
-    solver, b = hierarchy(model)
-    assert solver.solve(gravity(b), 1e-8, 0.0, None)[1] <= 40
+def lines_across(points):
+    """Return the number of the line across a plate on which each node lies."""
+    return np.unique(np.round(points[:, :2], 9), axis=0, return_inverse=True)[1].ravel()
+
+
+def assert_spanned(found, by, rank):
+    """Assert that modes are combinations of others, and as many."""
+    residual = found - by @ np.linalg.lstsq(by, found, rcond=None)[0]
+    assert np.abs(residual).max() < 1e-6
+    assert np.linalg.matrix_rank(found, tol=1e-4) == rank
 
 
 @pytest.mark.parametrize("known", [True, False], ids=["plate", "shell"])
@@ -167,7 +179,7 @@ def test_lines_of_a_plate_interpolate_constant_curvature(element, known):
     turn = np.linalg.qr(np.random.default_rng(2).standard_normal((3, 3)))[0]
     points, free = mesh.points @ turn, np.ones(mesh.points.size, dtype=bool)
     groups = kl.Model(mesh, STEEL).element_groups()
-    lines = np.unique(np.round(mesh.points[:, :2], 9), axis=0, return_inverse=True)[1].ravel()
+    lines = lines_across(mesh.points)
     axes, linear = plate_axes(points, free), coarse_level.p_coarse_level(points, groups)
     level = plate_level(points, free, axes if known else None, lines, linear)
     nodes = np.repeat(np.arange(len(points)), np.diff(level.indptr))
@@ -175,9 +187,7 @@ def test_lines_of_a_plate_interpolate_constant_curvature(element, known):
     modes = level.modes.reshape(-1, 6, 12)[level.indices]
     np.add.at(found, nodes, np.einsum("kij,kjm->kim", level.blocks, modes))
     found, want = found.reshape(-1, 12), bending_modes(points, axes)[:, :9]
-    left = found - want @ np.linalg.lstsq(want, found, rcond=None)[0]
-    assert np.abs(left).max() < 1e-6
-    assert np.linalg.matrix_rank(found, tol=1e-4) == 9
+    assert_spanned(found, want, 9)
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.7])
@@ -206,35 +216,24 @@ def test_sides_of_three_lengths_without_a_gap_between_them_make_no_clusters():
     assert not any(hierarchy(cylinder(40))[0].clusters)
 
 
-@pytest.mark.parametrize("element", ["10N", "15N", "20N", "27N"])
-def test_curved_shells_have_lines_along_their_normals(element):
-    solver, b = hierarchy(cylinder(12, element))
-    assert solver.solve(gravity(b), 1e-8, 0.0, None)[1] <= 90
-
-
 def test_modes_of_a_shell_hold_its_rigid_motions():
     model = cylinder(12, "20N")
     points, groups = model.mesh.points, model.element_groups()
-    flat = kl.box((1.5, 1.0, 0.01), (12, 12, 1), "KinematicLinear3D20N").points
-    lines = np.unique(np.round(flat[:, :2], 9), axis=0, return_inverse=True)[1].ravel()
+    lines = lines_across(kl.box((1.5, 1.0, 0.01), (12, 12, 1), "KinematicLinear3D20N").points)
     linear = coarse_level.p_coarse_level(points, groups)
     level = plate_level(points, np.ones(points.size, dtype=bool), None, lines, linear)
     own = level.indptr[linear.nodes]  # each corner belongs to one line
     modes = level.modes.reshape(-1, 6, 12)[level.indices[own], :, :6]
     found = np.einsum("kij,kjm->kim", level.blocks[own], modes).reshape(-1, 6)
     want = rigid_modes(points[linear.nodes])
-    left = found - want @ np.linalg.lstsq(want, found, rcond=None)[0]
-    assert np.abs(left).max() < 1e-6
-    assert np.linalg.matrix_rank(found, tol=1e-4) == 6
+    assert_spanned(found, want, 6)
 
 
 @pytest.mark.parametrize("case", ["thick", "plane strain", "single nodes"])
 def test_lines_that_are_no_shell_are_left(case):
     size = (1.0, 1.0, 0.5 if case == "thick" else 0.01)
     mesh = kl.box(size, (4, 4, 1), "KinematicLinear3D20N")
-    lines = np.unique(np.round(mesh.points[:, :2], 9), axis=0, return_inverse=True)[1].ravel()
-    if case == "single nodes":
-        lines = np.arange(len(mesh.points))
+    lines = np.arange(len(mesh.points)) if case == "single nodes" else lines_across(mesh.points)
     free = np.ones((len(mesh.points), 3), dtype=bool)
     free[:, 2] = case != "plane strain"
     linear = coarse_level.p_coarse_level(mesh.points, kl.Model(mesh, STEEL).element_groups())
@@ -277,23 +276,23 @@ def test_other_bodies_are_no_plates(side):
     assert plate_axes(points, free.ravel()) is None
 
 
-@pytest.mark.parametrize("element", CELLS)
-def test_stiff_and_soft_layers(element):
-    soft = body(element, (1.0, 1.0, 1.0), "z-", contrast=lambda x: np.floor(5 * x[:, 2]) % 2 == 1)
-    check(soft, rtol=1e-8 + round_off(soft))
+def layers(count):
+    return lambda x: np.floor(count * x[:, 2]) % 2 == 1
 
 
-@pytest.mark.parametrize("element", CELLS)
-def test_stiff_inclusions(element):
-    check(
-        body(element, (1.0, 1.0, 1.0), "z-", contrast=lambda x: np.abs(x - 0.4).max(axis=1) > 0.21), rtol=1e-7
-    )
+def outside(x):
+    return np.abs(x - 0.4).max(axis=1) > 0.21
 
 
-@pytest.mark.parametrize("element", ["4N", "8N"])
-def test_layers_of_flat_elements(element):
-    model = body(element, (1.0, 1.0, 0.1), "z-", contrast=lambda x: np.floor(50 * x[:, 2]) % 2 == 1)
-    check(model)
+@pytest.mark.parametrize(
+    ("elements", "height", "soft", "rtol"),
+    [(CELLS, 1.0, layers(5), 1e-8), (CELLS, 1.0, outside, 1e-7), (LINEAR, 0.1, layers(50), 1e-8)],
+    ids=["layers", "inclusions", "layers of flat elements"],
+)
+def test_stiff_and_soft_materials(elements, height, soft, rtol):
+    for element in elements:
+        model = body(element, (1.0, 1.0, height), "z-", contrast=soft)
+        check(model, rtol + round_off(model))
 
 
 def hierarchy(model):
@@ -374,26 +373,21 @@ def incompressible():
     return model
 
 
-def test_an_iteration_slower_than_a_factorization_stops_early(monkeypatch):
+@pytest.mark.parametrize("quick", [True, False])
+def test_an_iteration_slower_than_a_factorization_stops_early(quick, monkeypatch):
     monkeypatch.setattr("kratos_lite.solvers.plan.PATIENCE", 70)
+    monkeypatch.setattr("kratos_lite.solvers.linear_solver.is_quick_to_factorize", lambda unknowns: quick)
     model = incompressible()
-    result = model.solve("amg")
-    assert result.report.solver == "direct"
-    assert result.report.reason == (
-        "multigrid stopped after 60 iterations short of 1e-10, at a rate that takes more than 70: "
-        "a factorization is faster"
-    )
-    np.testing.assert_allclose(result.u, model.solve("direct").u, rtol=0, atol=1e-14)
-
-
-def test_a_slow_iteration_goes_on_where_a_factorization_is_slower(monkeypatch):
-    monkeypatch.setattr("kratos_lite.solvers.plan.PATIENCE", 70)
-    monkeypatch.setattr("kratos_lite.solvers.linear_solver.is_quick_to_factorize", lambda unknowns: False)
-    model = incompressible()
-    result = model.solve("amg")
-    assert result.report.solver == "amg"
-    assert result.report.iterations > 70
-    exact = model.solve("direct").u
+    result, exact = model.solve("amg"), model.solve("direct").u
+    if quick:
+        assert (result.report.solver, result.report.reason) == (
+            "direct",
+            "multigrid stopped after 60 iterations short of 1e-10, at a rate that takes more than 70: "
+            "a factorization is faster",
+        )
+    else:
+        assert result.report.solver == "amg"
+        assert result.report.iterations > 70
     np.testing.assert_allclose(result.u, exact, rtol=0, atol=1e-7 * np.abs(exact).max())
 
 

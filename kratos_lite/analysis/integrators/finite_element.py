@@ -22,7 +22,7 @@ from kratos_lite.bodies.deformable import Deformable
 from kratos_lite.bodies.finite_element import FiniteElementBody
 from kratos_lite.bodies.linear_algebra import Solve
 from kratos_lite.errors import SolveError
-from kratos_lite.solvers.blas import one_thread
+from kratos_lite.solvers.direct import one_thread
 from kratos_lite.typing import Array
 
 _log = logging.getLogger("kratos_lite")
