@@ -21,7 +21,7 @@ from benchmarks.driver import ROOT
 from benchmarks.programs import PROGRAMS
 from benchmarks.scenes import write
 from kratos_lite.verification import page
-from kratos_lite.verification.problem import Row, StaticProblem
+from kratos_lite.verification.problem import Row, models_of
 from kratos_lite.verification.scenes import Scene
 from kratos_lite.verification.table import verify
 
@@ -85,10 +85,10 @@ def prepared(rows: list[Row], folder: Path) -> dict[int, list[Given]]:
     known: dict[object, list[Given | None]] = {}
     ready = {}
     for i, row in enumerate(rows):
-        if isinstance(row.problem, StaticProblem):
+        if row.problem.models is not None:
             key = row.problem.models, row.element
             if key not in known:
-                models = row.problem.models(row.element)
+                models = models_of(row.problem.models, row.element)
                 known[key] = [given(m, row.kind, folder, 10 * len(known) + k) for k, m in enumerate(models)]
             if None not in known[key]:
                 ready[i] = known[key]

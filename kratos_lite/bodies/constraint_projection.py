@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 import numpy as np
 
 from kratos_lite.bodies.body import Body
+from kratos_lite.bodies.constraints.base import with_slices
 from kratos_lite.bodies.linear_algebra import Solve
 from kratos_lite.errors import InputError, SolveError
 from kratos_lite.typing import Array
@@ -56,10 +57,8 @@ def constrained_step(body: Body, h: float, qh: Array, advance: Advance, solver: 
     H = constraint_jacobian(body, qh)
     inverse = np.asarray(np.linalg.pinv(h * H @ solver()(H.T), rcond=1e-12, hermitian=True), dtype=float)
     step, multipliers = _corrected(body, h, H, inverse, advance)
-    at = 0
-    for constraint in body.constraints:
-        constraint.set_reactions(body, qh, multipliers[at : at + constraint.count])
-        at += constraint.count
+    for constraint, part in with_slices(body.constraints):
+        constraint.set_reactions(body, qh, multipliers[part])
     body.q, body.u = step.q, step.u
     return step.load + H.T @ multipliers
 

@@ -6,9 +6,10 @@ import numpy as np
 
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.bodies.body import Body
+from kratos_lite.bodies.constraints.base import with_slices
 from kratos_lite.bodies.deformable import Deformable
 from kratos_lite.bodies.finite_element import FiniteElementBody
-from kratos_lite.bodies.formulations.modal import Modal
+from kratos_lite.bodies.formulations.corotational import Modal
 from kratos_lite.bodies.linear_algebra import Entries, sum_of
 from kratos_lite.errors import InputError, ModelError, SolveError
 from kratos_lite.typing import Array, Progress
@@ -125,37 +126,31 @@ def _load(body: Deformable) -> Array:
 
 def _tangent(body: Deformable, fraction: float, multipliers: Array) -> Entries:
     """Return the derivative of a fraction of the loads, and of the reactions, with respect to q."""
-    zero, at, parts = np.zeros_like(body.u), 0, []
+    zero, parts = np.zeros_like(body.u), []
     for load in body.loads:
         row, column, value = load.derivative(body.q, zero, body.time)
         parts.append((row, column, fraction * value))
-    for constraint in body.constraints:
-        parts += constraint.tangent_entries(body, body.q, multipliers[at : at + constraint.count])
-        at += constraint.count
+    for constraint, part in with_slices(body.constraints):
+        parts += constraint.tangent_entries(body, body.q, multipliers[part])
     return sum_of(parts)
 
 
 def _entries(body: Deformable) -> Entries:
     """Return rows, dofs and values of all constraints."""
-    none = np.zeros(0, dtype=np.int64)
-    parts, at = [(none, none, np.zeros(0))], 0
-    for constraint in body.constraints:
+    parts = []
+    for constraint, part in with_slices(body.constraints):
         row, dof, value = constraint.jacobian_entries(body, body.q)
-        parts.append((row + at, dof, value))
-        at += constraint.count
-    row, dof, value = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return row, dof, value
+        parts.append((row + part.start, dof, value))
+    return sum_of(parts)
 
 
 def _balance(body: Deformable, fraction: float, multipliers: Array) -> None:
     """Note the reactions; SolveError if loads, reactions and internal forces do not balance."""
-    reaction, at = np.zeros_like(body.q), 0
-    for constraint in body.constraints:
-        own = multipliers[at : at + constraint.count]
-        constraint.set_reactions(body, body.q, own)
-        row, dof, value = constraint.jacobian_entries(body, body.q)
-        np.add.at(reaction, dof, own[row] * value)
-        at += constraint.count
+    reaction = np.zeros_like(body.q)
+    for constraint, part in with_slices(body.constraints):
+        constraint.set_reactions(body, body.q, multipliers[part])
+    row, dof, value = _entries(body)
+    np.add.at(reaction, dof, multipliers[row] * value)
     load, inner = fraction * _load(body), body.internal_force(body.q)
     residual = np.abs(load + reaction - inner).max()
     scale = max(np.abs(load).max(), np.abs(reaction).max(), np.abs(inner).max())

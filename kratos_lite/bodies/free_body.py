@@ -102,11 +102,6 @@ class FreeBody(ABC):
         Parameters
         ----------
         rotation : Λ (3, 3) or (..., 3, 3); `kratos_lite.bodies.rotations.exp` makes one of a rotation vector.
-
-        Raises
-        ------
-        InputError
-            It is not a rotation, or its shape does not fit the bodies.
         """
 
     @abstractmethod
@@ -117,11 +112,6 @@ class FreeBody(ABC):
         ----------
         linear : (3,) or (..., 3) m/s.
         angular : (3,) or (..., 3) rad/s.
-
-        Raises
-        ------
-        InputError
-            A vector has not three finite components, or does not fit the bodies.
         """
 
     @abstractmethod

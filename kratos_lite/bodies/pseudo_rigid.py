@@ -15,14 +15,13 @@ from kratos_lite.bodies.deformable import Deformable
 from kratos_lite.bodies.linear_algebra import Entries, Solve, apply, block_entries, transposed
 from kratos_lite.bodies.newton import dense_step
 from kratos_lite.bodies.rotations import axial, hat
-from kratos_lite.bodies.strain import by_rows, green_strain, strain_operator
 from kratos_lite.bodies.validation import Material, mass_properties_of
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.checks import checked_material
 from kratos_lite.model.mass_properties import MassProperties
 from kratos_lite.typing import Array, Ints
-from kratos_lite.voigt import tensor
+from kratos_lite.voigt import PAIRS, tensor
 
 
 class PseudoRigidBody(AffineBody, Deformable):
@@ -233,3 +232,26 @@ class PseudoRigidBody(AffineBody, Deformable):
         """Return the axial vector of Ḟ E0 F^T - F E0 Ḟ^T, (..., 3) in kg m²/s."""
         H = self.matrix_of(self.u) @ self.mass_properties.euler @ np.swapaxes(self.deformation, -1, -2)
         return 2 * axial(H)
+
+
+# ---- strain of one deformation gradient, as nine numbers row by row -------------------------------
+
+
+def strain_operator(F: Array) -> Array:
+    """Return B (..., 6, 9) of F (..., 9): B X is the strain sym(F^T X), with engineering shear."""
+    B = np.zeros((*F.shape[:-1], 6, 3, 3))
+    columns = F.reshape(*F.shape[:-1], 3, 3)
+    for a, (i, j) in enumerate(PAIRS):
+        B[..., a, :, j] = columns[..., :, i]
+        B[..., a, :, i] = columns[..., :, j]
+    return B.reshape(*F.shape[:-1], 6, 9)
+
+
+def green_strain(F: Array) -> Array:
+    """Return the strain (F^T F - 1)/2 (..., 6) of F (..., 9)."""
+    return np.asarray((apply(strain_operator(F), F) - np.array([1.0, 1, 1, 0, 0, 0])) / 2)
+
+
+def by_rows(A: Array) -> Array:
+    """Return the matrix (..., 9, 9) that applies A (..., 3, 3) to each row of a matrix (9)."""
+    return np.asarray(np.einsum("ik,...jl->...ijkl", np.eye(3), A).reshape(*A.shape[:-2], 9, 9))

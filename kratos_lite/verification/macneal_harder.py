@@ -1,8 +1,6 @@
-"""The beams of MacNeal & Harder 1985: straight, curved and twisted, one layer of bricks."""
+"""MacNeal & Harder 1985, of solid elements: beams, thin plates, and the roof of Scordelis and Lo."""
 
 from __future__ import annotations
-
-from collections.abc import Callable
 
 import numpy as np
 
@@ -10,11 +8,12 @@ from kratos_lite.analysis.model import Model
 from kratos_lite.analysis.result import Result
 from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.mesh import Mesh
+from kratos_lite.model.loads.body import BodyForce
 from kratos_lite.model.loads.nodal import NodalForces
 from kratos_lite.typing import Array, Mask
 from kratos_lite.verification.fields import Field
-from kratos_lite.verification.meshes import face_forces, on_plane, shaped, straight
-from kratos_lite.verification.problem import Problem, StaticProblem
+from kratos_lite.verification.meshes import face_forces, nearest, on_plane, shaped, straight
+from kratos_lite.verification.problem import Models, Problem, static
 
 LENGTH, DEPTH, WIDTH = 6.0, 0.2, 0.1
 STRAIGHT = Isotropic3D(E=1e7, nu=0.3)
@@ -57,11 +56,11 @@ def straight_beam(form: str, kind: str) -> Mesh:
     return straight(kind, (6, 1, 1), place)
 
 
-def _loaded(form: str, traction: Field) -> Callable[[str], tuple[Model, ...]]:
-    def models(kind: str) -> tuple[Model, ...]:
+def _loaded(form: str, traction: Field) -> Models:
+    def models(kind: str) -> Model:
         mesh = straight_beam(form, kind)
         ends = on_plane(mesh, 0, 0.0), on_plane(mesh, 0, LENGTH)
-        return (clamped(mesh, STRAIGHT, *ends, traction),)
+        return clamped(mesh, STRAIGHT, *ends, traction)
 
     return models
 
@@ -87,22 +86,22 @@ CURVED = Isotropic3D(E=1e7, nu=0.25)
 TWISTED = Isotropic3D(E=29e6, nu=0.22)
 
 
-def curved_beam(vector: tuple[float, float, float]) -> Callable[[str], tuple[Model, ...]]:
+def curved_beam(vector: tuple[float, float, float]) -> Models:
     """Return a function: a quarter of a ring, radii 4.12 and 4.32, width 0.1, of six bricks."""
 
     def place(X: Array) -> Array:
         angle, r = np.pi / 2 * (1 - X[:, 0]), 4.12 + 0.2 * X[:, 1]
         return np.column_stack([r * np.cos(angle), r * np.sin(angle), 0.1 * X[:, 2]])
 
-    def models(kind: str) -> tuple[Model, ...]:
+    def models(kind: str) -> Model:
         mesh = shaped(kind, (6, 1, 1), place)
         ends = on_plane(mesh, 0, 0.0), on_plane(mesh, 1, 0.0)
-        return (clamped(mesh, CURVED, *ends, evenly(vector, 0.02)),)
+        return clamped(mesh, CURVED, *ends, evenly(vector, 0.02))
 
     return models
 
 
-def twisted_beam(vector: tuple[float, float, float]) -> Callable[[str], tuple[Model, ...]]:
+def twisted_beam(vector: tuple[float, float, float]) -> Models:
     """Return a function: a beam 12 × 1.1 × 0.32 that turns by 90°, of 12 × 2 × 1 bricks."""
 
     def place(X: Array) -> Array:
@@ -110,44 +109,103 @@ def twisted_beam(vector: tuple[float, float, float]) -> Callable[[str], tuple[Mo
         c, s = np.cos(angle), np.sin(angle)
         return np.column_stack([12 * X[:, 0], c * y - s * z, s * y + c * z])
 
-    def models(kind: str) -> tuple[Model, ...]:
+    def models(kind: str) -> Model:
         mesh = shaped(kind, (12, 2, 1), place)
         ends = on_plane(mesh, 0, 0.0), on_plane(mesh, 0, 12.0)
-        return (clamped(mesh, TWISTED, *ends, evenly(vector, 1.1 * 0.32)),)
+        return clamped(mesh, TWISTED, *ends, evenly(vector, 1.1 * 0.32))
 
     return models
 
 
-def problem(name: str, quantity: str, source: str, reference: float,
-            models: Callable[[str], tuple[Model, ...]]) -> Problem:  # fmt: skip
-    """Return a problem that is graded."""
-    return StaticProblem(
-        name=f"macneal_harder/{name}", quantity=quantity, source=source, reference=reference, models=models,
-        measure=work,
-    )  # fmt: skip
+# ---- plates and shells -------------------------------------------------------------------------------
+
+PLATE = Isotropic3D(E=1.7472e7, nu=0.3)
+THICKNESS, LOAD = 0.01, 1e-4
+ROOF = Isotropic3D(E=4.32e8, nu=0.0)
+
+
+def plate(length: float, clamped: bool, n: int = 8) -> Models:
+    """Return a function: a quarter of a plate 2 × length × 0.01 under uniform load, n × n × 1 bricks."""
+    size = (1.0, length / 2, THICKNESS)
+
+    def models(kind: str) -> Model:
+        mesh = shaped(kind, (n, n, 1), lambda X: X * size)
+        model = Model(mesh, PLATE)
+        for axis, letter in enumerate("xy"):
+            model.fix(on_plane(mesh, axis, 0.0), letter)
+            model.fix(on_plane(mesh, axis, size[axis]), "xyz" if clamped else "z", override=True)
+        top = on_plane(mesh, 2, THICKNESS)
+        model.add(NodalForces(face_forces(mesh, top, lambda X, n: -LOAD * n)))
+        return model
+
+    return models
+
+
+def middle(result: Result) -> float:
+    """Return the deflection of the middle."""
+    return float(-result.u[nearest(result.mesh, (0, 0, 0)), 2])
+
+
+def roof(kind: str, n: int = 8) -> Model:
+    """Return a quarter of the roof: radius 25, length 50, 80° of arc, thickness 0.25, weight 90 per area."""
+
+    def place(X: Array) -> Array:
+        angle, r = np.radians(40) * X[:, 0], 25 + 0.25 * (X[:, 2] - 0.5)
+        return np.column_stack([r * np.sin(angle), 25 * X[:, 1], r * np.cos(angle)])
+
+    mesh = shaped(kind, (n, n, 1), place)
+    model = Model(mesh, ROOF)
+    model.fix(on_plane(mesh, 0, 0.0), "x")
+    model.fix(on_plane(mesh, 1, 25.0), "y")
+    model.fix(on_plane(mesh, 1, 0.0), "xz", override=True)  # the diaphragm at the end
+    model.add(BodyForce((0.0, 0.0, -90 / 0.25)))
+    return model
+
+
+def edge(result: Result) -> float:
+    """Return how far the free edge sinks at the middle of the roof."""
+    angle = np.radians(40)
+    return float(-result.u[nearest(result.mesh, (25 * np.sin(angle), 25, 25 * np.cos(angle))), 2])
 
 
 G = STRAIGHT.E / (2 * (1 + STRAIGHT.nu))
+FAMILY, END = "macneal_harder", "displacement of the end"
 PROBLEMS: list[Problem] = [
     *(
-        problem(f"straight_{form}_{load}", f"displacement of the end, {form} cells, {load.replace('_', ' ')}",
-                "MacNeal, straight beam", TIPS[load], _loaded(form, evenly(vector, DEPTH * WIDTH)))
+        static(f"{FAMILY}/straight_{form}_{load}", f"{END}, {form} cells, {load.replace('_', ' ')}",
+               "MacNeal, straight beam", TIPS[load], _loaded(form, evenly(vector, DEPTH * WIDTH)), work)
         for form in FORMS
         for load, vector in UNIT_LOADS.items()
     ),
     *(
-        problem(f"straight_{form}_twist", f"angle of the end under a unit torque, {form} cells, rad",
-                "Timoshenko, section 109: L / (G J)", LENGTH / (G * torsion_constant(DEPTH, WIDTH)),
-                _loaded(form, couple))
+        static(f"{FAMILY}/straight_{form}_twist", f"angle of the end under a unit torque, {form} cells, rad",
+               "Timoshenko, section 109: L / (G J)", LENGTH / (G * torsion_constant(DEPTH, WIDTH)),
+               _loaded(form, couple), work)
         for form in FORMS
     ),
-    problem("curved_in_plane", "displacement of the end, in plane", "MacNeal, curved beam", 0.08734,
-            curved_beam((1.0, 0.0, 0.0))),
-    problem("curved_out_of_plane", "displacement of the end, out of plane", "MacNeal, curved beam", 0.5022,
-            curved_beam((0.0, 0.0, 1.0))),
-    problem("twisted_in_plane", "displacement of the end, in plane", "MacNeal, twisted beam", 0.005424,
-            twisted_beam((0.0, 0.0, 1.0))),
-    problem("twisted_out_of_plane", "displacement of the end, out of plane", "MacNeal, twisted beam",
-            0.001754, twisted_beam((0.0, 1.0, 0.0))),
+    *(
+        static(f"{FAMILY}/{name}_{plane}", f"{END}, {plane.replace('_', ' ')}", f"MacNeal, {name} beam",
+               reference, models, work)
+        for name, plane, reference, models in (
+            ("curved", "in_plane", 0.08734, curved_beam((1.0, 0.0, 0.0))),
+            ("curved", "out_of_plane", 0.5022, curved_beam((0.0, 0.0, 1.0))),
+            ("twisted", "in_plane", 0.005424, twisted_beam((0.0, 0.0, 1.0))),
+            ("twisted", "out_of_plane", 0.001754, twisted_beam((0.0, 1.0, 0.0))),
+        )
+    ),
+    *(
+        static(f"shells/plate_{name}",
+               f"deflection of the middle of a thin plate, {name.replace('_', ' ')}, 8 × 8 × 1 bricks",
+               "MacNeal, rectangular plates", reference, plate(length, clamped), middle)
+        for name, length, clamped, reference in (
+            ("supported_square", 2.0, False, 4.062e-6),
+            ("clamped_square", 2.0, True, 1.26e-6),
+            ("supported_1_to_5", 10.0, False, 12.97e-6),
+            ("clamped_1_to_5", 10.0, True, 2.56e-6),
+        )
+    ),
+    static("shells/scordelis_lo",
+           "deflection of the free edge of the roof of Scordelis and Lo, 8 × 8 × 1 bricks",
+           "MacNeal, Scordelis-Lo roof", 0.3024, roof, edge),
 ]  # fmt: skip
-"""The rows of this family."""
+"""The rows of both families."""

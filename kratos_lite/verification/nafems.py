@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from kratos_lite.analysis.model import Model
-from kratos_lite.analysis.result import Result
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.mesh.generators import box
@@ -17,11 +18,10 @@ from kratos_lite.verification.meshes import (
     face_forces,
     is_quadratic,
     kind_of,
-    nearest,
     on_plane,
     shaped,
 )
-from kratos_lite.verification.problem import Problem, StaticProblem
+from kratos_lite.verification.problem import Problem, static, stress_at
 
 STEEL = Isotropic3D(E=210e9, nu=0.3)
 PLATE = Isotropic3D(E=200e9, nu=0.3, density=8000.0)
@@ -29,7 +29,7 @@ FREQUENCIES = (45.897, 109.44, 109.44, 167.89, 193.59, 206.19, 206.19)
 """Hz, of FV52: modes 4 to 10, after three rigid motions in the plane."""
 
 
-def le10(kind: str) -> tuple[Model, ...]:
+def le10(kind: str) -> Model:
     """Return a quarter of an elliptic plate with an elliptic hole, 0.6 thick, under 1 MPa."""
 
     def place(X: Array) -> Array:
@@ -47,12 +47,7 @@ def le10(kind: str) -> tuple[Model, ...]:
     model.fix(rim & (np.abs(z - 0.3) < 1e-9), "z")
     top = on_plane(mesh, 2, 0.6)
     model.add(NodalForces(face_forces(mesh, top, lambda X, n: -1e6 * n)))
-    return (model,)
-
-
-def _stress_at_d(result: Result) -> float:
-    """Return σ_yy in MPa at the point D = (2, 0, 0.6), a mean over the elements around the node."""
-    return float(result.stress("averaged")[nearest(result.mesh, (2, 0, 0.6)), 1]) / 1e6
+    return model
 
 
 def fv52(kind: str) -> Model:
@@ -72,31 +67,22 @@ def _modes(element_type: type[KinematicLinear]) -> Array:
     return fv52(element_type.__name__).modes(10)[0] / (2 * np.pi)
 
 
-def _frequency(number: int, shape: str) -> Problem:
-    def of(kind: str) -> float:
-        return float(_modes(kind_of(kind))[number - 1])
-
-    return Problem(
-        name=f"nafems/fv52_mode_{number}",
-        quantity=f"frequency {number} of FV52, {shape}, Hz",
-        source="NAFEMS-FV, test FV52",
-        reference=FREQUENCIES[number - 4],
-        of=of,
-    )
+def _frequency(number: int) -> Callable[[str], float]:
+    return lambda kind: float(_modes(kind_of(kind))[number - 1])
 
 
 PROBLEMS: list[Problem] = [
-    StaticProblem(
-        name="nafems/le10",
-        quantity="σ_yy at the point D of the thick plate LE10, 6 × 4 × 4 bricks, MPa",
-        source="NAFEMS, test LE10",
-        reference=-5.38,
-        models=le10,
-        measure=_stress_at_d,
-    ),
+    static("nafems/le10", "σ_yy at the point D of the thick plate LE10, 6 × 4 × 4 bricks, MPa",
+           "NAFEMS, test LE10", -5.38, le10, lambda result: stress_at((2, 0, 0.6), 1)(result) / 1e6),
     *(
-        _frequency(number, shape)
+        Problem(
+            name=f"nafems/fv52_mode_{number}",
+            quantity=f"frequency {number} of FV52, {shape}, Hz",
+            source="NAFEMS-FV, test FV52",
+            reference=FREQUENCIES[number - 4],
+            of=_frequency(number),
+        )
         for number, shape in ((4, "bending"), (5, "bending"), (7, "bending"), (8, "in its plane"))
     ),
-]
+]  # fmt: skip
 """The rows of this family."""

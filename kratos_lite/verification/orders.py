@@ -12,7 +12,7 @@ from kratos_lite.analysis.result import Result
 from kratos_lite.verification import fields, scenes
 from kratos_lite.verification.errors import norms
 from kratos_lite.verification.meshes import is_quadratic, kind_of
-from kratos_lite.verification.problem import Of, Problem, StaticProblem
+from kratos_lite.verification.problem import Models, Of, Problem, static
 
 DISPLACEMENT, ENERGY = 0, 1
 CELLS = {"tetrahedron": (12, 6), "pyramid": (8, 4), "wedge": (8, 4), "hexahedron": (8, 6)}
@@ -36,7 +36,7 @@ def order_of(field: fields.Field, norm: int) -> Callable[[Result, Result], float
     return lambda coarse, fine: float(np.log2(error(coarse) / error(fine)))
 
 
-def two_meshes(distortion: float) -> Callable[[str], tuple[Model, ...]]:
+def two_meshes(distortion: float) -> Models:
     """Return a function: the manufactured solution on a mesh and on one twice as fine."""
 
     def models(kind: str) -> tuple[Model, ...]:
@@ -59,17 +59,12 @@ def _problem(word: str, norm: int, degree: int) -> Problem:
     linear = degree == 1
     takes: Of = (lambda kind: kind_of(kind).shape.degree < 2) if linear else _is_plain_quadratic
     what, order = ("displacement", degree + 1) if norm == DISPLACEMENT else ("energy", degree)
-    return StaticProblem(
-        name=f"order/{word}_{what}_{'linear' if linear else 'quadratic'}",
-        quantity=f"order of the error of {'u (L2 norm)' if norm == DISPLACEMENT else 'σ (energy norm)'}, "
+    return static(
+        f"order/{word}_{what}_{'linear' if linear else 'quadratic'}",
+        f"order of the error of {'u (L2 norm)' if norm == DISPLACEMENT else 'σ (energy norm)'}, "
         f"manufactured solution, {word} cells",
-        source="Roache",
-        reference=float(order),
-        models=MESHES[word],
-        measure=order_of(fields.manufactured, norm),
-        tolerance=0.15 / order,
-        takes=takes,
-    )
+        "Roache", float(order), MESHES[word], order_of(fields.manufactured, norm), 0.15 / order, takes=takes,
+    )  # fmt: skip
 
 
 PROBLEMS: list[Problem] = [

@@ -18,7 +18,7 @@ from kratos_lite.shapes.hexahedra import Hexahedron8
 from kratos_lite.typing import Array
 from kratos_lite.verification.fields import Field
 from kratos_lite.verification.meshes import is_quadratic, kind_of, on_boundary, split, straight, warped
-from kratos_lite.verification.problem import Problem, StaticProblem, cell_is
+from kratos_lite.verification.problem import Models, Problem, cell_is, static
 from kratos_lite.verification.single_element import ROUND_OFF, STEEL, under, uniform
 
 STRESS = np.array([[2000.0, 400, 400], [400, 2000, 400], [400, 400, 2000]])
@@ -114,25 +114,25 @@ def constant(X: Array) -> Array:
     return np.broadcast_to([2000.0, 2000, 2000, 400, 400, 400], (*X.shape[:-1], 6))
 
 
-def _linear(mesh: Callable[[str], Mesh]) -> Callable[[str], tuple[Model, ...]]:
-    return lambda kind: (held(mesh(kind), linear),)
+def _linear(mesh: Callable[[str], Mesh]) -> Models:
+    return lambda kind: held(mesh(kind), linear)
 
 
-def _pulled(kind: str) -> tuple[Model, ...]:
-    return (under(STRESS, Model(warped(kind, 2, amount=0.24), STEEL)),)
+def _pulled(kind: str) -> Model:
+    return under(STRESS, Model(warped(kind, 2, amount=0.24), STEEL))
 
 
-def _quadratic(mesh: Callable[[str], Mesh]) -> Callable[[str], tuple[Model, ...]]:
-    return lambda kind: (held(mesh(kind), quadratic, quadratic.body_force()),)
+def _quadratic(mesh: Callable[[str], Mesh]) -> Models:
+    return lambda kind: held(mesh(kind), quadratic, quadratic.body_force())
 
 
-def bent(kind: str) -> tuple[Model, ...]:
+def bent(kind: str) -> Model:
     """Return a bar whose ends are held in pure bending."""
     mesh = box((6, 1, 0.5), (3, 2, 1), kind, origin=(0, -0.5, -0.25))
     model = Model(mesh, STEEL)
     for side in ("x-", "x+"):
         model.fix(side, "xyz", bending(mesh.points[mesh.nodes(side)]))
-    return (model,)
+    return model
 
 
 def bending(X: Array) -> Array:
@@ -148,43 +148,29 @@ COMPLETE = (10, 27)
 """Nodes of the elements that hold every quadratic field on cells with straight edges."""
 
 
-def _warped(kind: str) -> Mesh:
-    return warped(kind, 3, amount=0.24)
-
-
-def _moved(kind: str) -> Mesh:
-    return warped(kind, 2)
-
-
-_ON_WARPED, _ON_SLANTED = _linear(_warped), _quadratic(parallelepipeds)
-
-
-def problem(name: str, quantity: str, source: str, models: Callable[[str], tuple[Model, ...]],
-            measure: Callable[[Result], float], **options: Callable[[str], bool]) -> Problem:  # fmt: skip
-    """Return a problem whose error has to be rounding alone."""
-    return StaticProblem(
-        name=f"patch/{name}", quantity=quantity, source=source, reference=0, models=models, measure=measure,
-        tolerance=ROUND_OFF, **options,
-    )  # fmt: skip
+_ON_WARPED = _linear(lambda kind: warped(kind, 3, amount=0.24))
+_ON_SLANTED = _quadratic(parallelepipeds)
 
 
 PROBLEMS: list[Problem] = [
-    problem("linear", f"{U}: linear field held on 3 × 3 × 3 distorted bricks", "Irons",
-            _ON_WARPED, off(linear)),
-    problem("linear_stress", f"{SIGMA}: the same", "Irons", _ON_WARPED, stress_off(constant)),
-    problem("seven_bricks", f"{U}: linear field held on seven bricks", "MacNeal, patch test for solids",
-            _linear(seven_bricks), off(linear), takes=BRICKS),
-    problem("traction", f"{U}: constant stress by tractions on 2 × 2 × 2 distorted bricks", "Irons",
-            _pulled, off(linear)),
-    problem("traction_stress", f"{SIGMA}: the same", "Irons", _pulled, stress_off(constant)),
-    problem("quadratic", f"{U}: quadratic field and body force held on slanted bricks", "Irons",
-            _ON_SLANTED, off(quadratic), takes=is_quadratic),
-    problem("quadratic_stress", f"{SIGMA}: the same", "Irons",
-            _ON_SLANTED, stress_off(quadratic.stress), takes=is_quadratic),
-    problem("quadratic_moved", f"{U}: quadratic field on 2 × 2 × 2 distorted bricks", "Irons",
-            _quadratic(_moved), off(quadratic), takes=is_quadratic,
-            exact=lambda kind: len(kind_of(kind).shape.nodes) in COMPLETE),
-    problem("bending", f"{U}: bar with its ends held in pure bending", "Timoshenko, section 102",
-            bent, off(bending), takes=is_quadratic),
+    static("patch/linear", f"{U}: linear field held on 3 × 3 × 3 distorted bricks", "Irons", 0,
+           _ON_WARPED, off(linear), ROUND_OFF),
+    static("patch/linear_stress", f"{SIGMA}: the same", "Irons", 0,
+           _ON_WARPED, stress_off(constant), ROUND_OFF),
+    static("patch/seven_bricks", f"{U}: linear field held on seven bricks",
+           "MacNeal, patch test for solids", 0, _linear(seven_bricks), off(linear), ROUND_OFF, takes=BRICKS),
+    static("patch/traction", f"{U}: constant stress by tractions on 2 × 2 × 2 distorted bricks", "Irons", 0,
+           _pulled, off(linear), ROUND_OFF),
+    static("patch/traction_stress", f"{SIGMA}: the same", "Irons", 0,
+           _pulled, stress_off(constant), ROUND_OFF),
+    static("patch/quadratic", f"{U}: quadratic field and body force held on slanted bricks", "Irons", 0,
+           _ON_SLANTED, off(quadratic), ROUND_OFF, takes=is_quadratic),
+    static("patch/quadratic_stress", f"{SIGMA}: the same", "Irons", 0,
+           _ON_SLANTED, stress_off(quadratic.stress), ROUND_OFF, takes=is_quadratic),
+    static("patch/quadratic_moved", f"{U}: quadratic field on 2 × 2 × 2 distorted bricks", "Irons", 0,
+           _quadratic(lambda kind: warped(kind, 2)), off(quadratic), ROUND_OFF,
+           lambda kind: len(kind_of(kind).shape.nodes) in COMPLETE, is_quadratic),
+    static("patch/bending", f"{U}: bar with its ends held in pure bending", "Timoshenko, section 102", 0,
+           bent, off(bending), ROUND_OFF, takes=is_quadratic),
 ]  # fmt: skip
 """The rows of this family."""

@@ -14,8 +14,8 @@ from kratos_lite.model.loads.nodal import NodalForces
 from kratos_lite.model.loads.surface import Pressure
 from kratos_lite.typing import Array
 from kratos_lite.verification import scenes
-from kratos_lite.verification.meshes import element, face_forces, is_quadratic, nearest, on_plane, shaped
-from kratos_lite.verification.problem import Problem, StaticProblem
+from kratos_lite.verification.meshes import element, face_forces, is_quadratic, on_plane, shaped
+from kratos_lite.verification.problem import Models, Problem, static, stress_at
 
 RADII = (3.0, 3.5, 4.2, 5.2, 6.75, 9.0)
 RATIOS = (0.3, 0.49, 0.499, 0.4999)
@@ -26,14 +26,14 @@ def lame_cylinder(nu: float, E: float, a: float, b: float, r: float) -> float:
     return (1 + nu) * a**2 / (E * (b**2 - a**2)) * ((1 - 2 * nu) * r + b**2 / r)
 
 
-def thick_cylinder(nu: float) -> Callable[[str], tuple[Model, ...]]:
+def thick_cylinder(nu: float) -> Models:
     """Return a function: a quarter of a cylinder, radii 3 and 9, in nine segments of five bricks."""
 
     def place(X: Array) -> Array:
         r, angle = np.interp(5 * X[:, 0], range(6), RADII), np.pi / 2 * X[:, 1]
         return np.column_stack([r * np.cos(angle), r * np.sin(angle), X[:, 2]])
 
-    def models(kind: str) -> tuple[Model, ...]:
+    def models(kind: str) -> Model:
         mesh = shaped(kind, (5, 9, 1), place)
         model = Model(mesh, Isotropic3D(E=1000.0, nu=nu))
         model.fix(on_plane(mesh, 2, 0.0) | on_plane(mesh, 2, 1.0), "z")
@@ -41,7 +41,7 @@ def thick_cylinder(nu: float) -> Callable[[str], tuple[Model, ...]]:
         model.fix(on_plane(mesh, 0, 0.0), "x")
         inner = np.abs(_radius(mesh.points) - 3.0) < 1e-6
         model.add(NodalForces(face_forces(mesh, inner, lambda X, n: -n)))
-        return (model,)
+        return model
 
     return models
 
@@ -55,13 +55,13 @@ def _inner(radius: float) -> Callable[[Result], float]:
 
     def measure(result: Result) -> float:
         X = result.mesh.points
-        rows = np.abs(_radius(X) - radius) < 1e-6
-        return float(((result.u[rows] * X[rows])[:, :2].sum(axis=1) / radius).mean())
+        chosen = np.abs(_radius(X) - radius) < 1e-6
+        return float(((result.u[chosen] * X[chosen])[:, :2].sum(axis=1) / radius).mean())
 
     return measure
 
 
-def cylinder(kind: str) -> tuple[Model, ...]:
+def cylinder(kind: str) -> Model:
     """Return a whole cylinder, radii 1 and 2, in plane strain, 4 × 24 × 1 bricks."""
     mesh = annulus(1.0, 2.0, 0.25, (4, 24, 1), element(kind))
     model = Model(mesh, scenes.UNIT)
@@ -69,68 +69,31 @@ def cylinder(kind: str) -> tuple[Model, ...]:
     model.fix(on_plane(mesh, 1, 0.0), "y")
     model.fix(on_plane(mesh, 0, 0.0), "x")
     model.add(Pressure("inner", 1.0))
-    return (model,)
-
-
-def sphere(kind: str) -> tuple[Model, ...]:
-    """Return an eighth of a hollow sphere, three blocks of 3 × 3 × 3 bricks."""
-    return (scenes.sphere(kind, 3).model,)
-
-
-def _hoop(result: Result) -> float:
-    """Return the hoop stress at (1, 0, 0), a mean over the elements around the node."""
-    return float(result.stress("averaged")[nearest(result.mesh, (1, 0, 0)), 1])
+    return model
 
 
 def _sphere_radial(result: Result) -> float:
     X = result.mesh.points
-    rows = np.abs(np.linalg.norm(X, axis=1) - 1) < 1e-9
-    return float(np.linalg.norm(result.u[rows], axis=1).mean())
-
-
-def _thick() -> list[Problem]:
-    return [
-        StaticProblem(
-            name=f"pressure/thick_cylinder_{nu:g}",
-            quantity=f"u_r at the inner radius 3, segments of 10°, five bricks along the radius, ν = {nu:g}",
-            source="MacNeal, thick-walled cylinder; closed form of Lamé",
-            reference=lame_cylinder(nu, 1000.0, 3.0, 9.0, 3.0),
-            models=thick_cylinder(nu),
-            measure=_inner(3.0),
-        )
-        for nu in RATIOS
-    ]
+    inner = np.abs(np.linalg.norm(X, axis=1) - 1) < 1e-9
+    return float(np.linalg.norm(result.u[inner], axis=1).mean())
 
 
 PROBLEMS: list[Problem] = [
-    *_thick(),
-    StaticProblem(
-        name="pressure/lame_cylinder",
-        quantity="u_r at the inner radius 1, cylinder of 4 × 24 × 1 bricks",
-        source="Lame, section 28",
-        reference=lame_cylinder(0.3, 1.0, 1.0, 2.0, 1.0),
-        models=cylinder,
-        measure=_inner(1.0),
-        tolerance=2e-3,
-        exact=is_quadratic,
+    *(
+        static(f"pressure/thick_cylinder_{nu:g}",
+               f"u_r at the inner radius 3, segments of 10°, five bricks along the radius, ν = {nu:g}",
+               "MacNeal, thick-walled cylinder; closed form of Lamé",
+               lame_cylinder(nu, 1000.0, 3.0, 9.0, 3.0), thick_cylinder(nu), _inner(3.0))
+        for nu in RATIOS
     ),
-    StaticProblem(
-        name="pressure/lame_cylinder_hoop",
-        quantity="σ_φφ at the node (1, 0, 0), the same",
-        source="Lame, section 28",
-        reference=5 / 3,
-        models=cylinder,
-        measure=_hoop,
-    ),
-    StaticProblem(
-        name="pressure/lame_sphere",
-        quantity="mean |u| at the inner radius 1, an eighth of a hollow sphere, 3 blocks of 3 × 3 × 3 bricks",
-        source="Lame, section 142",
-        reference=0.8,
-        models=sphere,
-        measure=_sphere_radial,
-        tolerance=1.3e-2,
-        exact=is_quadratic,
-    ),
-]
+    static("pressure/lame_cylinder", "u_r at the inner radius 1, cylinder of 4 × 24 × 1 bricks",
+           "Lame, section 28", lame_cylinder(0.3, 1.0, 1.0, 2.0, 1.0), cylinder, _inner(1.0), 2e-3,
+           is_quadratic),
+    static("pressure/lame_cylinder_hoop", "σ_φφ at the node (1, 0, 0), the same",
+           "Lame, section 28", 5 / 3, cylinder, stress_at((1, 0, 0), 1)),
+    static("pressure/lame_sphere",
+           "mean |u| at the inner radius 1, an eighth of a hollow sphere, 3 blocks of 3 × 3 × 3 bricks",
+           "Lame, section 142", 0.8, lambda kind: scenes.sphere(kind, 3).model, _sphere_radial, 1.3e-2,
+           is_quadratic),
+]  # fmt: skip
 """The rows of this family."""

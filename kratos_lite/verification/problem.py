@@ -10,7 +10,7 @@ from math import inf, isfinite
 from kratos_lite.analysis.model import Model
 from kratos_lite.analysis.result import Result
 from kratos_lite.errors import InputError, KratosLiteError
-from kratos_lite.verification.meshes import kind_of, short
+from kratos_lite.verification.meshes import kind_of, nearest, short
 
 ELEMENTS = (
     *(f"KinematicLinear3D{n}N" for n in (4, 5, 6, 8)), "EnhancedStrain3D8N", "BBar3D8N",
@@ -23,6 +23,8 @@ GRADES = ((0.02, "A"), (0.1, "B"), (0.2, "C"), (0.5, "D"))
 PASS, FAIL, REFUSED = "pass", "FAIL", "refused"
 Of = Callable[[str], bool]
 """Whether something holds for an element, by its name."""
+Models = Callable[[str], Model | tuple[Model, ...]]
+"""Returns one or several models of an element, by its name."""
 
 
 def every(kind: str) -> bool:
@@ -42,11 +44,8 @@ class Problem:
     tolerance: float | None = None  # up to which a row passes; all are graded without
     exact: Of = every  # elements that have to pass; others are graded
     takes: Of = every  # elements that it is for
-
-    @property
-    def question(self) -> object:
-        """What is solved: rows of the same question share it."""
-        return self.name
+    models: Models | None = None  # of a static problem: rows of the same ones share their results
+    measure: Callable[..., float] | None = None  # takes these results to the value
 
     @property
     def cited(self) -> str:
@@ -85,30 +84,31 @@ class Problem:
         return Row(self, element, value, note=note)
 
 
-@dataclass(frozen=True, kw_only=True)
-class StaticProblem(Problem):
-    """A problem whose answer follows from the displacements of one or several models at rest."""
+def static(name: str, quantity: str, source: str, reference: float, models: Models,
+           measure: Callable[..., float], tolerance: float | None = None,
+           exact: Of = every, takes: Of = every) -> Problem:  # fmt: skip
+    """Return a problem whose answer follows from the displacements of one or several models at rest."""
+    return Problem(
+        name=name, quantity=quantity, source=source, reference=reference, models=models, measure=measure,
+        of=lambda element: measure(*solved(models, element)), tolerance=tolerance, exact=exact, takes=takes,
+    )  # fmt: skip
 
-    models: Callable[[str], tuple[Model, ...]]  # of the name of an element
-    measure: Callable[..., float]  # takes their results to the value
-    of: Callable[[str], float] = field(init=False)
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "of", self._solved)
-
-    @property
-    def question(self) -> object:
-        """The models: rows of the same ones share their results."""
-        return self.models
-
-    def _solved(self, element: str) -> float:
-        return self.measure(*solved(self.models, element))
+def models_of(models: Models, element: str) -> tuple[Model, ...]:
+    """Return the models of a problem for an element, one or several, as a tuple."""
+    made = models(element)
+    return (made,) if isinstance(made, Model) else made
 
 
 @lru_cache(maxsize=1)
-def solved(models: Callable[[str], tuple[Model, ...]], element: str) -> tuple[Result, ...]:
+def solved(models: Models, element: str) -> tuple[Result, ...]:
     """Return the results of the models of a problem; others that have the same models share them."""
-    return tuple(model.solve("direct") for model in models(element))
+    return tuple(model.solve("direct") for model in models_of(models, element))
+
+
+def stress_at(place: tuple[float, float, float], component: int) -> Callable[[Result], float]:
+    """Return a function: a stress at the node at a place, a mean over the elements around it."""
+    return lambda result: float(result.stress("averaged")[nearest(result.mesh, place), component])
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ from kratos_lite.verification.meshes import (
     on_boundary,
     warped,
 )
-from kratos_lite.verification.problem import Problem, StaticProblem
+from kratos_lite.verification.problem import Problem, static
 
 STEEL = Isotropic3D(E=1e6, nu=0.25)
 E, NU = STEEL.E, STEEL.nu
@@ -55,8 +55,8 @@ def uniform(stress: Array) -> Callable[[Array], Array]:
     return lambda X: np.asarray(X @ strain)
 
 
-def _loaded(stress: Array) -> Callable[[str], tuple[Model, ...]]:
-    return lambda kind: (under(stress, Model(box(element=element(kind)), STEEL)),)
+def _loaded(stress: Array) -> Callable[[str], Model]:
+    return lambda kind: under(stress, Model(box(element=element(kind)), STEEL))
 
 
 def _corner(result: Result) -> float:
@@ -94,14 +94,6 @@ def _top(result: Result) -> float:
     return float(top[np.argmax(np.abs(top - TOP))])
 
 
-def _weight(kind: str) -> tuple[Model, ...]:
-    return (scenes.cube(kind, 1).model,)
-
-
-def _warped_weight(kind: str) -> tuple[Model, ...]:
-    return (scenes.on_rollers(Model(warped(kind, 2, seed=0), scenes.SOIL)).model,)
-
-
 TOP = -scenes.SOIL.density * 9.81 / (2 * scenes.SOIL.C[0, 0])
 PROBLEMS: list[Problem] = [
     Problem(
@@ -122,47 +114,22 @@ PROBLEMS: list[Problem] = [
         tolerance=1e-11,
     ),
     *(
-        StaticProblem(
-            name=f"element/{name}",
-            quantity=f"u_x of the corner (1, 1, 1) of a unit cube, one brick, under unit stress, {name}, m",
-            source="Hooke",
-            reference=moved,
-            models=_loaded(stress),
-            measure=_corner,
-            tolerance=ROUND_OFF,
-            takes=is_stable,
-        )
+        static(f"element/{name}",
+               f"u_x of the corner (1, 1, 1) of a unit cube, one brick, under unit stress, {name}, m",
+               "Hooke", moved, _loaded(stress), _corner, ROUND_OFF, takes=is_stable)
         for name, (stress, moved) in STRESSES.items()
     ),
-    StaticProblem(
-        name="element/bending",
-        quantity="mean deflection of the end / exact, bar 4 × 1 × 1 of four bricks in pure bending",
-        source="Timoshenko, section 102",
-        reference=1,
-        models=lambda kind: (scenes.bending(kind, 1).model,),
-        measure=_tip,
-        tolerance=ROUND_OFF,
-        exact=is_quadratic,
-    ),
-    StaticProblem(
-        name="element/weight",
-        quantity="u_z of the top of the gravity cube, one brick, at the worst node, m",
-        source="Timoshenko, closed form -ρ g L²/(2 M)",
-        reference=TOP,
-        models=_weight,
-        measure=_top,
-        tolerance=ROUND_OFF,
-        exact=lambda kind: len(kind_of(kind).shape.nodes) > 4 and keeps_linear_strains(kind),
-    ),
-    StaticProblem(
-        name="element/weight_warped",
-        quantity="u_z of the top of the gravity cube, 2 × 2 × 2 distorted bricks, at the worst node, m",
-        source="Timoshenko, closed form -ρ g L²/(2 M)",
-        reference=TOP,
-        models=_warped_weight,
-        measure=_top,
-        tolerance=ROUND_OFF,
-        exact=lambda kind: len(kind_of(kind).shape.nodes) in (10, 27) and keeps_linear_strains(kind),
-    ),
-]
+    static("element/bending",
+           "mean deflection of the end / exact, bar 4 × 1 × 1 of four bricks in pure bending",
+           "Timoshenko, section 102", 1, lambda kind: scenes.bending(kind, 1).model, _tip, ROUND_OFF,
+           is_quadratic),
+    static("element/weight", "u_z of the top of the gravity cube, one brick, at the worst node, m",
+           "Timoshenko, closed form -ρ g L²/(2 M)", TOP, lambda kind: scenes.cube(kind, 1).model, _top,
+           ROUND_OFF, lambda kind: len(kind_of(kind).shape.nodes) > 4 and keeps_linear_strains(kind)),
+    static("element/weight_warped",
+           "u_z of the top of the gravity cube, 2 × 2 × 2 distorted bricks, at the worst node, m",
+           "Timoshenko, closed form -ρ g L²/(2 M)", TOP,
+           lambda kind: scenes.on_rollers(Model(warped(kind, 2, seed=0), scenes.SOIL)).model, _top, ROUND_OFF,
+           lambda kind: len(kind_of(kind).shape.nodes) in (10, 27) and keeps_linear_strains(kind)),
+]  # fmt: skip
 """The rows of this family."""

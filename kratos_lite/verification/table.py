@@ -14,7 +14,6 @@ from kratos_lite.verification import (
     orders,
     patch,
     pressure,
-    shells,
     single_element,
 )
 from kratos_lite.verification.meshes import element, kind_of
@@ -24,7 +23,6 @@ FAMILIES = (
     single_element,
     patch,
     macneal_harder,
-    shells,
     pressure,
     concentrations,
     nafems,
@@ -63,7 +61,7 @@ def verify(
     wanted = tuple(kind_of(name).__name__ for name in elements) or ELEMENTS
     kinds = {problem.name: problem.elements(tuple(map(element, wanted))) for problem in problems}
     done = 0
-    for _, group in groupby(problems, key=lambda problem: problem.question):
+    for _, group in groupby(problems, key=lambda problem: problem.models or problem.name):
         same = list(group)  # of these an element solves its models once
         if progress is not None:
             progress(same[0].name, done / len(problems))

@@ -416,7 +416,7 @@ MUTATIONS = [
         "tests/bodies/test_finite_element_motion.py tests/testing/test_bodies.py",
     ),
     Mutation(
-        "bodies/formulations/modal.py",
+        "bodies/formulations/corotational.py",
         "scale = 1 + c * self._squares",
         "scale = 1 - c * self._squares",
         "tests/bodies/test_finite_element_motion.py",

@@ -3,7 +3,7 @@
 import pytest
 
 from kratos_lite.verification import page
-from kratos_lite.verification.sources import SOURCES
+from kratos_lite.verification.page import SOURCES
 from tests.verification.moving import (
     bodies_in_motion,
     known_values,

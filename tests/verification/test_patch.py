@@ -41,7 +41,7 @@ def test_strain_of_a_quadratic_field_is_exact_on_parallelepipeds(nodes):
 
 @pytest.mark.parametrize("nodes", [10, 13, 15, 20, 27])
 def test_nodal_stress_of_pure_bending_is_exact_for_quadratic_elements(nodes):
-    (model,) = patch.bent(kind(nodes))
+    model = patch.bent(kind(nodes))
     y, largest = model.mesh.points[:, 1], 1e-3 * patch.STEEL.E
     expected = np.column_stack([largest * y, *[0 * y] * 5])
     np.testing.assert_allclose(model.solve().stress("node"), expected, rtol=0, atol=1e-9 * largest)

@@ -22,8 +22,7 @@ from kratos_lite.analysis.integrators.finite_element import warn_of_stiffness
 from kratos_lite.analysis.integrators.kernels import StepKernel
 from kratos_lite.bodies.constraint_projection import Step, constrained_step
 from kratos_lite.bodies.linear_algebra import apply, first, length, solve, transposed
-from kratos_lite.bodies.pseudo_rigid import PseudoRigidBody
-from kratos_lite.bodies.strain import by_rows, green_strain, strain_operator
+from kratos_lite.bodies.pseudo_rigid import PseudoRigidBody, by_rows, green_strain, strain_operator
 from kratos_lite.typing import Array, Mask
 from kratos_lite.voigt import tensor
 

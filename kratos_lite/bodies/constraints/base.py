@@ -10,7 +10,7 @@ Source: Solfec-1.0 user manual, constraints; its velocity-level laws are replace
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from typing import ClassVar, TypeAlias
 
 import numpy as np
@@ -150,3 +150,10 @@ class Constraint(ABC):
         """Take note of the reactions of multipliers (m r,) in N along the directions."""
         directions = self.directions(body.position(self.points, q))
         self.reactions = np.einsum("mr,mri->mi", multipliers.reshape(directions.shape[:2]), directions)
+
+
+def with_slices(constraints: Iterable[Constraint]) -> Iterator[tuple[Constraint, slice]]:
+    """Yield each constraint with the slice of its multipliers among those of all."""
+    start = 0
+    for constraint in constraints:
+        yield constraint, slice(start, start := start + constraint.count)

@@ -36,14 +36,7 @@ class FixPoint(Constraint):
 
 
 class AlongDirection(Constraint):
-    """A constraint along one direction fixed in space.
-
-    Parameters
-    ----------
-    points : (3,) or (m, 3) m, in the undeformed body; or a part or side of the mesh (``"x-"``), or a
-        predicate on its points (n, 3), for the nodes there.
-    direction : (3,), of any length but 0.
-    """
+    """A constraint along one direction (3,) fixed in space, of any length but 0; points as for `FixPoint`."""
 
     def __init__(self, points: Points, direction: ArrayLike) -> None:
         super().__init__(points)

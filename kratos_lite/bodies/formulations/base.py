@@ -130,14 +130,14 @@ class Formulation(ABC):
 
     def load_over(self, q: Array, dq: Array, damping: float) -> Array:
         """Return the load of the energy–momentum method; see `FiniteElementBody`."""
-        raise ModelError(
-            f"the formulation {self.name} has no energy–momentum integrator; "
-            "use formulation='total_lagrangian'"
-        )
+        raise self._no_energy_momentum()
 
     def increment_solver(self, q: Array, dq: Array, damping: float, c: float) -> Solve:
         """Return the solver of the energy–momentum method; see `FiniteElementBody`."""
-        raise ModelError(
+        raise self._no_energy_momentum()
+
+    def _no_energy_momentum(self) -> ModelError:
+        return ModelError(
             f"the formulation {self.name} has no energy–momentum integrator; "
             "use formulation='total_lagrangian'"
         )

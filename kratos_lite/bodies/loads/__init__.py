@@ -5,8 +5,7 @@ Loads of models (gravity, tractions, dead pressure, …) act through their nodal
 """
 
 from kratos_lite.bodies.loads.base import AppliedLoad, BodyLoad
-from kratos_lite.bodies.loads.callback import Callback
-from kratos_lite.bodies.loads.forces import Force, Spring, Torque
+from kratos_lite.bodies.loads.forces import Callback, Force, Spring, Torque
 from kratos_lite.bodies.loads.pressure import FollowerPressure
 
 __all__ = [

@@ -83,21 +83,7 @@ class BodyLoad(ABC):
 
     @abstractmethod
     def bind(self, body: FreeBody) -> AppliedLoad:
-        """Return the load as it acts on a body, for the amplitude 1.
-
-        Parameters
-        ----------
-        body : where it acts, in its configuration now.
-
-        Returns
-        -------
-        AppliedLoad
-
-        Raises
-        ------
-        ModelError, MeshError, InputError
-            It does not act on such a body, a point lies outside, or it does not support batches of bodies.
-        """
+        """Return the load on a body in its configuration now; an error if it does not act on such a body."""
 
 
 def apply_load(load: BodyLoad | Load, body: FreeBody, amplitude: Factor | None) -> AppliedLoad:
