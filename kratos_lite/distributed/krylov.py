@@ -17,7 +17,7 @@ from kratos_lite.distributed.petsc import (
     set_options,
     unused,
 )
-from kratos_lite.solvers.iteration import MAX_ITERATIONS, Share
+from kratos_lite.solvers.iteration import MAX_ITERATIONS, FractionDone
 from kratos_lite.solvers.plan import Facts, Plan, over_ranks
 from kratos_lite.typing import Progress
 
@@ -63,9 +63,9 @@ EPSILON = float(np.finfo(float).eps)
 MAXIMUM = 3
 """PETSc's number of the maximum norm."""
 NO_DIGITS = 1e-2
-"""Rounding of A x, as a share of b, from which a factorization has solved nothing."""
+"""Rounding of A x, as a fraction of b, from which a factorization has solved nothing."""
 REFINEMENTS = 2
-"""Solutions for what is left where the true residual is too large."""
+"""Solutions for the residual where the true one is too large."""
 
 
 def plan_of(solver: str, unknowns: int, ratio: float, given: Mapping[str, str | None]) -> Plan:
@@ -114,7 +114,7 @@ class Krylov:
         self.prefix = f"{PREFIX}{next(NUMBERS)}_"
         self.options, self.given = {**chosen, **given}, dict(given)
         self._A, self._is_ready, self.most = A, False, most
-        self._share: Share | None = None
+        self._fraction: FractionDone | None = None
         with plain_errors():
             set_options(self.prefix, self.options)
             self.ksp = petsc().KSP().create(A.comm)
@@ -162,21 +162,21 @@ class Krylov:
             return 0, 0.0, ""
         self.set_up(progress)
         iterations, failure = self._iterate(b, x, tolerance, progress, near)
-        left, step = b.duplicate(), x.duplicate()
+        residual, step = b.duplicate(), x.duplicate()
         for attempt in range(1 + REFINEMENTS):
-            self._A.mult(x, left)
-            left.aypx(-1.0, b)
+            self._A.mult(x, residual)
+            residual.aypx(-1.0, b)
             rounding = 2 * EPSILON * (norm * x.norm() + size)
-            found = left.norm()
-            if failure or attempt == REFINEMENTS or found <= max(tolerance * size, rounding):
+            norm_r = residual.norm()
+            if failure or attempt == REFINEMENTS or norm_r <= max(tolerance * size, rounding):
                 break
-            more, failure = self._iterate(left, step, min(max(tolerance * size, rounding) / found, 0.1))
+            more, failure = self._iterate(residual, step, min(max(tolerance * size, rounding) / norm_r, 0.1))
             iterations += more
             x.axpy(1.0, step)
-        error = left.norm(MAXIMUM) / (norm * x.norm(MAXIMUM) + b.norm(MAXIMUM))
+        error = residual.norm(MAXIMUM) / (norm * x.norm(MAXIMUM) + b.norm(MAXIMUM))
         if not iterations and 2 * EPSILON * norm * x.norm() > NO_DIGITS * size:
             failure = failure or f"{self.name}: the matrix is singular: parts are free to move, or nearly so"
-        left.destroy()
+        residual.destroy()
         step.destroy()
         return iterations, float(error), failure
 
@@ -190,12 +190,12 @@ class Krylov:
             rtol=tolerance if "ksp_rtol" not in self.given else None,
             max_it=self.most if "ksp_max_it" not in self.given else None,
         )
-        self._share = Share(tolerance, progress) if progress else None
+        self._fraction = FractionDone(tolerance, progress) if progress else None
         self._size = 0.0
         with plain_errors():
             ksp.solve(b, x)
-        if self._share:
-            self._share.finish()
+        if self._fraction:
+            self._fraction.finish()
         return (0 if ksp.getType() == "preonly" else ksp.getIterationNumber()), self._failure()
 
     def _failure(self) -> str:
@@ -211,8 +211,8 @@ class Krylov:
     def _report(self, ksp: Any, iteration: int, residual: float) -> None:
         """Report progress."""
         self._size = self._size or residual
-        if self._share is not None and self._size > 0:
-            self._share(residual / self._size)
+        if self._fraction is not None and self._size > 0:
+            self._fraction(residual / self._size)
 
     def unused(self) -> list[str]:
         """Return the user's options that PETSc has not asked for."""

@@ -129,10 +129,10 @@ class PetscSolver:
         self._key = key
 
     def _run(self, task: Callable[..., Any], *arguments: Any, each: Callable[[int], Any]) -> Any:
-        found = self._ranks.run(task, *arguments, each=each)
+        result = self._ranks.run(task, *arguments, each=each)
         if self._progress:
             self._progress.raise_error()
-        return found
+        return result
 
     def solve(
         self,
@@ -151,10 +151,10 @@ class PetscSolver:
         if near is not None:
             start = np.zeros(len(c))
             start[constraints.free] = (near - c)[constraints.free]
-        x, solution = self._found(b, start, tolerance)
+        x, solution = self._solved(b, start, tolerance)
         return replace(solution, x=constraints.expand(x[constraints.free], c))
 
-    def _found(self, b: Array, start: Array | None, tolerance: float) -> tuple[Array, Solution]:
+    def _solved(self, b: Array, start: Array | None, tolerance: float) -> tuple[Array, Solution]:
         """Solve for b (3a,); a small system whose iteration fails is factorized, unless options are given."""
         x, name, iterations, error, failure, unused = self._solve(b, start, tolerance)
         reason = self._plan.reason
@@ -175,11 +175,11 @@ class PetscSolver:
         def of_rank(rank: int) -> tuple[Array, Array | None]:
             return forces[own[rank]], None if near is None else near[own[rank]]
 
-        found, *rest = self._run(_solve, self._key, tolerance, each=of_rank)
+        parts, *report = self._run(_solve, self._key, tolerance, each=of_rank)
         x = np.zeros_like(forces)
-        for nodes, values in zip(own, found, strict=True):
+        for nodes, values in zip(own, parts, strict=True):
             x[nodes] = values
-        return x.ravel(), *rest
+        return x.ravel(), *report
 
     def destroy(self) -> None:
         """Let all ranks release matrix and solver."""
@@ -226,8 +226,8 @@ def _make(
 
 
 def _solve(ranks: Alone, key: int, tolerance: float, given: tuple[Array, Array | None]) -> tuple[Any, ...]:
-    found, *rest = KEPT[key].solve(given[0], tolerance, given[1])
-    return collected(ranks, found), *rest, KEPT[key].unused_options()
+    x, *report = KEPT[key].solve(given[0], tolerance, given[1])
+    return collected(ranks, x), *report, KEPT[key].unused_options()
 
 
 def _destroy(ranks: Alone, key: int) -> None:
@@ -237,5 +237,5 @@ def _destroy(ranks: Alone, key: int) -> None:
 def collected(ranks: Alone, values: Array) -> list[Array]:
     """Return the values of all ranks on rank 0, an empty list on the others."""
     nowhere = values[:0]
-    found = ranks.exchange([values] + [nowhere] * (ranks.size - 1))
-    return found if ranks.rank == 0 else []
+    received = ranks.exchange([values] + [nowhere] * (ranks.size - 1))
+    return received if ranks.rank == 0 else []

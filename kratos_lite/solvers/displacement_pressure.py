@@ -29,7 +29,7 @@ from kratos_lite.solvers.block_inverse import block_inverse
 from kratos_lite.solvers.coarse_level import PCoarseLevel
 from kratos_lite.solvers.dilatation import SplitMatrix
 from kratos_lite.solvers.direct import one_thread
-from kratos_lite.solvers.iteration import GoOn, Share
+from kratos_lite.solvers.iteration import FractionDone, GoOn
 from kratos_lite.typing import Array, Mask, Progress, Rows
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ class DisplacementPressure:
         go_on: GoOn | None = None,
     ) -> tuple[Array, int, bool]:
         """Return u, iterations and success."""
-        each = Share(tolerance, progress, go_on)
+        each = FractionDone(tolerance, progress, go_on)
         if self._kernel is None:
             with one_thread():
                 u, iterations, converged = self._solve(b, tolerance, norm, each)

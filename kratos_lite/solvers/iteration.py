@@ -43,7 +43,7 @@ class ConvergenceForecast:
         return not self.stopped
 
 
-class Share:
+class FractionDone:
     """Turns residuals, as fractions of the first, into the fraction of work that is done; it never falls."""
 
     def __init__(self, tolerance: float, progress: Progress | None, go_on: GoOn | None = None) -> None:
@@ -84,7 +84,7 @@ def conjugate_gradients(
     norm_b = float(np.linalg.norm(b))
     if norm_b == 0:
         return x, 0, True
-    each = Share(tolerance, progress, go_on)
+    each = FractionDone(tolerance, progress, go_on)
     best, best_at = np.inf, 0  # residuals may grow at first
     z = precondition(r)
     p, rz = z.copy(), float(r @ z)

@@ -22,7 +22,7 @@ from kratos_lite.native import kernels
 from kratos_lite.solvers.coarse_level import PCoarseLevel
 from kratos_lite.solvers.constraint_map import rigid_modes
 from kratos_lite.solvers.direct import one_thread
-from kratos_lite.solvers.iteration import MAX_ITERATIONS, GoOn, Share, conjugate_gradients
+from kratos_lite.solvers.iteration import MAX_ITERATIONS, FractionDone, GoOn, conjugate_gradients
 from kratos_lite.solvers.plate_level import bending_modes, is_very_thin, plate_axes, plate_level
 from kratos_lite.typing import Array, Mask, Progress
 
@@ -143,7 +143,7 @@ class Compiled:
         self, b: Array, tolerance: float, norm: float, progress: Progress | None, go_on: GoOn | None = None
     ) -> tuple[Array, int, bool]:
         """Return x, iterations and success."""
-        each = Share(tolerance, progress, go_on)
+        each = FractionDone(tolerance, progress, go_on)
         x, iterations, converged = self._kernel.solve(b, tolerance, norm, MAX_ITERATIONS, each)
         if converged:
             each.finish()
