@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from known_page import PAGE, rows_of_page
 
 import kratos_lite as kl
 from kratos_lite.cli import main
@@ -14,17 +15,7 @@ from kratos_lite.verification.page import SOURCES
 from kratos_lite.verification.problem import ELEMENTS, Problem, Row
 from kratos_lite.verification.table import PROBLEMS, chosen, verify
 
-ROOT = Path(__file__).resolve().parents[2]
-PAGE = (ROOT / "docs" / "about" / "verification.md").read_text(encoding="utf-8")
 FAMILIES = list(dict.fromkeys(name.partition("/")[0] for name in PROBLEMS))
-
-
-def rows_of_page(family):
-    """Return the rows of a family as the page has them: problem and element to the cells by their heads."""
-    section = PAGE.split(f"\n## {page.TITLES[family]}\n")[1].split("\n## ")[0]
-    lines = [[cell.strip() for cell in line.split("|")[1:-1]] for line in section.splitlines() if "|" in line]
-    head, _, *body = (cells for cells in lines if len(cells) > 6)
-    return {(cells[0], cells[1]): dict(zip(head, cells, strict=True)) for cells in body}
 
 
 CLOSER = {
@@ -98,7 +89,7 @@ def test_straight_cantilevers_agree_with_an_independent_program(nodes):
     forms, loads = ("rectangular", "trapezoidal", "parallelogram"), ("extension", "in_plane", "out_of_plane")
     for form, wanted in zip(forms, BEAM[nodes], strict=True):
         problems = [PROBLEMS[f"macneal_harder/straight_{form}_{load}"] for load in loads]
-        ratios = [p.row(f"KinematicLinear3D{nodes}N").value / p.reference for p in problems]
+        ratios = [p.of(f"KinematicLinear3D{nodes}N") / p.reference for p in problems]
         np.testing.assert_allclose(ratios, wanted, rtol=0, atol=0.0006)
 
 
@@ -106,8 +97,8 @@ def test_bricks_in_the_thick_cylinder_agree_with_an_independent_program():
     flat = np.sin(np.radians(10)) / np.radians(10)  # the pressure of 8-node bricks acts on plane faces
     for nu, wanted in ((0.3, (0.9908, 0.9996, 0.9998)), (0.4999, (0.0534, 0.8793, 0.8793))):
         problem = PROBLEMS[f"pressure/thick_cylinder_{nu}"]
-        found = [problem.row(f"KinematicLinear3D{n}N").value / problem.reference for n in (8, 20, 27)]
-        assert found == pytest.approx(np.array(wanted) * (flat, 1, 1), abs=5e-4)
+        ratios = [problem.of(f"KinematicLinear3D{n}N") / problem.reference for n in (8, 20, 27)]
+        assert ratios == pytest.approx(np.array(wanted) * (flat, 1, 1), abs=5e-4)
 
 
 @pytest.mark.parametrize(
