@@ -83,7 +83,7 @@ WRONG = {
     "traction edge": (lambda: solved_with(kl.Traction([26, 25], (0, 0, 1))), "a traction finds no face"),
     "pressure word": (lambda: kl.Pressure("z+", "a"), "a pressure must be made of real numbers"),
     "pressure none": (lambda: kl.Pressure("z+", None), "a pressure must be"),
-    "pressure list": (lambda: kl.Pressure("z+", [1, 2]), "a pressure must be one number"),
+    "pressure list": (lambda: kl.Pressure("z+", [[1, 2]]), "a pressure must be one number"),
     "pressure nan": (lambda: kl.Pressure("z+", np.nan), "a pressure must be finite"),
     "pressure normal": (lambda: kl.Pressure("z+", 1.0, "inward"), "normal must be 'outward' or 'nodes'"),
     "point rows": (lambda: kl.PointLoad([1, 2], np.ones((2, 3))), r"a point load must be \(3,\) in N"),
