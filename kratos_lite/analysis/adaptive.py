@@ -1,9 +1,9 @@
 """Adaptive solution: a static model solved to a requested accuracy, its mesh made finer where that pays.
 
-Linear elements become quadratic first; then the elements that hold most of the error are cut, few steps
-with many elements each.  The estimate of a result is corrected by what the last step has changed: of nested
-meshes ‖u - u_H‖² = ‖u - u_h‖² + ‖u_h - u_H‖², so that, if estimates fall by β = η_h/η_H, the error is
-‖u_h - u_H‖ β/√(1 - β²).
+Linear elements become quadratic first; then, mesh by mesh, those elements are cut that hold a fraction θ of
+the squared error (bulk marking).  The estimate of a result is corrected by what the last step has changed:
+of nested meshes ‖u - u_H‖² = ‖u - u_h‖² + ‖u_h - u_H‖², so that, if estimates fall by β = η_h/η_H, the
+error is ‖u_h - u_H‖ β/√(1 - β²).
 
 Sources: Dörfler, SIAM J. Numer. Anal. 33 (1996) 1106-1124; Zienkiewicz & Zhu, Int. J. Numer. Meth. Eng. 24
 (1987) 337-357 (density of the mesh); Ainsworth & Oden, A Posteriori Error Estimation (2000), ch. 3.
@@ -11,13 +11,14 @@ Sources: Dörfler, SIAM J. Numer. Anal. 33 (1996) 1106-1124; Zienkiewicz & Zhu, 
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from time import perf_counter
 from typing import TypeAlias, TypeVar
 
 import numpy as np
 
-from kratos_lite.analysis.adaptive_levels import SINGULAR, Level, QuantityLevel
+from kratos_lite.analysis.adaptive_levels import Level, QuantityLevel
 from kratos_lite.analysis.layers import layer_direction
 from kratos_lite.analysis.quantities import Quantity
 from kratos_lite.analysis.report import RefinementStep
@@ -26,32 +27,34 @@ from kratos_lite.analysis.static import StaticAnalysis
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.elements.custom import is_builtin
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.mesh import Mesh, with_rows
+from kratos_lite.mesh import Mesh
 from kratos_lite.mesh.facets import facets
 from kratos_lite.mesh.refined_mesh import RefinedMesh
 from kratos_lite.mesh.refinement import quadratic, raised, refine
 from kratos_lite.model.refined import refined
 from kratos_lite.model.structure import Structure
-from kratos_lite.typing import Array, Mask, Progress
+from kratos_lite.typing import Array, Ints, Progress
 from kratos_lite.validation import number, short, whole_number
 
 S = TypeVar("S", bound=Structure)
 Geometry: TypeAlias = Mapping[str, Callable[[Array], Array]]
 """By part, a function that takes places (k, 3) near its true surface onto it."""
+BULK, BULK_FAR, FAR = 0.5, 0.8, 3.0
+"""Fraction θ of the squared error that is cut, and that where the error is `FAR` times the one requested."""
 GROWTH = 1.2
-"""How many times more elements the next mesh has, unless singular ones hold most of the error."""
+"""How many times more elements the next mesh has at least."""
 FLAT = 0.05
 """Share of the error asked for that the stress may vary along a direction in which nothing is cut."""
-DEPTH = 2
-"""Times that elements around a singular point are cut at once."""
 ROUGH, ROUGH_SHARE = 1e-5, 1e-3
 """Relative residual of the meshes on the way at most, and as a share of the error asked for."""
 FAIR = 1e-3
 """Share of the forces that such a mesh may miss to equilibrium; beyond it is solved in full."""
 STEPS = 25
 """Meshes after which the accuracy counts as out of reach."""
-UNKNOWNS = 400_000
-"""Unknowns of the largest mesh that is solved."""
+SCANT = 0.05
+"""Of a step that there must be room for."""
+BYTES = 6000
+"""Memory that an unknown may need; the largest mesh is one that fits into what is free."""
 
 
 def solve_to(
@@ -60,7 +63,7 @@ def solve_to(
     solver: str = "auto",
     tolerance: float = 1e-10,
     progress: Progress | None = None,
-    most_unknowns: int = UNKNOWNS,
+    most_unknowns: int | None = None,
     geometry: Geometry | None = None,
     quantity: Quantity | None = None,
 ) -> Result:
@@ -68,7 +71,7 @@ def solve_to(
     aim = number(error, "error")
     if not 0 < aim < 1:
         raise InputError(f"error must be a share between 0 and 1, such as 0.01; got {error!r}")
-    most = whole_number(most_unknowns, "most_unknowns")
+    most = _affordable() if most_unknowns is None else whole_number(most_unknowns, "most_unknowns")
     check_geometry(geometry, model.mesh)
     if model.motion is not None:
         raise ModelError(
@@ -93,21 +96,18 @@ def solve_to(
             break
         if keep is None and quantity is None and model.mesh.hanging is None and not _can_be_raised(model):
             keep = layer_direction(result, FLAT * aim * level.norm)
-        steps = _next(level, aim, keep, geometry or {})
-        model = _carried(model, steps)
-        if 3 * model.mesh.n_nodes > most:
-            missed = f"the next mesh has more than {most} unknowns"
-        elif len(history) == STEPS:
-            missed = f"{STEPS} meshes did not suffice"
-        if missed:
+        step = _next(level, aim, keep, geometry or {}, most) if len(history) < STEPS else None
+        if step is None:
+            missed = _missed(history, aim, most)
             break
+        steps, model = [step], _carried(model, step)
         analysis.release()
     if result.report.iterations and rough > tolerance:
         result = analysis.solve(start=result.u)
     analysis.release()
     if missed:
         warnings += [
-            f"the error asked for, {aim:.3g}, was not reached: it may be {level.reported:.3g}; {missed}"
+            f"the error requested, {aim:.3g}, was not reached: it may be {level.reported:.3g}; {missed}"
         ]
     report = result.report
     report.history, report.error, report.error_asked = history, level.reported, aim
@@ -187,47 +187,63 @@ def check_geometry(geometry: Geometry | None, mesh: Mesh) -> None:
         mesh.nodes(part)
 
 
-def _next(level: Level, error: float, keep: Array | None, geometry: Geometry) -> list[RefinedMesh]:
-    """Return the steps to the next mesh; edges along `keep` are not cut."""
+def _next(
+    level: Level, error: float, keep: Array | None, geometry: Geometry, most: int
+) -> RefinedMesh | None:
+    """Return the step to the next mesh, edges along `keep` uncut; None if that has too many nodes."""
     mesh = level.model.mesh
     if _can_be_raised(level.model):
         named = raised(mesh, lambda name: f"Element3D{len(ELEMENTS[quadratic(name)].nodes)}N")
-        return [named.onto(geometry)]
+        if 3 * named.mesh.n_nodes <= most:
+            return named.onto(geometry)
     if level.is_blind:
-        return [refine(mesh, keep=keep).onto(geometry)]
-    aim = level.aim(error)
-    kept = level.kept()
-    times = _times(level.squares, kept, aim, 8 if keep is None else 4)
-    steps = [refine(mesh, times > 0, keep).onto(geometry)]
-    points = _singular_points(mesh, kept > SINGULAR)
-    wanted = times[steps[0].elements]
-    known = level.before is not None and level.before.order == level.order
-    for done in range(1, DEPTH if known else 1):
-        finer = steps[-1].mesh
-        again = (wanted > done) & _touching(finer, points)
-        if not again.any():
-            break
-        steps.append(refine(finer, again, keep).onto(geometry))
-        wanted = wanted[steps[-1].elements]
-    return steps
+        finer = refine(mesh, keep=keep)
+        return finer.onto(geometry) if 3 * finer.mesh.n_nodes <= most else None
+    marked = _marked(level, level.aim(error), 8 if keep is None else 4)
+    order = np.argsort(-level.squares)
+    while len(marked):
+        finer = refine(mesh, np.isin(np.arange(mesh.n_elements), marked), keep)
+        n = 3 * finer.mesh.n_nodes
+        if n <= most:
+            return finer.onto(geometry)
+        room = (most - 3 * mesh.n_nodes) / (n - 3 * mesh.n_nodes)
+        marked = order[: int(0.9 * room * len(marked))] if room > SCANT else marked[:0]
+    return None
 
 
-def _singular_points(mesh: Mesh, singular: Mask) -> Mask:
-    """Return which nodes (n,) have singular elements alone around them, two or more."""
-    around, of_these = np.zeros(mesh.n_nodes, dtype=np.int64), np.zeros(mesh.n_nodes, dtype=np.int64)
-    for block, at in with_rows(mesh.blocks):
-        np.add.at(around, block.nodes, 1)
-        np.add.at(of_these, block.nodes[singular[at]], 1)
-    return (around > 1) & (around == of_these)
+def _marked(level: Level, aim: float, pieces: int) -> Ints:
+    """Return the fewest elements that hold a fraction θ of the squared error, or that bring it to its aim.
+
+    Source: Dörfler 1996, marking.
+    """
+    squares = level.squares
+    order = np.argsort(-squares)
+    held, total = np.cumsum(squares[order]), squares.sum()
+    bulk = (BULK if total < (FAR * aim) ** 2 else BULK_FAR) * total
+    gained = np.cumsum((squares * (1 - level.kept()))[order])
+    count = 1 + min(np.searchsorted(held, bulk), np.searchsorted(gained, total - aim**2))
+    least = int(np.ceil((GROWTH - 1) * len(squares) / (pieces - 1)))
+    return order[: max(count, least)]
 
 
-def _touching(mesh: Mesh, points: Mask) -> Mask:
-    """Return which elements (m,) have one of some nodes, the first of the mesh, as a corner."""
-    every = np.zeros(mesh.n_nodes, dtype=bool)
-    every[: len(points)] = points
-    corners = [ELEMENTS[block.name].shape.corners for block in mesh.blocks]
-    cells = [block.nodes[:, :c] for block, c in zip(mesh.blocks, corners, strict=True)]
-    return np.concatenate([np.asarray(every[nodes].any(axis=1)) for nodes in cells])
+def _missed(history: Sequence[RefinementStep], aim: float, most: int) -> str:
+    """Return why the error was not reached, and what it would take by the rate of the last meshes."""
+    why = f"{STEPS} meshes did not suffice" if len(history) == STEPS else f"there is room for {most} unknowns"
+    alike = [step for step in history if step.kinds == history[-1].kinds]
+    if len(alike) > 1 and alike[-1].error < alike[-2].error:
+        rate = np.log(alike[-2].error / alike[-1].error) / np.log(alike[-1].unknowns / alike[-2].unknowns)
+        needed = alike[-1].unknowns * (alike[-1].error / aim) ** (1 / rate)
+        return f"{why}; it would take about {needed:.2g}"
+    return why
+
+
+def _affordable() -> int:
+    """Return how many unknowns fit into the memory that is free."""
+    try:
+        free = os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, OSError, ValueError):  # another system
+        free = 4 << 30
+    return max(int(free / BYTES), 100_000)
 
 
 def _can_be_raised(model: Structure) -> bool:
@@ -242,40 +258,9 @@ def _can_be_raised(model: Structure) -> bool:
     )
 
 
-def _times(squares: Array, kept: Array, aim: float, pieces: int) -> Array:
-    """Return how often elements (m,) are cut on the way to a mesh with the error `aim`.
-
-    On it all elements have the same error τ.  An element cut k times has pieces^k children, or pieces · k
-    around a singular point, that hold kept^k of its squared error.
-    """
-    singular = kept > SINGULAR
-    rate = np.where(singular, -np.log(kept), np.log(pieces / kept))
-    logs = np.log(np.maximum(squares, np.finfo(float).tiny))
-
-    def times(tau: float) -> Array:
-        return np.maximum(np.ceil((logs - tau) / rate - 0.5), 0.0)
-
-    low, high = float(logs.max()) - 60.0, float(logs.max())
-    for _ in range(40):
-        middle = (low + high) / 2
-        if (squares * kept ** times(middle)).sum() > aim**2:
-            high = middle
-        else:
-            low = middle
-    found = times(low)
-    least = 1
-    if squares[singular].sum() < squares.sum() / 2:
-        least = int(np.ceil((GROWTH - 1) * len(squares) / (pieces - 1)))
-    largest = np.argsort(-squares)[:least]
-    found[largest] = np.maximum(found[largest], 1.0)
-    return found
-
-
-def _carried(model: S, steps: Sequence[RefinedMesh]) -> S:
-    """Return a model after some steps."""
-    for step in steps:
-        finer = refined(model, step)
-        if step.mesh.n_elements == step.coarse.n_elements and model.formulation != "b_bar":
-            finer.formulation = None  # quadratic elements: those that do not lock
-        model = finer
-    return model
+def _carried(model: S, step: RefinedMesh) -> S:
+    """Return a model after a step."""
+    finer = refined(model, step)
+    if step.mesh.n_elements == step.coarse.n_elements and model.formulation != "b_bar":
+        finer.formulation = None  # quadratic elements: those that do not lock
+    return finer

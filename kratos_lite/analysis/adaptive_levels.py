@@ -20,6 +20,8 @@ from kratos_lite.typing import Array, Ints
 
 CORRECTED = 1.25
 """Safety of an estimate that a coarser mesh corrects."""
+MOST_CORRECTED = 1.3
+"""Times that it may exceed the estimate of its own mesh: short steps say little."""
 SETTLED = 0.9
 """Share to which estimates must fall, so that they can be corrected."""
 AIM = 0.9
@@ -88,19 +90,14 @@ class Level:
             ratio = max(ratio, 2.0 ** -(self.order * float(self.cuts().max())))
         if not ratio < SETTLED:
             return max(self.estimate, self.change)
-        found = self.change * ratio / float(np.sqrt(1 - ratio**2))
-        if ratio < 0.5:
-            return found
-        left = float(np.sqrt(max(self.before.corrected**2 - self.change**2, 0.0)))
-        return max(
-            found, min(left, 1.5 * found)
-        )  # of a short step: what the one before leaves, within reason
+        return self.change * ratio / float(np.sqrt(1 - ratio**2))
 
     @cached_property
     def bound(self) -> float:
         """The error in √J that is reported."""
         alone = self.result.error().absolute
-        return alone if self.before is None else max(CORRECTED * self.corrected, alone)
+        corrected = alone if self.before is None else CORRECTED * self.corrected
+        return float(np.clip(corrected, alone, MOST_CORRECTED * alone))
 
     @property
     def reported(self) -> float:

@@ -75,8 +75,8 @@ class Model(Structure):
         progress : called with the phase and the share done, 0 … 1.
         error : relative error of the energy norm, such as 0.01, for which the mesh is made finer and linear
             elements quadratic where needed; the result is on the final mesh, the model stays as it is.
-        most_unknowns : with `error`: no mesh with more of them is solved (400 000); a warning says what was
-            reached.
+        most_unknowns : with `error`: no mesh with more of them is solved (as many as fit into the free
+            memory); a warning says what was reached, and what it would take.
         geometry : with `error`: by part, a function that takes places (k, 3) in m near its true surface onto
             it; without, edges that are straight stay straight.
         quantity : with `error`: the error is that of a quantity, such as ``kl.DisplacementAt(point, "z")``,
@@ -105,11 +105,10 @@ class Model(Structure):
                 raise InputError(f"{name} belongs to a requested error; give error, such as error=0.01, too")
         with watched(progress) as shown:
             if error is not None:
-                from kratos_lite.analysis.adaptive import UNKNOWNS, solve_to  # a quick start without it
+                from kratos_lite.analysis.adaptive import solve_to  # a quick start without it
 
                 check_own(backend, petsc, "a requested error")
-                most = UNKNOWNS if most_unknowns is None else most_unknowns
-                return solve_to(self, error, solver, tolerance, shown, most, geometry, quantity)
+                return solve_to(self, error, solver, tolerance, shown, most_unknowns, geometry, quantity)
             if self.motion is not None:
                 from kratos_lite.analysis.steady import solve_steady  # a quick start for statics
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from kratos_lite.errors import MeshError
 from kratos_lite.mesh.blocks import NO_ROWS, Block, with_rows
-from kratos_lite.mesh.centers import Centers, Keys, keys_of
+from kratos_lite.mesh.centers import Centers, Keys, are_among, keys_of, sorted_keys
 from kratos_lite.shapes import Shape
 from kratos_lite.shapes.faces import FACE_SHAPES, Line3
 from kratos_lite.typing import Array, Ints, Mask, Rows
@@ -220,7 +220,7 @@ def split_faces(blocks: Sequence[Block], centers: Centers, corner: Mask, existin
                 cells = np.flatnonzero(ends[:, half] & ends[:, half + 2] & ~quartered)
                 if len(cells):
                     line = keys_of(middles[cells][:, [half, half + 2]])
-                    cells = cells[np.isin(line, existing)]
+                    cells = cells[are_among(line, existing)]
                 yield Split(kind, nodes[cells], middles[cells], at.start + cells, half)
 
 
@@ -236,7 +236,7 @@ def hanging_nodes(blocks: Sequence[Block], centers: Centers, n_nodes: int) -> Ha
             continue
         smaller = face.parts()
         inside = [keys_of(part) for part in smaller if part.shape[1] > 2]
-        cut = np.isin(np.stack(inside), existing).all(axis=0)
+        cut = are_among(np.stack(inside), existing).all(axis=0)
         if not cut.any():
             continue
         coarse = Split(face.shape, face.nodes[cut], face.middles[cut], face.rows[cut], face.half)
@@ -334,8 +334,7 @@ def is_corner(blocks: Iterable[Block], n_nodes: int) -> Mask:
 
 def existing_keys(blocks: Iterable[Block]) -> Keys:
     """Return the keys of the edges and faces of elements, each once and in order."""
-    keys = [entity_keys(block).ravel() for block in blocks if block.shape is not None and block.shape.faces]
-    return np.unique(np.concatenate([np.zeros(0, dtype=np.uint64), *keys]))
+    return sorted_keys(*(entity_keys(block) for block in blocks if block.shape and block.shape.faces))
 
 
 def entity_keys(block: Block) -> Keys:

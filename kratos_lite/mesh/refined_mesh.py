@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kratos_lite.mesh.blocks import Block, Part
-from kratos_lite.mesh.centers import Keys, corners_around, keys_of
+from kratos_lite.mesh.centers import Keys, are_among, corners_around, keys_of, sorted_keys
 from kratos_lite.mesh.mesh import Mesh
 from kratos_lite.mesh.selection import Where, WhereElements, elements_among
 from kratos_lite.shapes import Shape
@@ -67,7 +67,7 @@ class RefinedMesh:
         if not len(self.inside) or not len(rows):
             return rows
         keys = _keys_among(self.coarse, rows)
-        new = np.flatnonzero(np.isin(self.inside, keys)) + self.coarse.n_nodes
+        new = np.flatnonzero(are_among(self.inside, keys)) + self.coarse.n_nodes
         return np.concatenate([rows, new])
 
     def children(self, rows: Ints) -> Ints:
@@ -118,7 +118,7 @@ def _keys_among(mesh: Mesh, rows: Ints) -> Keys:
     """Return the keys of the edges, faces and cells that a set of nodes means; see `RefinedMesh.grown`."""
     inside = np.zeros(mesh.n_nodes, dtype=bool)
     inside[rows] = True
-    keys: list[Keys] = [np.zeros(0, dtype=np.uint64)]
+    keys: list[Keys] = []
     alone = inside.copy()
     for faces in mesh.boundary:
         chosen = faces.nodes[inside[faces.nodes].all(axis=1)]
@@ -127,7 +127,7 @@ def _keys_among(mesh: Mesh, rows: Ints) -> Keys:
     if alone.any():
         for block in mesh.blocks:
             keys += _with_lone_nodes(block, inside, alone)
-    return np.unique(np.concatenate(keys))
+    return sorted_keys(*keys)
 
 
 def _edges_and_face(nodes: Rows, shape: type[Shape]) -> list[Keys]:

@@ -14,7 +14,7 @@ import numpy as np
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import MeshError
 from kratos_lite.mesh.blocks import Block, with_rows
-from kratos_lite.mesh.centers import Centers, Keys, keys_of
+from kratos_lite.mesh.centers import Centers, Keys, are_among, keys_of, sorted_keys
 from kratos_lite.mesh.hanging import (
     entity_keys,
     existing_keys,
@@ -140,7 +140,7 @@ def _condition_cuts(mesh: Mesh, block: Block, cut: Keys, direction: Array | None
     shape = block.shape
     if shape is None or shape.cell == "point" or not len(block):
         return []
-    cells = np.flatnonzero(np.isin(keys_of(block.nodes[:, : shape.corners]), cut))
+    cells = np.flatnonzero(are_among(keys_of(block.nodes[:, : shape.corners]), cut))
     cuts = []
     if direction is not None and len(cells) and shape.cell in ("quadrilateral", "line"):
         along = axes_along(mesh, block.take(cells), direction)
@@ -161,8 +161,8 @@ def _closed(mesh: Mesh, centers: Centers, marked: Mask) -> Mask:
     keys, element = _keys_by_element(mesh)
     marked = marked.copy()
     while True:
-        hot = np.unique(keys[marked[element]])
-        need = owners[np.isin(parts, hot) & ~marked[owners]]
+        hot = sorted_keys(keys[marked[element]])
+        need = owners[are_among(parts, hot) & ~marked[owners]]
         if not len(need):
             return marked
         marked[need] = True
@@ -195,11 +195,11 @@ def _keys_by_element(mesh: Mesh) -> tuple[Keys, Ints]:
 def _cut_entities(mesh: Mesh, marked: Mask) -> Keys:
     """Return the keys of the edges and faces of the elements that are cut."""
     keys = [
-        entity_keys(block.take(marked[at])).ravel()
+        entity_keys(block.take(marked[at]))
         for block, at in with_rows(mesh.blocks)
         if block.shape is not None and marked[at].any()
     ]
-    return np.unique(np.concatenate([np.zeros(0, dtype=np.uint64), *keys]))
+    return sorted_keys(*keys)
 
 
 # ---- order -------------------------------------------------------------------------------------------

@@ -71,6 +71,12 @@ def _equations(mesh: Mesh, found: Bodies, supports: Supports) -> _Constraints:
     row, dof, weight = supports.constraint_rows()
     body = part[dof // 3]
     first = int(row.max(initial=-1)) + 1
+    joins = np.ones(first, dtype=bool)  # hanging nodes that hang within a body hold in each of its motions
+    fixed = int(supports.fixed.sum())
+    joins[fixed : fixed + len(supports.hanging)] = False
+    joins[row[body != body[row]]] = True
+    kept = joins[row]
+    row, dof, body, weight = row[kept], dof[kept], body[kept], weight[kept]
     joint = (3 * node[:, None] + np.arange(3)).ravel()
     rows = first + np.arange(len(joint))
     ones = np.ones(len(joint))

@@ -272,8 +272,8 @@ def _on(level: PCoarseLevel, nodes: Ints, inner: Any, P: Any) -> PCoarseLevel:
     from scipy.sparse import kron
 
     def assemble() -> BlockMatrix:
-        axes: Any = kron(inner, np.eye(3)).tocsr()
-        return BlockMatrix.of(axes.T @ level.K.scipy().tocsr() @ axes)
+        axes: Any = kron(inner, np.eye(3), format="bsr")
+        return BlockMatrix.of(axes.T @ level.K.scipy() @ axes)
 
     P.sort_indices()
     return PCoarseLevel(
@@ -291,9 +291,10 @@ def apply_ties(level: PCoarseLevel, T: Any, free: Ints) -> PCoarseLevel:
     n, m = T.shape[0] // 3, len(level.nodes)
     entries = T.tocoo()
     column = free[entries.col]
-    dependent = np.flatnonzero(~np.isin(np.arange(3 * n), free))
-    is_dependent = np.zeros(n, dtype=bool)
-    is_dependent[np.intersect1d(dependent, entries.row) // 3] = True
+    dependent = np.zeros((n, 3), dtype=bool)
+    dependent.flat[entries.row] = True
+    dependent.flat[free] = False
+    is_dependent = np.asarray(dependent.any(axis=1))
     if not is_dependent[level.nodes].any():
         return level  # as with hanging nodes, which the level has left out
     chosen = is_dependent[entries.row // 3]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Block, Mesh, Where, outward_signs
 from kratos_lite.model.loads.base import DistributedLoad, Load, OfPlace, at_places, vectors
 from kratos_lite.typing import Array
-from kratos_lite.validation import number
+from kratos_lite.validation import finite, number
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -47,7 +47,8 @@ class Traction(FaceLoad):
     Parameters
     ----------
     where : part; its conditions if it has any, otherwise the boundary faces among its nodes.
-    traction : (3,) float, Pa; or a function of places (m, 3) that returns (m, 3), taken at quadrature points.
+    traction : (3,) float, or (n, 3) interpolated from the nodes of the mesh; Pa; or a function of places
+        (m, 3) that returns (m, 3), taken at quadrature points.
     """
 
     cells: ClassVar[tuple[str, ...]] = SURFACES
@@ -55,19 +56,19 @@ class Traction(FaceLoad):
     def __init__(self, where: Where, traction: ArrayLike | OfPlace) -> None:
         self.where, self.traction = where, traction
         if not callable(traction):
-            self.traction = vectors(traction, "a traction", "(3,) in Pa")
+            self.traction = vectors(traction, "a traction", "(3,) or (n, 3) in Pa", (1, 2))
 
     def on_faces(self, mesh: Mesh, factors: int = FUNCTION) -> Iterator[tuple[Block, Array]]:
         """Yield blocks of faces with ∫ N t dA (m, k, 3) in N of each face."""
         what = "a traction" if self.cells == SURFACES else "a line load"
         for block in _faces(mesh, self.where, what, self.cells):
             assert block.shape is not None
-            t = at_places(self.traction, what, (3,)) if callable(self.traction) else self.traction
+            t = _on(block, self.traction, mesh, what, (3,))
             yield block, surface_load(block.shape, mesh.points[block.nodes], t, factors)
 
     def refined(self, finer: RefinedMesh) -> Load:
         """Return the load on a finer mesh: on the faces or lines that have come from those of the old one."""
-        return type(self)(finer.where(self.where), self.traction)
+        return type(self)(finer.where(self.where), _refined(self.traction, finer, 2))
 
 
 class LineLoad(Traction):
@@ -88,7 +89,8 @@ class Pressure(FaceLoad):
     Parameters
     ----------
     where : part; its conditions if it has any, otherwise the boundary faces among its nodes.
-    pressure : float, Pa; or a function of places (m, 3) that returns (m,), taken at quadrature points.
+    pressure : float, or (n,) interpolated from the nodes of the mesh; Pa; or a function of places (m, 3) that
+        returns (m,), taken at quadrature points.
     normal : ``"outward"`` takes the outward normal of the body; ``"nodes"`` the normal about which
         the nodes of each condition run counter-clockwise, as Kratos does.
 
@@ -98,18 +100,21 @@ class Pressure(FaceLoad):
         The normal is neither, or the pressure no number.
     """
 
-    def __init__(self, where: Where, pressure: float | OfPlace, normal: str = "outward") -> None:
+    def __init__(self, where: Where, pressure: ArrayLike | OfPlace, normal: str = "outward") -> None:
         if normal not in ("outward", "nodes"):
             raise InputError(f"normal must be 'outward' or 'nodes'; got {normal!r}")
         if not callable(pressure):
-            pressure = number(pressure, "a pressure")
+            pressure = finite(pressure, "a pressure")
+            if pressure.ndim > 1:
+                raise InputError(f"a pressure must be one number or (n,) in Pa; got shape {pressure.shape}")
+            pressure = pressure if pressure.ndim else number(pressure.item(), "a pressure")
         self.where, self.pressure, self.normal = where, pressure, normal
 
     def on_faces(self, mesh: Mesh, factors: int = FUNCTION) -> Iterator[tuple[Block, Array]]:
         """Yield blocks of faces with -∫ N p n dA (m, k, 3) in N of each face."""
         for block in _faces(mesh, self.where, "a pressure"):
             assert block.shape is not None
-            p = at_places(self.pressure, "a pressure", ()) if callable(self.pressure) else self.pressure
+            p = _on(block, self.pressure, mesh, "a pressure", ())
             forces = surface_pressure(block.shape, mesh.points[block.nodes], p, factors)
             if self.normal == "outward":
                 forces *= outward(mesh, block)[:, None, None]
@@ -117,7 +122,23 @@ class Pressure(FaceLoad):
 
     def refined(self, finer: RefinedMesh) -> Load:
         """Return the load on a finer mesh: on the faces that have come from those of the old one."""
-        return Pressure(finer.where(self.where), self.pressure, self.normal)
+        return Pressure(finer.where(self.where), _refined(self.pressure, finer, 1), self.normal)
+
+
+def _on(block: Block, value: Any, mesh: Mesh, what: str, width: tuple[int, ...]) -> Any:
+    """Return a load on faces: constant, at their nodes, or a function of places (..., 3)."""
+    if callable(value):
+        return at_places(value, what, width)
+    if np.ndim(value) == len(width):
+        return value
+    if len(value) != mesh.n_nodes:
+        raise InputError(f"{what} at nodes needs {mesh.n_nodes} of them; got {len(value)}")
+    return value[block.nodes]
+
+
+def _refined(value: Any, finer: RefinedMesh, dimensions: int) -> Any:
+    """Return a load on a finer mesh, where what nodes have is interpolated."""
+    return finer.interpolate(value) if not callable(value) and np.ndim(value) == dimensions else value
 
 
 def outward(mesh: Mesh, block: Block) -> Array:
