@@ -221,6 +221,30 @@ def check_rounding(
     return [text]
 
 
+def check_energy(
+    u: Array, inner: Array, loads: Array, reactions: Array, roundoff: float, supports: Supports
+) -> list[str]:
+    """Warn where loads and reactions do another work than twice the strain energy by `inner` forces, (n, 3).
+
+    Raises SolveError where 5 % are missing.  In thin bodies rounding of K, which no residual shows, makes the
+    body stiffer or softer; strains, and what stresses do, are as exact as the displacements.
+    """
+    twice, missing = float((u * inner).sum()), abs(float((u * (inner - loads - reactions)).sum()))
+    moved = (
+        100 * roundoff * float(np.abs(supports.values).sum())
+    )  # rounding of the work of what is prescribed
+    if missing <= max(1e-3 * abs(twice), moved):
+        return []
+    text = (
+        f"the work of the loads is {100 * missing / abs(twice):.2g} % off twice the strain energy: the "
+        "stiffness has lost its digits, as in very thin bodies; displacements are as wrong or more.  Take "
+        "cells less flat (smaller in the plane, fewer layers), or a shell program for bodies this thin"
+    )
+    if missing > 0.05 * abs(twice):
+        raise SolveError(text)
+    return [text]
+
+
 def check_loads(
     loads: Sequence[Load], groups: Sequence[ElementGroup], forces: Array, supports: Supports
 ) -> list[str]:

@@ -60,32 +60,46 @@ def test_one_step_of_hht_satisfies_its_equation(alpha):
     assert np.abs(sum(terms)).max() < 1e-9 * max(np.abs(term).max() for term in terms)
 
 
-def test_one_step_of_central_differences_damps_the_velocity_at_its_middle():
-    """M a⁺ + C v(½) + K u⁺ = f, v(½) = v + h/2 a."""
+def test_one_step_of_central_differences_damps_the_velocity_at_its_end():
+    """M a⁺ + α M v⁺ + K u⁺ = f."""
     subject = model()
     start = np.random.default_rng(2).uniform(-1, 1, (12, 3)) * (subject.mesh.points[:, 2:] > 0)
     options = {"velocity": start, "rayleigh": (50.0, 0.0)}
     transient = subject.transient(integrator=kl.CentralDifference(), **options)
     h = 0.5 * transient.critical_step()
     M, C, K, free = system(transient)
-    half = (transient.v + h / 2 * transient.a)[free]
     old = transient.v[free]
     (end,) = kl.integrate(transient, h, 1)
-    u1, a1 = end.u.ravel()[free], end.a.ravel()[free]
-    left = M @ a1 + C @ half + K @ u1 - transient.equations.load(h)[free]
+    u1, v1, a1 = (x.ravel()[free] for x in (end.u, end.v, end.a))
+    left = M @ a1 + C @ v1 + K @ u1 - transient.equations.load(h)[free]
     assert np.abs(left).max() < 1e-9 * np.abs(M @ a1).max()
-    assert np.abs(C @ (half - old)).max() > 1e-4 * np.abs(M @ a1).max()
+    assert np.abs(C @ (v1 - old)).max() > 1e-4 * np.abs(M @ a1).max()
 
 
-@pytest.mark.parametrize("rayleigh", [(300.0, 0.0), (0.0, 1e-3), (100.0, 5e-4)])
+@pytest.mark.parametrize(("rayleigh", "order"), [((0.0, 0.0), 2), ((40.0, 0.0), 2)])
+def test_order_of_central_differences_with_damping(rayleigh, order):
+    """Errors at steps of h and h/2 against those of h/16."""
+    ends = []
+    for n in (1, 2, 16):
+        transient = model().transient(
+            integrator=kl.CentralDifference(), velocity=1e-3 * model().mesh.points, rayleigh=rayleigh
+        )
+        h = 0.4 * transient.critical_step()
+        ends.append([state.u for state in kl.integrate(transient, h / n, 60 * n, every=60 * n)][-1])
+    coarse, fine = (np.abs(end - ends[2]).max() for end in ends[:2])
+    limit = 2.0**order * (1 - 16.0**-order) / (1 - 8.0**-order) * np.array([0.8, 1.2])
+    assert limit[0] < coarse / fine < limit[1]
+
+
+@pytest.mark.parametrize("rayleigh", [(0.0, 1e-3), (100.0, 5e-4)])
 def test_damping_shortens_the_critical_step_of_central_differences(rayleigh):
-    """With x = ω h / 2 the limit of stability is x² + 2 ξ x = 1, ξ = α / 2ω + β ω / 2."""
+    """With x = ω h / 2 the limit of stability is x² + 2 ξ x = 1, ξ = β ω / 2."""
     free, damped = (
         model().transient(integrator=kl.CentralDifference(), rayleigh=r).critical_step()
         for r in ((0.0, 0.0), rayleigh)
     )
-    omega, (alpha, beta) = 2 / free, rayleigh
-    xi, x = alpha / (2 * omega) + beta * omega / 2, omega * damped / 2
+    omega = 2 / free
+    xi, x = rayleigh[1] * omega / 2, omega * damped / 2
     assert xi > 0.02
     assert x * x + 2 * xi * x == pytest.approx(1.0, rel=1e-12)
 

@@ -79,7 +79,10 @@ WRONG = {
     "force rows": (lambda: solved_with(kl.BodyForce(np.ones((99, 3)))), r"BodyForce needs shape \(27, 3\)"),
     "force part": (lambda: solved_with(kl.BodyForce((0, 0, 1), "nope")), "there is no part 'nope'"),
     "force property": (lambda: solved_with(kl.BodyForce((0, 0, 1), 7)), "no element has property 7"),
-    "traction rows": (lambda: kl.Traction("z+", np.ones((4, 2))), r"a traction must be \(3,\) in Pa"),
+    "traction rows": (
+        lambda: kl.Traction("z+", np.ones((4, 2))),
+        r"a traction must be \(3,\) or \(n, 3\) in Pa",
+    ),
     "traction edge": (lambda: solved_with(kl.Traction([26, 25], (0, 0, 1))), "a traction finds no face"),
     "pressure word": (lambda: kl.Pressure("z+", "a"), "a pressure must be made of real numbers"),
     "pressure none": (lambda: kl.Pressure("z+", None), "a pressure must be"),

@@ -41,21 +41,20 @@ class CentralDifference(ModelIntegrator):
             raise ModelError("central differences do not take constraints; use Newmark()")
 
     def critical_step(self, e: EquationsOfMotion) -> float:
-        """Return 2/ω (√(1 + ξ²) - ξ) in s, ω of a bound for the elements, ξ the damping ratio."""
+        """Return 2/ω (√(1 + ξ²) - ξ) in s, ω of a bound for the elements, ξ the damping ratio of β."""
         omega = highest_frequency(e.system.points, e.system.groups, lumped=True)
-        alpha, beta = e.rayleigh
-        xi = alpha / (2 * omega) + beta * omega / 2
+        xi = e.rayleigh[1] * omega / 2
         return float(2 / omega * (np.sqrt(1 + xi * xi) - xi))
 
     def step(self, e: EquationsOfMotion, now: Kinematics, start: float, h: float) -> Kinematics:
-        """Take a step; damping sees the velocity half a step before the end."""
+        """Take a step; α M damps the velocity at its end, β K that half a step before."""
         (u, v, a), held = now, e.held
         half = v + h / 2 * a
         u = u + h * half
         given = at_end(e, start + h, h)
         u[held] = given[0][held]
         force = e.load(start + h) - e.times_damping(half, start) - e.times_stiffness(u, start)
-        a = e.mass.solve(force)
+        a = e.mass.solve(force) / (1 + e.rayleigh[0] * h / 2)  # v = half + h/2 a
         a[held] = given[2][held]
         v = half + h / 2 * a
         v[held] = given[1][held]
