@@ -154,6 +154,8 @@ def real(token: bytes) -> float:
         hint = ""
         if re.fullmatch(rb"[+-]?\d+,\d+(?:[eE][+-]?\d+)?", token):
             hint = f"; decimal comma? write {token.replace(b',', b'.').decode()}"
+            if re.fullmatch(rb"[+-]?\d{1,3},\d{3}", token):
+                hint += f"; thousands? write {token.replace(b',', b'').decode()}"
         raise ValueError(f"{shown(token)} is not a number{hint}")
     value = float(token.translate(bytes.maketrans(b"dD", b"ee")))
     if value in (float("inf"), float("-inf")):

@@ -28,7 +28,7 @@ Factors = tuple[Value, ...] | None
 IDLE = ("ROTATION", "VELOCITY", "ACCELERATION", "ANGULAR_VELOCITY", "ANGULAR_ACCELERATION", "REACTION")
 """Vector variables that files set although a static solution of solids does not use them."""
 KNOWN_VECTORS = (*VECTORS, *IDLE)
-KNOWN_SCALARS = (*(f"{v}_{a}" for v in KNOWN_VECTORS for a in "XYZ"), *PRESSURES, "TEMPERATURE")
+KNOWN_SCALARS = (*(f"{v}_{a}" for v in KNOWN_VECTORS for a in "XYZ"), *PRESSURES)
 COMMON = ("help", "mesh_id", "model_part_name", "variable_name", "interval", "local_axes")
 NORMALS = ("automatic_inwards_normal", "automatic_outwards_normal")
 
@@ -169,6 +169,9 @@ def refuse_local_axes(settings: Settings) -> None:
 def _variable(settings: Settings, process: Process) -> str:
     kind, known = ("vector", KNOWN_VECTORS) if process.is_vector else ("scalar", KNOWN_SCALARS)
     name = settings.text("variable_name").rsplit(".", 1)[-1]
+    if name == "TEMPERATURE":
+        text = "a TEMPERATURE is imposed, but there is no thermal strain; take the process out"
+        raise settings.error("variable_name", text)
     if name not in known:
         text = f"{name!r} is not a {kind} variable of static solids.{nearest_variable(name, known)}"
         raise settings.error("variable_name", f"{text} Known are {', '.join(known[:5])} …")

@@ -69,6 +69,7 @@ def read_kratos_project(
             f"supports, loads and motion are taken at the end of the run: those at t = {times[-1]:g} s"
         )
     document = _read_mesh(solver, folder, allow_outside, notes, part)
+    _check_strains(solver, document)
     root, moved = solver.text("model_part_name", "Structure"), solver.flag("move_mesh_flag", True)
     context = RunContext(document.mesh, root, folder, times, moved, allow_outside)
     materials = _read_materials(solver, context, document, notes)
@@ -128,6 +129,18 @@ def _check_solver(solver: Settings) -> list[str]:
         notes.append("analysis_type is non_linear: the linear solution is computed, on the undeformed body")
     chosen = solver.section("linear_solver_settings").text("solver_type", "")
     return notes + ([f"linear solver {chosen}: kratos_lite chooses its own"] if chosen else [])
+
+
+def _check_strains(solver: Settings, document: Document) -> None:
+    """Refuse elements of large strains in a nonlinear analysis: their linear solution is another one."""
+    large = ("TotalLagrangian", "UpdatedLagrangian")
+    names = [block.name for block in document.mesh.blocks if len(block) and block.name.startswith(large)]
+    text = (
+        f"elements {', '.join(names)} with 'non_linear' have large deformations, which are not here yet; for "
+        "the linear solution set 'linear', or name them SmallDisplacementElement3D…N"
+    )
+    is_linear = solver.text("analysis_type", "non_linear") == "linear"
+    solver.expect(is_linear or not names, "analysis_type", text)
 
 
 def part_files_of(run_file: Path) -> dict[int, Path]:

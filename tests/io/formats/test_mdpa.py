@@ -332,6 +332,7 @@ def test_value_by_the_type_of_its_variable(read, text, value):
         ("YOUNG_MODULUS [3] (1,2,3)", r"8:16: YOUNG_MODULUS: expected a number, found"),
         ("YOUNG_MODULUS", r"8:2: YOUNG_MODULUS: has no value"),
         ("YOUNG_MODULUS 1,5", r"'1,5' is not a number; decimal comma\? write 1.5"),
+        ("YOUNG_MODULUS 200,000", r"decimal comma\? write 200.000; thousands\? write 200000"),
         ("DENSITY 1 kg", r"8:12: 'kg' is not a variable"),
         ("BODY_FORCE 1.0, 2.0, 3.0", r"BODY_FORCE: '1.0,' is not a vector; write \[3\] \(x, y, z\)"),
         ("MINE 1.0, 2.0, 3.0", r"MINE: '1.0,' is not a number"),

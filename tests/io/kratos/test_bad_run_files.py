@@ -95,6 +95,10 @@ BAD = {
         in_time(process("assign_scalar_variable_process", "Top", "DISPLACEMENT_X", value="t*X")),
         "a support may move with x, y, z or with t, not with both",
     ),
+    "temperature": (
+        processes(process("assign_scalar_variable_process", "Top", "TEMPERATURE", value=80.0)),
+        "a TEMPERATURE is imposed, but there is no thermal strain",
+    ),
     "two dimensions": (changed(domain_size=2), "domain_size must be 3; got 2"),
     "domain size as text": (
         changed(domain_size="3"),
@@ -244,6 +248,13 @@ def test_bad_materials_file_is_refused_with_place_and_problem(folder, name):
         read_case(write(folder, changed()))
     assert words in str(caught.value)
     assert str(caught.value).startswith(f"{path}: ")
+
+
+def test_large_deformations_are_not_solved_as_small_ones(folder):
+    (folder / "box.mdpa").write_text(box_mdpa().replace("SmallDisplacementElement", "TotalLagrangianElement"))
+    with pytest.raises(InputError, match=r"TotalLagrangianElement3D8N with 'non_linear'.*set 'linear'"):
+        read_case(write(folder, changed(analysis_type="non_linear")))
+    assert read_case(write(folder, changed())).model.mesh.n_elements == 8
 
 
 def test_elements_without_material_are_named(folder):
