@@ -27,7 +27,7 @@ from kratos_lite.materials import MATERIALS, LinearMaterial
 from kratos_lite.model.loads import Load
 from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.loads.nodal import PointLoad
-from kratos_lite.model.loads.surface import Pressure, Traction
+from kratos_lite.model.loads.surface import Pressure, Resultant, Traction
 from kratos_lite.validation import whole_number
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 OF_TIME = ("integrator", "rayleigh", "lumped", "restart", "state", "steps")
 """Options that need a time integration."""
 OF_MODELS = (
-    *("material", "formulation", "fix", "gravity", "traction", "pressure", "point_load"),
+    *("material", "formulation", "fix", "gravity", "traction", "pressure", "point_load", "resultant"),
     *("modes", "solver", "tolerance", "error"),
     *("rotation", "translation", "center", "center_velocity", "center_acceleration", "stiffening"),
     *("boundaries", "damping", "moving_part"),
@@ -157,6 +157,7 @@ LOADS: dict[str, tuple[Callable[[str, Any], Load], Callable[[str, str], Any], st
     "traction": (Traction, vector, "PART:X,Y,Z"),
     "pressure": (Pressure, number, "PART:P"),
     "point_load": (PointLoad, vector, "PART:X,Y,Z"),
+    "resultant": (Resultant, vector, "PART:X,Y,Z"),
 }
 
 

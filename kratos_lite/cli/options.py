@@ -212,7 +212,8 @@ def _add_model(command: argparse.ArgumentParser) -> None:
         ("--gravity", "X,Y,Z", "acceleration in m/s²"),
         ("--traction", "PART:X,Y,Z", "force per area in Pa"),
         ("--pressure", "PART:P", "pressure in Pa, positive into the body"),
-        ("--point-load", "PART:X,Y,Z", "force in N on each node of the part"),
+        ("--point-load", "PART:X,Y,Z", "force in N on a part of one node"),
+        ("--resultant", "PART:X,Y,Z", "force in N in all, spread over the faces of the part"),
         action="append",
         default=[],
     )

@@ -493,6 +493,35 @@ class Mesh(Tabular):
             blocks.append(replace(block, nodes=nodes))
         return self.replace(blocks=blocks)
 
+    def area(self, where: Where) -> float:
+        """Return the area of a part.
+
+        Parameters
+        ----------
+        where : as for `faces`.
+
+        Returns
+        -------
+        m², of its faces.
+
+        Examples
+        --------
+        >>> from kratos_lite import box
+        >>> box((2.0, 3.0, 1.0)).area("z+")
+        6.0
+        """
+        from kratos_lite.elements.surface import FUNCTION, area_vectors, face_rule  # above this floor's start
+
+        return float(
+            sum(
+                np.linalg.norm(
+                    area_vectors(b.shape, self.points[b.nodes], face_rule(b.shape, FUNCTION)), axis=-1
+                ).sum()
+                for b in self.faces(where)
+                if b.shape is not None
+            )
+        )
+
     def faces(self, where: Where) -> list[Block]:
         """Return the faces of a part: its conditions, or else the boundary faces among its nodes.
 

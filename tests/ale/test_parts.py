@@ -130,11 +130,11 @@ def test_the_cut_faces_of_a_strip_are_its_own(boundaries):
     both = kl.Model(joined(strip=strip, rest=rest), {"strip": RUBBER, "rest": STEEL})
     both.fix("rest.z-")
     both.fix("strip.z-")
-    both.add(kl.PointLoad("strip.y+", (1.0, 2.0, -3.0)))
+    both.add(kl.PointLoad("strip.y+", (1.0, 2.0, -3.0), each=True))
     both.add(Translation("x", part="strip", **motion))
     alone = kl.Model(kl.box((4.0, 0.5, 0.2), (8, 1, 1), origin=(-2.0, 0.0, 0.0)), RUBBER)
     alone.fix("z-")
-    alone.add(kl.PointLoad("y+", (1.0, 2.0, -3.0)))
+    alone.add(kl.PointLoad("y+", (1.0, 2.0, -3.0), each=True))
     alone.add(Translation("x", **motion))
     n = strip.n_nodes
     same(both.solve().u[:n], alone.solve().u)

@@ -56,7 +56,7 @@ def test_forces_are_kept_while_the_load_is_the_same():
 
 
 def test_a_load_that_comes_late_finds_all_at_rest_before():
-    push = kl.PointLoad("x+", (0.0, 0.0, 10.0))
+    push = kl.PointLoad("x+", (0.0, 0.0, 10.0), each=True)
     transient = beam(kl.TimeDependentLoad(lambda t: push if t > 0.0105 else None)).transient()
     sizes = [np.abs(state.u).max() for state in kl.integrate(transient, dt=1e-3, steps=20)]
     assert max(sizes[:10]) == 0 < min(sizes[10:])

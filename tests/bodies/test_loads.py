@@ -172,7 +172,7 @@ def test_loads_add_up_and_an_amplitude_multiplies(kind):
 MODEL_LOADS = [
     kl.Traction("x+", (10.0, -20.0, 5.0)),
     kl.Pressure("z+", 7.0),
-    kl.PointLoad("y-", (1.0, 2.0, 3.0)),
+    kl.PointLoad("y-", (1.0, 2.0, 3.0), each=True),
     kl.BodyForce((4.0, -5.0, 6.0)),
     kl.BodyForce(np.random.default_rng(1).uniform(-1, 1, (18, 3))),
     kl.Gravity((1.0, 2.0, 3.0), where=[0, 2]),

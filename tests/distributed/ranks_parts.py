@@ -18,7 +18,7 @@ def loaded(mesh):
     model.fix("x+", "y", 1e-4)
     model.add(kl.Traction("z+", (1e6, 0.0, -2e6)))
     model.add(kl.Gravity((0.0, 0.0, -9.81)))
-    model.add(kl.PointLoad("y+", (0.0, 10.0, 0.0)))
+    model.add(kl.PointLoad("y+", (0.0, 10.0, 0.0), each=True))
     return model
 
 

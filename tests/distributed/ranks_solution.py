@@ -57,7 +57,7 @@ def pulled(mesh):
     model.assign(kl.Isotropic3D(E=2e4, nu=0.4, density=900.0), np.flatnonzero(np.concatenate(right)))
     model.add(kl.Traction("z+", (10.0, 20.0, -30.0)))
     model.add(kl.Pressure("x+", 50.0))
-    model.add(kl.PointLoad("y+", (0.0, 5.0, 7.0)))
+    model.add(kl.PointLoad("y+", (0.0, 5.0, 7.0), each=True))
     return model
 
 
@@ -235,7 +235,7 @@ def test_gravity_cube():
 def test_load_cases_and_one_matrix():
     cases = {
         "down": kl.Gravity((0.0, 0.0, -9.81)),
-        "pull": [kl.Traction("z+", (0.0, 1.0, 50.0)), kl.PointLoad("x+", (1.0, 0.0, 0.0))],
+        "pull": [kl.Traction("z+", (0.0, 1.0, 50.0)), kl.PointLoad("x+", (1.0, 0.0, 0.0), each=True)],
     }
     model = clamped(box())
     expected, found = model.solve_cases(cases), model.solve_cases(cases, backend="petsc")

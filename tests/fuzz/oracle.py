@@ -34,8 +34,8 @@ VALUES = (
 ).split(" ")
 FLAGS = ("--stiffening", "--lumped", "--ignore-initial-displacement", "--lenient", "-v")
 OPTIONS = (
-    "--material --fix --gravity --traction --pressure --point-load --rotation --translation --center "
-    "--damping --boundaries --time "
+    "--material --fix --gravity --traction --pressure --point-load --resultant --rotation "
+    "--translation --center --damping --boundaries --time "
     "--restart --integrator --rayleigh --steps --modes --solver --tolerance --json --state"
 ).split()
 

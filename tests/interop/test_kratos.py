@@ -372,7 +372,7 @@ def test_point_loads_and_prescribed_displacements_are_those_of_kratos(tmp_path):
     model = kl.Model(distorted_cube(20, 2), STEEL)
     model.fix("z-", "xyz", [1e-5, -2e-5, 3e-5])
     model.fix("z+", "y", 4e-5)
-    model.add(kl.PointLoad("x+", (100.0, 200.0, -300.0)))
+    model.add(kl.PointLoad("x+", (100.0, 200.0, -300.0), each=True))
     kl.write(tmp_path / "a.mdpa", model)
     (found,) = ask(tmp_path, [{"mdpa": str(tmp_path / "a.mdpa"), "solve": True}])
     assert found["conditions"] == len(model.mesh.nodes("x+"))

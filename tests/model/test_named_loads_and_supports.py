@@ -34,7 +34,7 @@ def by_cell():
         (kl.Traction("y+", UP), 2.0),
         (kl.Traction("y+", UP), lambda t: factor * t),
         (kl.Traction("y+", UP), kl.TimeSeries([0.0, 1.0], [0.0, 2.0])),
-        (kl.TimeDependentLoad(lambda t: kl.PointLoad("x+", (0, 0, factor * t))), None),
+        (kl.TimeDependentLoad(lambda t: kl.PointLoad("x+", (0, 0, factor * t), each=True)), None),
     ]
 
 

@@ -35,7 +35,7 @@ LOADS = {
     "linear traction": kl.Traction("z+", lambda X: X),
     "traction by rows": kl.Traction([0, 1, 2, 3, 4, 5], (1.0, 2.0, 3.0)),
     "pressure": kl.Pressure(lambda X: X[:, 2] == 0.7, 5.0),
-    "point load": kl.PointLoad("z+", (0.0, 0.0, 2.0)),
+    "point load": kl.PointLoad("z+", (0.0, 0.0, 2.0), each=True),
     "nodal forces": kl.NodalForces(np.arange(54.0).reshape(18, 3)),
     "nodal body force": kl.BodyForce(np.linspace(0, 1, 54).reshape(18, 3)),
 }

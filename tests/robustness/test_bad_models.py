@@ -282,7 +282,7 @@ def test_loads_that_cannot_do_anything_are_reported():
     ]
     held = kl.Model(kl.box(), STEEL)
     held.fix("z-")
-    held.add(kl.PointLoad("z-", (0, 0, 1.0)))
+    held.add(kl.PointLoad("z-", (0, 0, 1.0), each=True))
     assert held.solve().report.warnings == ["all loads act on fixed components, so nothing moves"]
 
 

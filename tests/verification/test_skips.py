@@ -179,7 +179,7 @@ def test_without_load_nothing_is_assembled_or_solved(solver):
 @pytest.mark.usefixtures("without_matrices")
 def test_loads_on_supports_alone_go_straight_into_them():
     model = bodies(1)
-    model.add(kl.PointLoad("z-", (1.0, 2.0, 3.0)))
+    model.add(kl.PointLoad("z-", (1.0, 2.0, 3.0), each=True))
     result = model.solve()
     assert not result.u.any()
     expected = np.where(model.mesh.points[:, 2:] == 0, [-1.0, -2.0, -3.0], 0.0)

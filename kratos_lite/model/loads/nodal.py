@@ -13,6 +13,7 @@ from kratos_lite.mesh import Mesh, Where
 from kratos_lite.mesh.selection import ONE_PLACE, nodes_at, point_of
 from kratos_lite.model.loads.base import Load, vectors
 from kratos_lite.typing import Array, Ints
+from kratos_lite.validation import flag, short
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -28,6 +29,7 @@ class PointLoad(Load):
     where : a point (x, y, z) in m, or nodes.  A force on a point acts on the node there, or else on the nodes
         of the element around it, by its shape functions N.
     force : (3,) float, N: in all on a point, on each of several nodes.
+    each : a part of several nodes is refused otherwise: `Resultant` spreads a force over its faces.
 
     Examples
     --------
@@ -36,8 +38,8 @@ class PointLoad(Load):
     [0, -2, 0, -2, 0, -2, 0, -2]
     """
 
-    def __init__(self, where: Where, force: ArrayLike) -> None:
-        self.where = where
+    def __init__(self, where: Where, force: ArrayLike, each: bool = False) -> None:
+        self.where, self.each = where, flag(each, "each")
         self.force = vectors(force, "a point load", "(3,) in N")
         self._point = point_of(where)
 
@@ -48,9 +50,18 @@ class PointLoad(Load):
         ------
         MeshError
             They do not.
+        ModelError
+            A part has several nodes, and the force was not said to be on each.
         """
         if self._point is None:
             super().check(mesh)
+            count = len(mesh.nodes(self.where)) if isinstance(self.where, str) else 1
+            if count > 1 and not self.each:
+                force = short(self.force.tolist())
+                raise ModelError(
+                    f"a point load on part {self.where!r} would put {force} N on each of its {count} nodes: "
+                    "if so, give each=True; a force in all is kl.Resultant(part, force), or --resultant"
+                )
         else:
             _around(mesh, self._point)
 
@@ -78,7 +89,7 @@ class PointLoad(Load):
     def refined(self, finer: RefinedMesh) -> Load:
         """Return the load on a finer mesh: on the same nodes or point."""
         same = finer.coarse.nodes(self.where) if self._point is None else self.where
-        return PointLoad(same, self.force)
+        return PointLoad(same, self.force, self.each)
 
 
 def _around(mesh: Mesh, point: Array) -> tuple[Ints, Array]:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup, add_nodal
-from kratos_lite.elements.surface import FUNCTION, surface_load, surface_pressure
+from kratos_lite.elements.surface import FUNCTION, area_vectors, face_rule, surface_load, surface_pressure
+from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Block, Mesh, Where, outward_signs
 from kratos_lite.model.loads.base import DistributedLoad, Load, OfPlace, at_places, vectors
@@ -123,6 +124,85 @@ class Pressure(FaceLoad):
     def refined(self, finer: RefinedMesh) -> Load:
         """Return the load on a finer mesh: on the faces that have come from those of the old one."""
         return Pressure(finer.where(self.where), _refined(self.pressure, finer, 1), self.normal)
+
+
+class Resultant(FaceLoad):
+    """A force and a moment in all, spread over the faces of a part.
+
+    The traction is F / A + ω × (x - c), as a rigid plate on a soft bed would pass it on: c is the centroid of
+    the faces, and ω gives the moment.
+
+    Parameters
+    ----------
+    where : part; its conditions if it has any, otherwise the boundary faces among its nodes.
+    force : (3,) float, N.
+    moment : (3,) float, N m.
+    about : (3,) float, m; the point on which the force acts and about which the moment is.  The centroid if
+        not given.
+
+    Raises
+    ------
+    InputError
+        An argument is no vector.
+
+    Examples
+    --------
+    >>> import kratos_lite as kl
+    >>> model = kl.Model(kl.box((2.0, 1.0, 1.0)), kl.Isotropic3D(E=1e9, nu=0.3))
+    >>> forces = kl.Resultant("x+", (0, 0, -100.0), moment=(5.0, 0, 0)).forces(model.mesh, [])
+    >>> forces.sum(axis=0)[2].round(9).item()
+    -100.0
+    """
+
+    def __init__(
+        self,
+        where: Where,
+        force: ArrayLike,
+        moment: ArrayLike = (0.0, 0.0, 0.0),
+        about: ArrayLike | None = None,
+    ) -> None:
+        self.where = where
+        self.force = vectors(force, "a resultant force", "(3,) in N")
+        self.moment = vectors(moment, "a resultant moment", "(3,) in N m")
+        self.about = None if about is None else vectors(about, "the point of a resultant", "(3,) in m")
+
+    def on_faces(self, mesh: Mesh, factors: int = FUNCTION) -> Iterator[tuple[Block, Array]]:
+        """Yield blocks of faces with ∫ N t dA (m, k, 3) in N of each face.
+
+        Raises
+        ------
+        ModelError
+            There are no faces, or the mesh is a part of a larger one.
+        """
+        faces = _faces(mesh, self.where, "a resultant")
+        if not mesh.whole:
+            raise ModelError("a resultant needs all faces of its part in one mesh; give a traction instead")
+        X, dA = (np.concatenate(values) for values in zip(*_points_of(mesh, faces, factors), strict=True))
+        center = dA @ X / dA.sum()
+        arms = X - center
+        inertia = (dA * (arms**2).sum(axis=1)).sum() * np.eye(3) - (dA * arms.T) @ arms
+        arm = np.zeros(3) if self.about is None else self.about - center
+        turn = np.linalg.solve(inertia, self.moment + np.cross(arm, self.force))
+
+        def traction(x: Array) -> Array:
+            return np.asarray(self.force / dA.sum() + np.cross(turn, x - center))
+
+        for block in faces:
+            assert block.shape is not None
+            yield block, surface_load(block.shape, mesh.points[block.nodes], traction, factors)
+
+    def refined(self, finer: RefinedMesh) -> Load:
+        """Return the load on a finer mesh: on the faces that have come from those of the old one."""
+        return Resultant(finer.where(self.where), self.force, self.moment, self.about)
+
+
+def _points_of(mesh: Mesh, faces: Sequence[Block], factors: int) -> Iterator[tuple[Array, Array]]:
+    """Yield for blocks of faces the points (k, 3) of their rules and the areas (k,) that these stand for."""
+    for block in faces:
+        assert block.shape is not None
+        rule, X = face_rule(block.shape, factors), mesh.points[block.nodes]
+        dA = np.linalg.norm(area_vectors(block.shape, X, rule), axis=-1)
+        yield (tabulate(block.shape, rule)[0] @ X).reshape(-1, 3), dA.ravel()
 
 
 def _on(block: Block, value: Any, mesh: Mesh, what: str, width: tuple[int, ...]) -> Any:

@@ -143,7 +143,7 @@ def test_cantilever_beam_runs_as_kratos_computed_it(shared):
     found = project.model.solve()
     hand = kl.Model(project.model.mesh, kl.Isotropic3D(E=206.9e9, nu=0.29, density=7850.0))
     hand.fix("DISPLACEMENT_support", "xyz")
-    hand.add(kl.PointLoad("PointLoad3D_load_point", (0.0, -1e4, 0.0)))
+    hand.add(kl.PointLoad("PointLoad3D_load_point", (0.0, -1e4, 0.0), each=True))
     np.testing.assert_allclose(found.displacement(), hand.solve().displacement(), rtol=0, atol=1e-17)
 
 
