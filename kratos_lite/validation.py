@@ -39,6 +39,8 @@ T = TypeVar("T")
 AnyArray = TypeVar("AnyArray", bound="NDArray[Any]")
 LARGEST = 1e50
 """Size of the largest number that is taken, so that products of some of them are finite."""
+MOST = 1e11
+"""Numbers of an array at most."""
 
 
 def finite(
@@ -75,9 +77,10 @@ def finite(
         if array.dtype.kind not in "buifO":
             raise TypeError
         with np.errstate(all="ignore"):  # what is too large for a float becomes infinite
-            array = array.astype(float)
+            array = array.astype(float) if array.size <= MOST else array
     except (TypeError, ValueError, OverflowError):
         raise error(f"{what} must be made of real numbers; got {short(value)}") from None
+    _check_size(array, what, error)
     if shape is not None and not _has(array.shape, shape):
         raise error(f"{what} must have shape ({_axes(shape)}); got {array.shape}")
     if not (np.abs(array) <= LARGEST).all():
@@ -102,6 +105,7 @@ def whole_numbers(
         array = np.asarray(value)
     except (TypeError, ValueError):
         array = np.asarray(None)
+    _check_size(array, what, error)
     unlike = array.dtype.kind not in "iu" and (array.size or array.dtype.kind != "f")
     if unlike or (shape is not None and not _has(array.shape, shape)):
         axes = "" if shape is None else f" of shape ({_axes(shape)})"
@@ -117,6 +121,12 @@ def whole_numbers(
     if low < ends.min or high > ends.max:
         raise error(f"{what} must be below 2^{ends.bits - 1}; got {high}")
     return array.astype(dtype, copy=False)
+
+
+def _check_size(array: AnyArray, what: str, error: type[KratosLiteError]) -> None:
+    """Raise an error for an array that claims more numbers than any memory holds."""
+    if array.size > MOST:
+        raise error(f"{what} must have at most {MOST:g} numbers; got shape {array.shape}")
 
 
 def read_only(array: AnyArray) -> AnyArray:

@@ -39,6 +39,8 @@ from kratos_lite.validation import number, short, whole_number
 S = TypeVar("S", bound=Structure)
 Geometry: TypeAlias = Mapping[str, Callable[[Array], Array]]
 """By part, a function that takes places (k, 3) near its true surface onto it."""
+LEAST = 1e-8
+"""Relative error that can be asked for: what rounding leaves of a solution."""
 BULK, BULK_FAR, FAR = 0.5, 0.8, 3.0
 """Fraction θ of the squared error that is cut, and that where the error is `FAR` times the one requested."""
 GROWTH = 1.2
@@ -69,8 +71,8 @@ def solve_to(
 ) -> Result:
     """Solve a static model on meshes that become finer until the error is as small as asked for."""
     aim = number(error, "error")
-    if not 0 < aim < 1:
-        raise InputError(f"error must be a share between 0 and 1, such as 0.01; got {error!r}")
+    if not LEAST <= aim < 1:
+        raise InputError(f"error must be a fraction between {LEAST:g} and 1, such as 0.01; got {error!r}")
     most = _affordable() if most_unknowns is None else whole_number(most_unknowns, "most_unknowns")
     check_geometry(geometry, model.mesh)
     if model.motion is not None:

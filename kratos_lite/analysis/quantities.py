@@ -296,7 +296,8 @@ class StressAt(Quantity):
     def __init__(self, point: ArrayLike, component: str) -> None:
         self.point = finite(point, "a point", (3,))
         turned = component[::-1] if isinstance(component, str) else component
-        self.component = choice(turned if turned in COMPONENTS else component, "component", COMPONENTS)
+        known = isinstance(turned, str) and turned in COMPONENTS
+        self.component = choice(turned if known else component, "component", COMPONENTS)
 
     def value(self, result: Solved) -> float:
         """Return the stress in Pa."""

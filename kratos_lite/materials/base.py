@@ -94,8 +94,7 @@ class LinearMaterial:
         scales = np.outer(scale, scale)  # a C that was turned has round-off in place of zeros
         if not (np.abs(self.C - self.C.T) <= 1e-10 * scales).all():
             raise MaterialError(f"{type(self).__name__}: C is not symmetric; check the Poisson ratios")
-        smallest = np.linalg.eigvalsh(self.C / scales)[0]
-        if not smallest > 0:
+        if not (scale > 0).all() or not np.linalg.eigvalsh(self.C / scales)[0] > 0:
             raise MaterialError(f"{type(self).__name__}: C must be positive definite; {self.why_unstable()}")
 
     def why_unstable(self) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 from kratos_lite.atomic import replacing
 from kratos_lite.errors import InputError, KratosLiteError
 from kratos_lite.typing import Numbers
+from kratos_lite.validation import path_of
 from kratos_lite.view import canvas
 from kratos_lite.view.figure import compose, draw_body
 from kratos_lite.view.scene import Options, Subject, scene_of
@@ -28,7 +29,7 @@ def check_animation(path: str | Path) -> None:
 
     Raises InputError for another ending, KratosLiteError where matplotlib or ffmpeg is missing.
     """
-    ending = Path(path).suffix.lower()
+    ending = path_of(path).suffix.lower()
     if ending not in ENDINGS:
         raise InputError(f"{path}: animations are written as {' or '.join(ENDINGS)}; got {ending!r}")
     canvas.file_types()

@@ -12,7 +12,7 @@ from kratos_lite.atomic import write_whole
 from kratos_lite.errors import InputError, KratosLiteError
 from kratos_lite.registry import remembered
 from kratos_lite.typing import Array
-from kratos_lite.validation import finite, short
+from kratos_lite.validation import finite, path_of, short
 
 DPI = 150
 """Dots per inch."""
@@ -172,7 +172,7 @@ def check_picture(path: str | Path) -> str:
 
     Raises InputError for a type that cannot be written, KratosLiteError where matplotlib is missing.
     """
-    kind, known = Path(path).suffix[1:].lower(), file_types()
+    kind, known = path_of(path).suffix[1:].lower(), file_types()
     if not kind:
         raise InputError(f"{path}: give the picture an ending that says its format, such as .png")
     if kind not in known:

@@ -30,6 +30,12 @@ def ending(path: str | Path) -> str:
 def input_file(path: str | Path) -> Path:
     """Return the file that an input means: of a folder that is no stem of a set, its run file of Kratos."""
     path = Path(path)
+    try:
+        path.stat()
+    except FileNotFoundError:
+        pass
+    except OSError as reason:  # a name too long, or a folder that may not be entered
+        raise InputError(f"{str(path)[:100]}: {reason.strerror}") from None
     run_file = path / PROJECT
     return run_file if path.is_dir() and not _is_stem(path) and run_file.is_file() else path
 
