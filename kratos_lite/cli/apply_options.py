@@ -63,6 +63,7 @@ def case_of(options: Namespace, part: int | None = None) -> Case:
         options.input,
         materials=not everywhere,
         strict=not options.lenient,
+        linear=options.linear,
         initial_displacement=not options.ignore_initial_displacement,
         part=part,
     )

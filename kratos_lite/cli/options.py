@@ -220,6 +220,7 @@ def _add_model(command: argparse.ArgumentParser) -> None:
     _add_options(
         model,
         ("--formulation", "WORD", FORMULATION),
+        ("--linear", None, "small deformations, also where a run file asks for large ones"),
         (
             "--ignore-initial-displacement",
             None,

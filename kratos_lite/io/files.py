@@ -55,6 +55,7 @@ def read_case(
     strict: bool = True,
     allow_outside: bool = False,
     initial_displacement: bool = True,
+    linear: bool = False,
     part: int | None = None,
 ) -> Case:
     """Return what an input means: model or body, analysis, outputs and expected values.
@@ -68,6 +69,7 @@ def read_case(
     allow_outside : let a .json file name files outside its folder.
     initial_displacement : take the DISPLACEMENT of nodes that are not fixed for the state without stress;
         False ignores it.
+    linear : take small deformations where a run file asks for large ones, which is refused otherwise.
     part : number of the part to read, of a mesh that Kratos has divided into part files.
 
     Returns
@@ -86,7 +88,7 @@ def read_case(
             from kratos_lite.io.kratos.run_file import read_kratos_project
 
             case = read_kratos_project(
-                path, allow_outside, initial_displacement=initial_displacement, part=part
+                path, allow_outside, initial_displacement=initial_displacement, linear=linear, part=part
             )
         elif ending(path) == ".py":
             from kratos_lite.io.script import read_script

@@ -32,7 +32,7 @@ VALUES = (
     "Top:1 z-:xyz x-:x=1e308 E=1e9,nu=0.3 E=1e9,nu=0.5 Top:E=1,nu=0 0,0,-9.81 1e308,1e308,1e308 1,2 hht:-0.1 "
     "newmark:0.1,0.1 auto amg fixed , : ="
 ).split(" ")
-FLAGS = ("--stiffening", "--lumped", "--ignore-initial-displacement", "--lenient", "-v")
+FLAGS = ("--stiffening", "--lumped", "--ignore-initial-displacement", "--lenient", "--linear", "-v")
 OPTIONS = (
     "--material --fix --gravity --traction --pressure --point-load --resultant --rotation "
     "--translation --center --damping --boundaries --time "

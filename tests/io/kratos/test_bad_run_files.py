@@ -250,11 +250,17 @@ def test_bad_materials_file_is_refused_with_place_and_problem(folder, name):
     assert str(caught.value).startswith(f"{path}: ")
 
 
-def test_large_deformations_are_not_solved_as_small_ones(folder):
+def test_large_deformations_are_not_solved_as_small_ones(folder, run):
     (folder / "box.mdpa").write_text(box_mdpa().replace("SmallDisplacementElement", "TotalLagrangianElement"))
     with pytest.raises(InputError, match=r"TotalLagrangianElement3D8N with 'non_linear'.*set 'linear'"):
         read_case(write(folder, changed(analysis_type="non_linear")))
     assert read_case(write(folder, changed())).model.mesh.n_elements == 8
+    path = write(folder, changed(analysis_type="non_linear"))
+    assert read_case(path, linear=True).model.mesh.n_elements == 8
+    done = run("solve", path)
+    assert done.code == 2
+    assert "--linear" in done.err
+    assert run("solve", path, "--linear").code == 0
 
 
 def test_elements_without_material_are_named(folder):
