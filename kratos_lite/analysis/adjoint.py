@@ -6,7 +6,8 @@ error e_z of the adjoint solution on the same mesh: the product of both errors, 
 recovered stresses in place of the exact ones; near singular points averaged ones show more, and the safe
 figure is not smaller than what they say.  A reaction is the virtual work of a unit displacement of its
 part; the adjoint has this displacement as its support.  The adjoint of a stress at a point is too singular:
-the error of the mean around the point takes its place, and what recovery shows of the difference is added.
+the error of the mean around the point takes its place, and what recovery shows of the difference is added;
+the safe figure also has the spread of recovered less own stresses around the point.
 
 Source: Becker & Rannacher, Acta Numerica 10 (2001) 1-102; Ainsworth & Oden, A Posteriori Error Estimation in
 Finite Element Analysis (2000), chapter 8.
@@ -16,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kratos_lite.analysis.error_estimate import SAFETY, QuantityError, in_few_elements
+from kratos_lite.analysis.error_estimate import SAFETY, QuantityError, in_few_elements, too_few
 from kratos_lite.analysis.origin import Origin
 from kratos_lite.analysis.quantities import Quantity, Solved
 from kratos_lite.assembly.recovery import Recovery
@@ -49,8 +50,8 @@ def error_of(
         SAFETY["recovery"] ** 2 * float(np.abs(shares).sum()),
         SAFETY["averaging"] ** 2 * abs(float(averaged.sum())),
     )
-    absolute += SAFETY["recovery"] * float(np.abs(local).sum())
-    warnings += _concentrated(np.abs(shares))
+    absolute += SAFETY["recovery"] * (float(np.abs(local).sum()) + quantity.spread(result))
+    warnings += _concentrated(np.abs(shares)) + too_few(result.mesh)
     shares = shares + local
     return QuantityError(value, float(shares.sum()), absolute, shares, quantity.unit, warnings)
 

@@ -172,6 +172,10 @@ class ElementFields:
         """Recovered strains and stresses (n, 6) in Pa without prestress."""
         return self.strain("node"), self.without_prestress.stress("node")
 
+    def stress_in(self, group: ElementGroup) -> Array:
+        """Return stresses (m, g, 6) in Pa at the Gauss points of elements."""
+        return at_gauss(self.mesh.points, group, self._strained)
+
     def stress_of_material(self, row: int) -> Array:
         """Return recovered stresses at the nodes of one material, which those of its neighbors do not change.
 

@@ -92,15 +92,20 @@ def _warnings(recovered: Array, is_coarse: bool, groups: Sequence[ElementGroup],
             "recovered stresses are farther from those of the elements than averaged ones: the mesh is too "
             "coarse for them, and the estimated error may be several times too large"
         )
-    if count < FEW:
-        warnings.append(f"{count} elements are too few to estimate their error by one another")
-    elif in_few_elements(recovered, count):
+    warnings += too_few(mesh)
+    if in_few_elements(recovered, count):
         element = mesh.element_ids[int(recovered.argmax())]
         warnings.append(
             f"a large share of the error lies in few elements, most in element {element}: near a re-entrant "
             "corner, the edge of a support or a concentrated load stresses have no limit"
         )
     return warnings
+
+
+def too_few(mesh: Mesh) -> list[str]:
+    """Return a warning for a mesh of few elements."""
+    n = mesh.n_elements
+    return [f"{n} elements are too few to estimate their error by one another"] if n < FEW else []
 
 
 def in_few_elements(shares: Array, count: int) -> bool:

@@ -37,6 +37,9 @@ class Solved(Protocol):
     def stress(self, at: str) -> Any:
         """Return stresses (..., 6) in Pa of elements or recovered at nodes."""
 
+    def stress_in(self, group: ElementGroup) -> Array:
+        """Return stresses (m, g, 6) in Pa at the Gauss points of elements."""
+
     def stress_of_material(self, row: int) -> Array:
         """Return recovered stresses (n, 6) in Pa at the nodes of the material of an element."""
 
@@ -109,6 +112,19 @@ class Quantity(ABC):
         (m,) of each element, in the unit of the value.
         """
         return np.zeros(result.mesh.n_elements)
+
+    def spread(self, result: Solved) -> float:
+        """Return how far Q may be from the mean that `load` is of; 0 if the class has none.
+
+        Parameters
+        ----------
+        result : of any analysis.
+
+        Returns
+        -------
+        float, in the unit of the value.
+        """
+        return 0.0
 
 
 class DisplacementAt(Quantity):
@@ -324,6 +340,19 @@ class StressAt(Quantity):
         out = np.zeros(result.mesh.n_elements)
         out[located.rows] = at_point - (off * volume).sum() / volume.sum()
         return out
+
+    def spread(self, result: Solved) -> float:
+        """Return the root mean square of recovered less own stresses at Gauss points around the point.
+
+        A component that happens to be recovered without a difference has half of the largest one's.
+        """
+        group = self._around(result)
+        recovered = result.stress_of_material(int(_located(result, self.point).rows))[group.nodes]
+        N, _ = tabulate(group.element.shape, group.rule)
+        volume = volumes(result.mesh.points, group)[..., None]
+        squares = (N @ recovered - result.stress_in(group)) ** 2 * volume
+        spread = np.sqrt(squares.sum(axis=(0, 1)) / volume.sum())
+        return float(max(spread[COMPONENTS.index(self.component)], spread.max() / 2))
 
     def _around(self, result: Solved) -> ElementGroup:
         """Return the elements that share a corner with that of the point, of the same group."""
