@@ -67,14 +67,15 @@ def plot(
     view : ``iso``, ``x-``, ``x+``, ``y-``, ``y+``, ``z-``, ``z+``, the side that is looked at; azimuth and
         elevation of the viewer in degrees; or the direction towards the viewer, (3,).  If not given, ``iso``,
         and more from the side for long and thin bodies.
-    clim : lowest and highest value of the colors; those of the body if not given.
+    clim : lowest and highest value of the colors, in the unit of the values without prefix, such as Pa; those of
+        the body if not given.
     scale : factor on the displacement, 0 for the undeformed body; ``auto``: at least 1, the largest being a
         tenth of the body.
     zoom : factor, a part or a box ((x, y, z), (x, y, z)) that fills the picture.
     clip : plane that cuts the body open, ``("x", 0.5)`` or (normal, offset), in m, of the undeformed body;
         what lies between it and the viewer is taken away.
     title, titles : above the picture; above each of several.
-    unit : of own values, at the color bar.
+    unit : of an array of values, at the color bar; fields have theirs.
     points : (g, d) reference coordinates to mark in an element, in place of its Gauss points.
     shown : how many positions along a path are drawn at most (6): the first, the last, and those that differ
         most from each other, such as turning points; the later the stronger.

@@ -163,7 +163,12 @@ def _values(result: Fields | None, mesh: Mesh, u: Array | None, given: dict[str,
             raise InputError(f"a mesh or a model has no field {name!r}; solve it, or give an array")
         else:
             named = nodal_values(result, name)
-        return named if unit is None else replace(named, unit=unit)
+        if unit not in (None, named.unit):
+            raise InputError(
+                f"unit: the field {name!r} is shown in {named.unit or 'no unit'}, with a prefix; for another "
+                f"give an array in {short(unit)}, and its unit"
+            )
+        return named
     if values is None:
         return None
     numbers = finite(values, "values")

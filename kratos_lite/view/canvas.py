@@ -18,6 +18,8 @@ DPI = 150
 """Dots per inch."""
 LARGEST = 100
 """Width and height of a figure in inches."""
+PREFIXED = ("m", "Pa", "N", "J", "J/m³", "m/s", "m/s²", "N m", "Hz")
+"""Units that take prefixes, such as MPa; numbers in others stay with a power of ten."""
 
 
 def _canvas() -> Any:
@@ -216,8 +218,10 @@ def color_bar(axes: Any, colors: Any, unit: str, extend: str, *, upright: bool) 
         bar.set_ticks(LogLocator(subs=(1, 2, 5)))
         bar.minorticks_off()
     bar.ax.tick_params(labelsize=9)
-    prefix = EngFormatter.ENG_PREFIXES[power]
-    bar.set_label(prefix + unit if unit else f"× 1e{power}" if power else "")
+    if power and unit not in PREFIXED:
+        bar.set_label(f"× 1e{power} {unit}".rstrip())
+    else:
+        bar.set_label(EngFormatter.ENG_PREFIXES[power] + unit)
     bar.outline.set_visible(False)
 
 
