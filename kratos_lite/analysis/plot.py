@@ -67,8 +67,8 @@ def plot(
     view : ``iso``, ``x-``, ``x+``, ``y-``, ``y+``, ``z-``, ``z+``, the side that is looked at; azimuth and
         elevation of the viewer in degrees; or the direction towards the viewer, (3,).  If not given, ``iso``,
         and more from the side for long and thin bodies.
-    clim : lowest and highest value of the colors, in the unit of the values without prefix, such as Pa; those of
-        the body if not given.
+    clim : lowest and highest value of the colors, in the unit of the values without a prefix (Pa, not MPa);
+        those of the body if not given.
     scale : factor on the displacement, 0 for the undeformed body; ``auto``: at least 1, the largest being a
         tenth of the body.
     zoom : factor, a part or a box ((x, y, z), (x, y, z)) that fills the picture.

@@ -16,6 +16,8 @@ from kratos_lite.typing import Array, Ints
 
 LARGE = 0.1
 """Displacement, as share of the diagonal of the body, from which it is not small."""
+TINY = 1e-11
+"""Displacement, as share of the diagonal, below which a load does nothing: 0.2 Pa on steel do more."""
 STRAINED = 0.05
 """Strain from which it is not small."""
 SAMPLE = 500
@@ -24,10 +26,11 @@ UNITLESS = 10.0
 """Young's modulus in Pa below all materials, gels included, so that models with it are without units."""
 GOLDEN = (5**0.5 - 1) / 2
 UNITS = "is E in Pa (steel: 210e9), are lengths in m, forces in N and pressures in Pa?"
+IN_MM = "are lengths in mm (read with scale=1e-3, or --scale mm) and pressures in MPa?"
 
 
 def check_deformation(model: Structure, groups: Sequence[ElementGroup], u: Array) -> list[str]:
-    """Warn of displacements u (n, 3) in m, or their strains, that are too large for linear theory.
+    """Warn of displacements u (n, 3) in m, or their strains, too large for linear theory, or next to nothing.
 
     Those of a model without units, softer than everything there is, are whatever they are.
     """
@@ -43,6 +46,11 @@ def check_deformation(model: Structure, groups: Sequence[ElementGroup], u: Array
         share = largest / size
         times = f"{share:.0%} of" if share < 2 else f"{share:.3g} times"
         found.append(f"displacements differ by {largest:.3g} m, {times} the size of the body")
+    elif largest < TINY * size:
+        return [
+            f"displacements differ by {largest:.3g} m only, {largest / size:.1e} of the size of the body "
+            f"({size:.3g} m); {IN_MM}"
+        ]
     if strain > STRAINED:
         found.append(f"strains reach at least {strain:.0%}")
     if not found or all(young_moduli(group.material)[1] < UNITLESS for group in groups):

@@ -10,7 +10,7 @@ from kratos_lite.io.case import Case
 from kratos_lite.io.formats import ending, input_file, read_document, write_document
 from kratos_lite.io.formats.part_files import part_files, read_part
 from kratos_lite.io.kratos.to_model import model_from
-from kratos_lite.validation import path_of
+from kratos_lite.validation import number, path_of
 from kratos_lite.view.progress import watched
 
 if TYPE_CHECKING:
@@ -20,7 +20,12 @@ if TYPE_CHECKING:
 
 
 def read(
-    path: str | Path, *, materials: bool = True, strict: bool = True, initial_displacement: bool = True
+    path: str | Path,
+    *,
+    materials: bool = True,
+    strict: bool = True,
+    initial_displacement: bool = True,
+    scale: float = 1.0,
 ) -> Model:
     """Return the model that a file describes.
 
@@ -32,6 +37,7 @@ def read(
     strict : refuse `.mdpa` rows that do not stand on lines of their own (but in run files).
     initial_displacement : take the DISPLACEMENT of nodes that are not fixed for the state without stress,
         as KinematicLinear does in Kratos; False ignores it.
+    scale : factor on coordinates, such as 1e-3 for a mesh in mm; nothing else in a file is scaled.
 
     Returns
     -------
@@ -42,7 +48,9 @@ def read(
     InputError
         With file, line and cure of everything that is wrong.
     """
-    case = read_case(path, materials=materials, strict=strict, initial_displacement=initial_displacement)
+    case = read_case(
+        path, materials=materials, strict=strict, initial_displacement=initial_displacement, scale=scale
+    )
     if not case.is_of_model:
         raise InputError(f"{path}: describes a body; read it with kl.read_case")
     return case.model
@@ -56,6 +64,7 @@ def read_case(
     allow_outside: bool = False,
     initial_displacement: bool = True,
     linear: bool = False,
+    scale: float = 1.0,
     part: int | None = None,
 ) -> Case:
     """Return what an input means: model or body, analysis, outputs and expected values.
@@ -70,6 +79,7 @@ def read_case(
     initial_displacement : take the DISPLACEMENT of nodes that are not fixed for the state without stress;
         False ignores it.
     linear : take small deformations where a run file asks for large ones, which is refused otherwise.
+    scale : factor on the coordinates of a mesh file, such as 1e-3 for mm; nothing else is scaled.
     part : number of the part to read, of a mesh that Kratos has divided into part files.
 
     Returns
@@ -82,7 +92,9 @@ def read_case(
     InputError, MeshError, ModelError, MaterialError
         With file, line and cure of everything that is wrong.
     """
-    path = input_file(path_of(path))
+    path, scale = input_file(path_of(path)), number(scale, "scale", above=0)
+    if scale != 1 and ending(path) in (".json", ".py"):
+        raise InputError(f"{path}: scale is that of a mesh file; write {ending(path)} files in SI units")
     with watched(None, "read"):
         if ending(path) == ".json":
             from kratos_lite.io.kratos.run_file import read_kratos_project
@@ -100,6 +112,8 @@ def read_case(
                 if part is None
                 else read_part(part_files(path)[part], strict)
             )
+            if scale != 1:
+                document.mesh = document.mesh.replace(points=scale * document.mesh.points)
             model = model_from(document, materials=materials, initial_displacement=initial_displacement)
             case = Case(model, files=[path])
         return case

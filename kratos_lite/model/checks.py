@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup, element_class
-from kratos_lite.assembly.gauss_point_fields import clearly_positive
+from kratos_lite.assembly.gauss_point_fields import clearly_positive, volumes
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.tables import gradients_at_nodes, tabulate
 from kratos_lite.errors import MAX_PROBLEMS, InputError, MeshError, ModelError, Problems, SolveError
@@ -29,6 +29,8 @@ LIGHTEST, HEAVIEST = 0.01, 2.26e6
 """Densities in kg/m³: a hundredth of that of aerogel, and a hundred times that of osmium."""
 HEAVY, HARD = 2300.0, 1e7
 """Above this density in kg/m³ there are concrete, rock and metals, all far stiffer than this E in Pa."""
+METAL, BULKY = 6e10, 1e3
+"""Young's modulus in Pa of light metals, above that of concrete; volume in m³ that no part of metal has."""
 FOLD = 0.2
 """Fraction of the mean det J by which it may be negative at a node; two swapped nodes give 0.7 and more."""
 LOADS_ON_SUPPORTS = "all loads act on fixed components, so nothing moves"
@@ -144,7 +146,17 @@ def check_scales(mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
         warnings.append(
             f"stiffnesses differ by a factor of {max(stiff) / min(stiff):.1e}; expect fewer digits"
         )
+    if float((high - low).prod()) > BULKY and (volume := _metal(mesh, groups)) > BULKY:
+        warnings.append(
+            f"{volume:.3g} m³ are as stiff as metal: are lengths in mm (read with scale=1e-3, or --scale mm)?"
+        )
     return warnings + check_wave_speeds(group.material for group in groups)
+
+
+def _metal(mesh: Mesh, groups: Sequence[ElementGroup]) -> float:
+    """Return the volume in m³ of what is as stiff as metal."""
+    stiff = [group for group in groups if young_moduli(group.material)[1] > METAL]
+    return float(sum(volumes(mesh.points, group).sum() for group in stiff))
 
 
 def check_nodes(mesh: Mesh) -> list[str]:

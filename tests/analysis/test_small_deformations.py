@@ -176,3 +176,35 @@ def test_the_speed_of_waves_in_graphene_is_no_warning():
     model.fix("x-")
     model.add(kl.Traction("x+", (1e6, 0.0, 0.0)))
     assert not [text for text in model.solve().report.warnings if "waves" in text]
+
+
+def bracket(scale):
+    """Return a steel part of 100 x 60 x 10 mm³ under .1 MPa, in mm where the scale is 1."""
+    points = kl.box((100, 60, 10), (4, 3, 1))
+    model = kl.Model(points.replace(points=scale * points.points), kl.Isotropic3D(210e9, 0.3, 7850.0))
+    model.fix("x-")
+    return model
+
+
+def test_a_mesh_in_millimetres_is_a_warning_that_names_the_cure():
+    model = bracket(1.0)
+    model.add(kl.Traction("x+", (0.1, 0, 0)))
+    bulky, idle = model.solve().report.warnings
+    assert bulky.startswith("6e+04 m³ are as stiff as metal: are lengths in mm (read with scale=1e-3")
+    assert idle.startswith("displacements differ by 4")
+    assert "e-13 of the size of the body (117 m); are lengths in mm" in idle
+    model = bracket(1e-3)
+    model.add(kl.Traction("x+", (1e5, 0, 0)))
+    assert not model.solve().report.warnings
+
+
+def test_meshes_are_scaled_where_they_are_read(tmp_path):
+    kl.write(tmp_path / "b.mdpa", bracket(1.0))
+    model = kl.read(tmp_path / "b.mdpa", scale=1e-3)
+    assert np.abs(model.mesh.extent[1] - [0.1, 0.06, 0.01]).max() < 1e-15
+    for scale, words in ((0, "scale must be"), ("mm", "scale must be"), (np.inf, "scale must be")):
+        with pytest.raises(kl.InputError, match=words):
+            kl.read(tmp_path / "b.mdpa", scale=scale)
+    (tmp_path / "p.json").write_text("{}")
+    with pytest.raises(kl.InputError, match="scale is that of a mesh file"):
+        kl.read(tmp_path / "p.json", scale=1e-3)

@@ -104,7 +104,7 @@ def test_own_values_of_nodes_and_of_elements(result):
 def test_an_unknown_name_of_values_is_refused_with_all_names(result, given):
     with pytest.raises(kl.InputError, match=r"unknown field .*; there are displacement, ux, .*, error"):
         result.plot(values=given)
-    with pytest.raises(kl.InputError, match="'sxx' is shown in Pa, .*; for another give an array in 'ksi'"):
+    with pytest.raises(kl.InputError, match=r"'sxx' is shown in Pa, .*; for another give an array in 'ksi'"):
         kl.plot(result, values="sxx", unit="ksi")
     with pytest.raises(kl.InputError, match="a mesh or a model has no field 'sxx'"):
         kl.plot(result.mesh, values="sxx")
