@@ -20,6 +20,7 @@ import numpy as np
 
 from kratos_lite.analysis.adaptive_levels import Level, QuantityLevel
 from kratos_lite.analysis.layers import layer_direction
+from kratos_lite.analysis.peak import peak
 from kratos_lite.analysis.quantities import Quantity
 from kratos_lite.analysis.report import RefinementStep
 from kratos_lite.analysis.result import Result
@@ -111,6 +112,8 @@ def solve_to(
         warnings += [
             f"the error requested, {aim:.3g}, was not reached: it may be {level.reported:.3g}; {missed}"
         ]
+    if top := peak(result):
+        warnings.append(f"the largest von Mises stress lies{top}")
     report = result.report
     report.history, report.error, report.error_asked = history, level.reported, aim
     report.error_of = "the energy norm" if quantity is None else str(quantity)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from kratos_lite.analysis.element_fields import ElementFields
+from kratos_lite.analysis.peak import peak
 from kratos_lite.analysis.report import Report, element_counts, vector
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError
@@ -368,7 +369,7 @@ class Result(ElementFields, Tabular):
         mises, element, center = self.largest_von_mises()
         counts = element_counts(mesh, self.groups, report.formulation)
         forces = float(np.abs(self.loads).sum() + np.abs(self.reactions).sum())
-        place = f"in element {element} around {vector(center)} m"
+        place = f"in element {element} around {vector(center)} m{peak(self) or ''}"
         return [
             ("nodes", str(mesh.n_nodes)),
             ("elements", ", ".join(f"{count} {name}" for name, count in counts.items())),

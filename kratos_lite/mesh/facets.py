@@ -7,7 +7,7 @@ import numpy as np
 from kratos_lite.mesh.blocks import NO_ROWS, Block
 from kratos_lite.mesh.mesh import Mesh
 from kratos_lite.mesh.topology import equal_sets
-from kratos_lite.typing import Array, Mask
+from kratos_lite.typing import Array, Ints, Mask
 
 ANGLES = (2.0, 40.0)
 """Degrees by which faces that stand for a curved surface turn from one to the next."""
@@ -21,25 +21,47 @@ def facets(mesh: Mesh) -> tuple[int, float]:
     These have straight edges and meet two neighbors or more at small angles; along a fold of flat surfaces
     faces meet one.
     """
-    edges, faces, straight, normals = [], [NO_ROWS], [np.zeros(0, dtype=bool)], [np.zeros((0, 3))]
-    count = 0
-    for block in mesh.boundary:
-        assert block.shape is not None
-        c = block.shape.corners
-        edges.append((block.nodes, [(i, (i + 1) % c) for i in range(c)]))
-        faces.append(np.tile(count + np.arange(len(block)), c))
-        straight.append(np.tile(_straight(mesh, block), c))
-        normals.append(_normals(mesh.points[block.nodes[:, :c]]))
-        count += len(block)
-    first, second = equal_sets(edges)
-    both = np.concatenate(straight)[first] & np.concatenate(straight)[second]
-    one, other = (np.concatenate(faces)[edge[both]] for edge in (first, second))
-    n = np.concatenate(normals)
-    angle = np.degrees(np.arccos(np.clip((n[one] * n[other]).sum(axis=1), -1, 1)))
-    small = (angle > ANGLES[0]) & (angle < ANGLES[1])
-    turns = np.bincount(np.concatenate([one[small], other[small]]), minlength=count)
+    one, other, angle, *_ = _folds(mesh)
+    blocks = [block for block in mesh.boundary if block.shape is not None]
+    straight = np.concatenate([np.zeros(0, dtype=bool), *[_straight(mesh, block) for block in blocks]])
+    small = straight[one] & straight[other] & (angle > ANGLES[0]) & (angle < ANGLES[1])
+    turns = np.bincount(np.concatenate([one[small], other[small]]), minlength=len(straight))
     curved = int((turns > 1).sum())
     return curved, round(float(np.median(angle[small])), 6) if curved else 0.0
+
+
+def reentrant_nodes(mesh: Mesh) -> Mask:
+    """Return the nodes (n,) on edges of the surface where the body has more than 180° and `ANGLES`."""
+    _, _, angle, ahead, edge = _folds(mesh)
+    found = np.zeros(mesh.n_nodes, dtype=bool)
+    found[edge[(angle > ANGLES[1]) & (ahead > -1e-6)]] = True
+    return found
+
+
+def _folds(mesh: Mesh) -> tuple[Ints, Ints, Array, Array, Ints]:
+    """Return the two boundary faces at each edge (k,), how they meet, and the nodes of the edge (k, 2).
+
+    They meet at an angle in degrees between their normals; the center of the second is outside the first by
+    a fraction of the distance between their centers.
+    """
+    edges, faces, ends, normals, centers = [], [NO_ROWS], [], [np.zeros((0, 3))], [np.zeros((0, 3))]
+    for block in mesh.boundary:
+        assert block.shape is not None
+        c, count = block.shape.corners, sum(map(len, normals))
+        sides = [(i, (i + 1) % c) for i in range(c)]
+        edges.append((block.nodes, sides))
+        ends += [block.nodes[:, side] for side in sides]
+        faces.append(np.tile(count + np.arange(len(block)), c))
+        normals.append(_normals(mesh.points[block.nodes[:, :c]]))
+        centers.append(mesh.points[block.nodes[:, :c]].mean(axis=1))
+    first, second = equal_sets(edges)
+    one, other = (np.concatenate(faces)[edge] for edge in (first, second))
+    n, X = np.concatenate(normals), np.concatenate(centers)
+    angle = np.degrees(np.arccos(np.clip((n[one] * n[other]).sum(axis=1), -1, 1)))
+    step = X[other] - X[one]
+    length = np.maximum(np.linalg.norm(step, axis=1), 1e-300)
+    ahead = (n[one] * step).sum(axis=1) / length
+    return one, other, angle, ahead, np.concatenate([np.zeros((0, 2), dtype=int), *ends])[first]
 
 
 def _straight(mesh: Mesh, block: Block) -> Mask:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kratos_lite.analysis.fields import fields
+from kratos_lite.analysis.peak import peak
 from kratos_lite.analysis.report import element_counts
 from kratos_lite.atomic import write_whole
 from kratos_lite.errors import SolveError
@@ -54,7 +55,7 @@ def summary(result: Result) -> dict[str, Any]:
     report, mesh = result.report, result.mesh
     length, node, _ = result.largest_displacement()
     mises, element, _ = result.largest_von_mises()
-    error = result.error()
+    error, top = result.error(), peak(result)
     asked = {}
     if report.error is not None:
         history = [vars(step) for step in report.history]
@@ -75,7 +76,7 @@ def summary(result: Result) -> dict[str, Any]:
             "warnings": error.warnings,
         },
         **asked,
-        "largest_von_mises_stress": {"value": mises, "element": element},
+        "largest_von_mises_stress": {"value": mises, "element": element, **(vars(top) if top else {})},
         "solver": report.solver,
         "reason": report.reason,
         "iterations": report.iterations,

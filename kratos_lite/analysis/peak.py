@@ -1,0 +1,67 @@
+"""The largest stress: whether it lies where stresses have no limit, and the largest one away from there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kratos_lite.mesh import Mesh
+from kratos_lite.mesh.facets import reentrant_nodes
+from kratos_lite.typing import Array, Mask
+
+if TYPE_CHECKING:
+    from kratos_lite.analysis.result import Result
+
+ACTS = 1e-6
+"""Reaction, of the largest one, that is more than rounding."""
+
+
+@dataclass(frozen=True)
+class Peak:
+    """Where stresses may have no limit, and the largest one two elements away from all such places."""
+
+    place: str
+    elsewhere: float | None = None  # in Pa; None where all elements are near
+
+    def __str__(self) -> str:
+        away = "" if self.elsewhere is None else f"; at most {self.elsewhere:.6e} Pa two elements away"
+        return f" {self.place}, where it may grow with each refinement{away}"
+
+
+def peak(result: Result) -> Peak | None:
+    """Return where the largest von Mises stress lies if it may have no limit there, else None."""
+    mesh, element = result.mesh, result.totals()[2]
+    places = {
+        "at a clamped or concentrated support": clamped_nodes(mesh, result.reactions),
+        "at a re-entrant edge": reentrant_nodes(mesh),
+    }
+    place = next((name for name, nodes in places.items() if _touching(mesh, nodes)[element]), None)
+    if place is None:
+        return None
+    near = np.logical_or.reduce([*places.values()])
+    for block in mesh.blocks:
+        near[block.nodes[near[block.nodes].any(axis=1)]] = True
+    away = ~_touching(mesh, near)
+    if not away.any():
+        return Peak(place)
+    stresses = np.array([np.max(points) for points in result.von_mises()])
+    return Peak(place, float(stresses[away].max()))
+
+
+def clamped_nodes(mesh: Mesh, reactions: Array) -> Mask:
+    """Return the nodes (n,) of faces that are held along two axes or more, and those held without a face."""
+    held = np.abs(reactions) > ACTS * np.abs(reactions).max(initial=0.0)
+    on_faces, clamped = np.zeros_like(held), np.zeros(mesh.n_nodes, dtype=bool)
+    for block in mesh.boundary:
+        axes = held[block.nodes].all(axis=1)
+        for nodes in block.nodes.T:
+            np.logical_or.at(on_faces, nodes, axes)
+        clamped[block.nodes[axes.sum(axis=1) > 1]] = True
+    return clamped | (held & ~on_faces).any(axis=1)
+
+
+def _touching(mesh: Mesh, nodes: Mask) -> Mask:
+    """Return the elements (m,) with any of some nodes."""
+    return np.concatenate([nodes[block.nodes].any(axis=1) for block in mesh.blocks])
