@@ -269,10 +269,13 @@ def _continuous(
 
 def _on(level: PCoarseLevel, nodes: Ints, inner: Any, P: Any) -> PCoarseLevel:
     """Return the level on some nodes, from which `inner` leads to its corner nodes and P to all nodes."""
-    from scipy.sparse import kron
+    from scipy.sparse import bsr_array
 
     def assemble() -> BlockMatrix:
-        axes: Any = kron(inner, np.eye(3), format="bsr")
+        weights = inner.tocsr()
+        blocks = weights.data[:, None, None] * np.eye(3)
+        shape = (3 * weights.shape[0], 3 * weights.shape[1])
+        axes = bsr_array((blocks, weights.indices, weights.indptr), shape=shape)
         return BlockMatrix.of(axes.T @ level.K.scipy() @ axes)
 
     P.sort_indices()
