@@ -173,7 +173,16 @@ class ElementFields:
         return self.strain("node"), self.without_prestress.stress("node")
 
     def stress_in(self, group: ElementGroup) -> Array:
-        """Return stresses (m, g, 6) in Pa at the Gauss points of elements."""
+        """Return stresses at the Gauss points of elements.
+
+        Parameters
+        ----------
+        group : some of the elements of the result.
+
+        Returns
+        -------
+        (m, g, 6) in Pa.
+        """
         return at_gauss(self.mesh.points, group, self._strained)
 
     def stress_of_material(self, row: int) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -11,11 +11,21 @@ from kratos_lite.mesh import Mesh
 from kratos_lite.mesh.facets import reentrant_nodes
 from kratos_lite.typing import Array, Mask
 
-if TYPE_CHECKING:
-    from kratos_lite.analysis.result import Result
-
 ACTS = 1e-6
 """Reaction, of the largest one, that is more than rounding."""
+
+
+class Solved(Protocol):
+    """What is read of a result."""
+
+    mesh: Mesh
+    reactions: Array
+
+    def totals(self) -> tuple[float, float, int]:
+        """Return energy, largest von Mises stress and the index of its element."""
+
+    def von_mises(self, at: str = "gauss") -> Any:
+        """Return von Mises stresses of each element."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +40,7 @@ class Peak:
         return f" {self.place}, where it may grow with each refinement{away}"
 
 
-def peak(result: Result) -> Peak | None:
+def peak(result: Solved) -> Peak | None:
     """Return where the largest von Mises stress lies if it may have no limit there, else None."""
     mesh, element = result.mesh, result.totals()[2]
     places = {

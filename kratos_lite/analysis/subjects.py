@@ -11,7 +11,6 @@ import numpy as np
 from kratos_lite.analysis.fields import Fields
 from kratos_lite.analysis.named_values import MOTIONS, named_values, nodal_values
 from kratos_lite.analysis.peak import peak
-from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.state import State
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh
@@ -170,7 +169,7 @@ def _values(result: Fields | None, mesh: Mesh, u: Array | None, given: dict[str,
                 f"unit: the field {name!r} is shown in {named.unit or 'no unit'}, with a prefix; for another "
                 f"give an array in {short(unit)}, and its unit"
             )
-        if isinstance(result, Result) and name == DEFAULT and (top := peak(result)):
+        if name == DEFAULT and hasattr(result, "reactions") and (top := peak(result)):
             return replace(named, title=f"{named.title}, largest {top.place}")
         return named
     if values is None:
