@@ -39,7 +39,7 @@ class BodyForce(DistributedLoad):
     factors = 4  # N, and a polynomial of degree p + 2 over straight cells
     nodal = "force", 2
 
-    def scale(self, group: ElementGroup) -> float:
+    def _scale(self, group: ElementGroup) -> float:
         """Return what multiplies the force in a group: 1, or the density in kg/m³ for `Gravity`."""
         return 1.0
 
@@ -63,7 +63,7 @@ class BodyForce(DistributedLoad):
             name = type(self).__name__
             raise InputError(f"a nodal {name} needs shape ({len(points)}, 3); got {force.shape}")
         for group in groups:
-            part, scale = group.take(carriers[group.rows]), self.scale(group)
+            part, scale = group.take(carriers[group.rows]), self._scale(group)
             if not (len(part) and scale):
                 continue
             if callable(force):
@@ -96,6 +96,6 @@ class Gravity(BodyForce):
     def __init__(self, acceleration: ArrayLike | OfPlace, where: WhereElements = None) -> None:
         super().__init__(acceleration, where)
 
-    def scale(self, group: ElementGroup) -> float:
+    def _scale(self, group: ElementGroup) -> float:
         """Return the density."""
         return group.material.density
