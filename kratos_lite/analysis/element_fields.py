@@ -85,7 +85,7 @@ class ElementFields:
         Raises
         ------
         InputError
-            An element class has a strain of its own, but no B-operator; or a stress of its own.
+            An element class has a strain of its own, but no B-operator.
         """
         from kratos_lite.assembly.nodal_values import at_located  # as for the recovery
         from kratos_lite.assembly.recovery import recovered_at

@@ -49,7 +49,7 @@ class GaussPoints:
     def elastic(self) -> tuple[Array, Array]:
         """ε and the stress (m, g, 6) in Pa without prestress."""
         strain = self.strain
-        return strain, self.group.stress(strain)
+        return strain, strain @ self.group.material.C.T
 
     @property
     def displacement(self) -> Array:

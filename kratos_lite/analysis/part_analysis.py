@@ -127,7 +127,6 @@ def solve_part(
         seconds=phase.seconds,
         warnings=[*dict.fromkeys(found), *system.warnings],
         notes=list(dict.fromkeys(text for some in partition.gather(model.remarks()) for text in some)),
-        skipped=system.skipped,
         formulation=model.chosen(groups),
     )
     result = PartResult(mesh, groups, u, reactions, external, report, model.initial_displacement)

@@ -104,15 +104,6 @@ class ElementGroup:
         """Return the prestress of a chunk as (m, 1, 6), or 0."""
         return 0.0 if self.prestress is None else self.prestress[chunk, None, :]
 
-    @property
-    def has_own_stress(self) -> bool:
-        """Whether the material has a method of its own for C strain."""
-        return type(self.material).stress is not LinearMaterial.stress
-
-    def stress(self, strain: Array) -> Array:
-        """Return the stresses of strains (..., 6) of a solution, in which any number may have come up."""
-        return self.material.stress(strain) if self.has_own_stress else strain @ self.material.C.T
-
 
 def by_mass_rule(points: Array, group: ElementGroup, factors: int, flow: bool = False) -> list[ElementGroup]:
     """Cut a group into parts whose rule is exact for a product of shape functions over their cells."""
@@ -169,7 +160,6 @@ def element_groups_of(
             continue
         element_class(mesh, block)
         for material, rule, cells in _alike(mesh, block, material_of[at], rule_of[at]):
-            materials[material].check_stress()
             element = element_of(block.name, formulation, materials[material].C, unnamed)
             rows = at.start + cells
             chosen = _rule_of(element, rules[rule] if rules and rule >= 0 else None)

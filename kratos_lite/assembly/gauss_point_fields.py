@@ -1,7 +1,7 @@
 """Gauss point fields: volumes, strains and stresses of elements, and the loads and energies of them.
 
-Every function takes the compiled kernels, but for element classes with a B or local system of a user and for
-materials with a stress of their own, which are computed by their methods in cache-sized chunks.
+Every function takes the compiled kernels, but for element classes with a B or local system of a user, which
+are computed by their methods in cache-sized chunks.
 """
 
 from __future__ import annotations
@@ -16,11 +16,6 @@ from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, as_doub
 from kratos_lite.elements import KinematicLinear, custom
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.typing import Array, Ints, Mask, Rows
-
-
-def compiled_law(group: ElementGroup, stress: bool = True) -> Any:
-    """Return the kernels if they stand for the strains, or the stresses, of a group, else None."""
-    return None if stress and group.has_own_stress else compiled("gauss", group.element)
 
 
 def displaced(points: Array, group: ElementGroup, u: Array, stress: bool = True) -> tuple[Any, ...]:
@@ -101,7 +96,7 @@ def body_force_by_function(
 
 def at_gauss(points: Array, group: ElementGroup, u: Array, *, stress: bool = True) -> Array:
     """Return stresses in Pa with prestress, or strains, (m, g, 6) of displacements u (n, 3) in m."""
-    if module := compiled_law(group, stress=stress):
+    if module := compiled("gauss", group.element):
         return module.stress(*displaced(points, group, u, stress))
     parts = [value_at(group.at(points, chunk), group, u, chunk, stress) for chunk in group.chunks()]
     return np.concatenate(parts)
@@ -136,14 +131,14 @@ def value_at(
     displacements = u[group.nodes[chunk]]
     if not stress:
         return element.strain(displacements, group.material.C)
-    return group.stress(element.strain(displacements, group.material.C)) + group.initial_stress(chunk)
+    return element.strain(displacements, group.material.C) @ group.material.C.T + group.initial_stress(chunk)
 
 
 def internal_load(points: Array, groups: Sequence[ElementGroup], u: Array) -> Array:
     """Return ∫ B^T σ dV of displacements u (n, 3) as nodal forces (n, 3) in N."""
     total = np.zeros_like(points)
     for group in groups:
-        if module := compiled_law(group):
+        if module := compiled("gauss", group.element):
             total += module.internal_load(*displaced(points, group, u))
             continue
         for chunk in group.chunks():
@@ -167,7 +162,7 @@ def totals(points: Array, groups: Sequence[ElementGroup], u: Array) -> tuple[flo
     """Return strain energy in J, largest von Mises stress at a Gauss point in Pa, index of its element."""
     energy, largest, row = 0.0, 0.0, 0
     for group in groups:
-        module = compiled_law(group)
+        module = compiled("gauss", group.element)
         parts = (
             [module.totals(*displaced(points, group, u))]
             if module
@@ -184,7 +179,7 @@ def _totals(points: Array, group: ElementGroup, u: Array, chunk: slice) -> tuple
     element = group.at(points, chunk)
     C, displacements = group.material.C, u[group.nodes[chunk]]
     strain = element.strain(displacements, C)
-    elastic = group.stress(strain)
+    elastic = strain @ C.T
     energy = float(((strain * elastic).sum(axis=-1) * element.dV).sum()) / 2
     if "local_system" in element.custom:
         energy = float((custom.system(element, C, displacements)[1] * displacements).sum()) / 2

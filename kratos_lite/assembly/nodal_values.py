@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from kratos_lite import voigt
-from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, as_double
-from kratos_lite.assembly.gauss_point_fields import at_gauss, compiled_law, displaced, value_at
+from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, as_double, compiled
+from kratos_lite.assembly.gauss_point_fields import at_gauss, displaced, value_at
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.tables import cofactors, determinant
 from kratos_lite.mesh.locate import Located
@@ -60,7 +60,7 @@ def averages(
 def _averages(points: Array, group: ElementGroup, u: Array, stress: bool) -> tuple[Array, Array]:
     """Return the sums of the nodal values (n, 6) of a group and the means of its elements (m, 6)."""
     to_nodes = as_double(extrapolation(group.element, group.rule))
-    if module := compiled_law(group, stress=stress):
+    if module := compiled("gauss", group.element):
         nodal, mean = module.averages(*displaced(points, group, u, stress), to_nodes)
         return nodal, mean
     total, means = np.zeros((len(points), 6)), np.zeros((len(group), 6))
@@ -89,7 +89,7 @@ def at_located(groups: Sequence[ElementGroup], located: Located, u: Array, *, st
         X, displaced = (values[group.nodes[cells]] for values in (located.mesh.points, u))
         value = _strain(group, X, xi[at], displaced)
         if stress:
-            value = group.stress(value)
+            value = value @ group.material.C.T
             value = value if group.prestress is None else value + group.prestress[cells]
         out[at] = value
     return out.reshape(*located.rows.shape, 6)

@@ -17,7 +17,6 @@ from kratos_lite.typing import Array, Progress
 
 SCATTER_BYTES = 64_000_000
 """Memory of the element matrices that are added to the global matrix at once."""
-CONSTANT_JACOBIANS = "all Jacobians but the first of elements where they are constant"
 
 
 def assemble_stiffness(
@@ -25,7 +24,6 @@ def assemble_stiffness(
     groups: Sequence[ElementGroup],
     pattern: Pattern,
     progress: Progress | None = None,
-    skipped: set[str] | None = None,
 ) -> BlockMatrix:
     """Return the stiffness matrix as 3x3 blocks, (3n, 3n) in N/m."""
     data = np.zeros((len(pattern.indices), 3, 3))
@@ -34,41 +32,33 @@ def assemble_stiffness(
     for number, group in enumerate(groups):
         kernels = compiled("stiffness", group.element)
         add = _add_compiled if kernels else _add_computed
-        for count, constant in add(data, points, group, pattern, number):
+        for count in add(data, points, group, pattern, number):
             done += count
             if progress:
                 progress("assemble", done / total)
-            if constant and skipped is not None:
-                skipped.add(CONSTANT_JACOBIANS)
     return BlockMatrix(data, pattern.indices, pattern.indptr)
 
 
 def _add_compiled(
     data: Array, points: Array, group: ElementGroup, pattern: Pattern, number: int
-) -> Iterator[tuple[int, bool]]:
-    """Add the stiffness of a group; yield the number of elements and whether J was constant in some."""
+) -> Iterator[int]:
+    """Add the stiffness of a group; yield the number of elements."""
     nodes, _, dN, weights = group.tables()
     law = group.kernel_arguments()[0], group.strain_tables()
     module = compiled("stiffness", group.element)
-    constant = module.add_stiffness(points, nodes, dN, weights, *law, pattern.indptr, pattern.indices, data)
-    yield len(group), constant > 0
+    module.add_stiffness(points, nodes, dN, weights, *law, pattern.indptr, pattern.indices, data)
+    yield len(group)
 
 
 def _add_computed(
     data: Array, points: Array, group: ElementGroup, pattern: Pattern, number: int
-) -> Iterator[tuple[int, bool]]:
+) -> Iterator[int]:
     """Do the same in NumPy, in parts."""
-    standard, constant = group.element.has_standard_strain() and not group.element.custom, False
 
     def stiffness(chunk: slice) -> Array:
-        nonlocal constant
-        elements = group.at(points, chunk)
-        K = elements.stiffness_by_axis(group.material.C)
-        constant |= standard and elements.constant_jacobian
-        return K
+        return group.at(points, chunk).stiffness_by_axis(group.material.C)
 
-    for count in add_in_parts(data, group, pattern, number, stiffness):
-        yield count, constant
+    return add_in_parts(data, group, pattern, number, stiffness)
 
 
 def add_in_parts(

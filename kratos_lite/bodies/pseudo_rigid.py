@@ -77,7 +77,6 @@ class PseudoRigidBody(AffineBody, Deformable):
                 raise InputError("a pseudo-rigid body needs a mesh, or its mass_properties")
             mass_properties = mass_properties_of(mesh, material)
         mass_properties.check_deformable()
-        material.check_stress()
         self.C = material.C
         super().__init__(mesh, material, mass_properties, integrator, tolerance, damping)
 

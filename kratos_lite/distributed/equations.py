@@ -53,7 +53,6 @@ class Equations:
     Attributes
     ----------
     norm : the largest row sum of |K| at nodes with equations.
-    skipped : what assembly left out, in words.
     """
 
     def __init__(self, ranks: Alone, part: Part, method: Method, progress: Progress | None = None) -> None:
@@ -70,7 +69,6 @@ class Equations:
             self._solver = Krylov(self._A, options, method.options, method.most)
             if own:
                 set_multigrid(self._solver.ksp, K)
-        self.skipped = sorted({text for some in ranks.gather(K.skipped) for text in some})
 
     def _matrix(self, K: SharedStiffness, part: Part) -> Any:
         """Return T^T K T as a matrix of PETSc; that of K goes."""

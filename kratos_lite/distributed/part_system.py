@@ -34,7 +34,7 @@ class PartSystem:
     Attributes
     ----------
     unknowns : of all parts.
-    skipped, warnings : what assembly left out, and what is to be said, in words.
+    warnings : what is to be said, in words.
     """
 
     def __init__(
@@ -58,7 +58,6 @@ class PartSystem:
         ratio = ranks.max(max((bulk_over_shear(group.material.C) for group in groups), default=0.0))
         self.plan = plan_of(solver, self.unknowns, ratio, given)
         self._equations = Equations(ranks, part, Method(self.plan.method, given, False, PATIENCE), progress)
-        self.skipped = self._equations.skipped
         self.warnings: list[str] = []
 
     def solve(self, forces: Array, prescribed: Array) -> tuple[Array, Solution]:

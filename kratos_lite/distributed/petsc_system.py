@@ -125,7 +125,7 @@ class PetscSolver:
         def of_rank(rank: int) -> tuple[Part, Progress | None]:
             return self._cut.part(rank), None if rank else self._progress
 
-        self._norm, self._system.skipped = self._run(_make, key, method, each=of_rank)
+        self._norm = self._run(_make, key, method, each=of_rank)
         self._key = key
 
     def _run(self, task: Callable[..., Any], *arguments: Any, each: Callable[[int], Any]) -> Any:
@@ -218,11 +218,9 @@ class Postponed:
             raise error
 
 
-def _make(
-    ranks: Alone, key: int, method: Method, given: tuple[Part, Progress | None]
-) -> tuple[float, list[str]]:
+def _make(ranks: Alone, key: int, method: Method, given: tuple[Part, Progress | None]) -> float:
     KEPT[key] = Equations(ranks, given[0], method, given[1])
-    return KEPT[key].norm, KEPT[key].skipped
+    return KEPT[key].norm
 
 
 def _solve(ranks: Alone, key: int, tolerance: float, given: tuple[Array, Array | None]) -> tuple[Any, ...]:

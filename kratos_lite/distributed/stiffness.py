@@ -79,7 +79,6 @@ class SharedStiffness:
     Attributes
     ----------
     points, groups, free, held, number : those of the part in the new order of nodes.
-    skipped : what assembly left out, in words.
     """
 
     def __init__(
@@ -102,7 +101,6 @@ class SharedStiffness:
         self.points, self.free, self.held = part.points[order], part.free[order], part.held[order]
         self.number = number[order]
         self.groups = [replace(group, nodes=place[group.nodes]) for group in part.groups]
-        self.skipped: set[str] = set()
         self.K: BlockMatrix | MatrixFree
         if not own_rows and self._needs_no_matrix():
             self.K = MatrixFree(self.points, self.groups)
@@ -126,7 +124,7 @@ class SharedStiffness:
     def _matrix(self, progress: Progress | None, own_rows: bool) -> BlockMatrix:
         """Return the rows of own nodes, or all, for the multigrid of one process."""
         pattern = Pattern(len(self.points), [group.nodes for group in self.groups])
-        K = assemble_stiffness(self.points, self.groups, pattern, progress, self.skipped)
+        K = assemble_stiffness(self.points, self.groups, pattern, progress)
         if not own_rows:
             return K
         stop = int(K.indptr[self.ghosts.own])

@@ -30,7 +30,7 @@ CURES = {
     **dict.fromkeys(("J", "detJ", "dNdX", "dV", "strain", "strain_at"), STRAIN),
     **dict.fromkeys(("internal_force", "stiffness", "stiffness_by_axis", "K", "r_int"), SYSTEM),
     **dict.fromkeys(("body_force", "r_ext", "mass", "scalar_mass", "lumped_mass", "volume"), MASS),
-    "stress": "a stress of its own belongs to a material: write a LinearMaterial",
+    "stress": "stress is C strain: write a LinearMaterial with that C",
     "__init__": f"{STRAIN}; or {SYSTEM}",
 }
 """What to write in place of a method that is not overridden."""

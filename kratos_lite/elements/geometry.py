@@ -124,14 +124,6 @@ class PlacedCell(Tabular):
         """Return the places X (..., g, 3) in m of the Gauss points."""
         return self._N(self.rule) @ self.X
 
-    @cached_property
-    def constant_jacobian(self) -> bool:
-        """Whether J is the same at all Gauss points of each element, but for the rounding of its sums."""
-        J = self._jacobian(tabulate(self.shape, self.rule)[1])
-        change = np.abs(J - J[..., :1, :, :]).max(axis=(-3, -2, -1))
-        size = np.abs(self.X).max(axis=(-2, -1))
-        return bool((change <= 8 * np.finfo(float).eps * size).all())
-
     def table(self) -> list[tuple[str, str]]:
         """Return the rows of a summary: shape, rule, nodes and volume."""
         count, rule = int(np.prod(self.X.shape[:-2])), self.rule

@@ -17,7 +17,7 @@ import numpy as np
 from kratos_lite import voigt
 from kratos_lite.elements import arguments, custom, stiffness
 from kratos_lite.elements.mass import CellMass
-from kratos_lite.elements.tables import StrainTables, lame_constants, reference_products, tabulate
+from kratos_lite.elements.tables import StrainTables, lame_constants
 from kratos_lite.errors import InputError
 from kratos_lite.quadrature import Rule
 from kratos_lite.registry import Registry
@@ -246,13 +246,9 @@ class KinematicLinear(CellMass):
         return self._stiffness(C)
 
     def _stiffness(self, C: Array) -> Array:
-        """Return K (..., 3, n, 3, n) of B, by a short way where the strain is that of the gradients."""
-        if C.ndim == 2 and self.has_standard_strain():
-            if self.constant_jacobian:
-                J = self._jacobian(tabulate(self.shape, self.rule)[1][:1])[..., 0, :, :]
-                return stiffness.affine(J, reference_products(self.shape, self.rule), C)
-            if lame := lame_constants(C):
-                return stiffness.isotropic(self._gauss[1], self.dV, lame)
+        """Return K (..., 3, n, 3, n) of B; of isotropic materials by a short way where B is that of gradients."""
+        if C.ndim == 2 and self.has_standard_strain() and (lame := lame_constants(C)):
+            return stiffness.isotropic(self._gauss[1], self.dV, lame)
         B = self._operator(C)
         return stiffness.by_axis(stiffness.summed(B, (C[..., None, :, :] if C.ndim > 2 else C) @ B, self.dV))
 

@@ -1,11 +1,10 @@
-"""Stiffness from what is known at the Gauss points: the sum Σ B^T S dV, and two short ways to it."""
+"""Stiffness from what is known at the Gauss points: the sum Σ B^T S dV, and a short way to it."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from kratos_lite import voigt
-from kratos_lite.elements.tables import cofactors, determinant
 from kratos_lite.typing import Array
 
 
@@ -49,14 +48,3 @@ def isotropic(D: Array, dV: Array, lame: tuple[float, float]) -> Array:
     for i in range(3):
         K[..., i, :, i, :] += trace
     return K
-
-
-def affine(J: Array, products: Array, C: Array) -> Array:
-    """Return K = Σ_kl G_ijkl R_kalb of constant J, G_ijkl = det J Σ_pq C_ipjq J^-1_kp J^-1_lq."""
-    inverse, det = cofactors(J), determinant(J)[..., None, None]
-    pairs = (inverse / det)[..., :, None, :, None] * inverse[..., None, :, None, :]
-    tensor = voigt.tensor(np.moveaxis(voigt.tensor(C), 0, -1))  # j q i p
-    G = pairs.reshape(*J.shape[:-2], 9, 9) @ tensor.transpose(3, 1, 2, 0).reshape(9, 9)
-    K = np.swapaxes(G, -1, -2).reshape(-1, 9) @ products
-    n = int(np.sqrt(products.shape[1]))
-    return np.swapaxes(K.reshape(*J.shape[:-2], 3, 3, n, n), -3, -2)

@@ -43,17 +43,6 @@ def gradients_at_nodes(shape: type[Shape]) -> Array:
 
 
 @remembered
-def reference_products(shape: type[Shape], rule: Rule) -> Array:
-    """Return R = Σ γ dN_a/dxi_k dN_b/dxi_l as (9, n n), rows k l and columns a b.  Read-only, made once."""
-    dN = np.swapaxes(tabulate(shape, rule)[1], 1, 2)
-    g, d, n = dN.shape
-    A = dN.reshape(g, d * n)
-    R: Array = ((A.T * rule.weights) @ A).reshape(d, n, d, n).swapaxes(1, 2).reshape(d * d, n * n)
-    R.setflags(write=False)
-    return R
-
-
-@remembered
 def has_positive_row_sums(shape: type[Shape], rule: Rule) -> bool:
     """Return whether the row sums of the mass matrix of the reference cell are all positive."""
     sums = rule.weights @ tabulate(shape, rule)[0]

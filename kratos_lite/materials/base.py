@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cached_property
-from itertools import product
 from sys import float_info
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -22,15 +21,6 @@ MAX_FLOAT = float_info.max
 
 MATERIALS: Registry[type[LinearMaterial]] = Registry("material")
 """Every material by its class name and by the names of Kratos."""
-
-SAME_STRESS = 1e-8
-"""Relative difference up to which a stress is C strain."""
-
-
-def _samples() -> Array:
-    """Return strains (k, 6) of three sizes and of all signs, alike and unlike in size."""
-    signs = np.array(list(product((0.0, 1.0, -1.0), repeat=6)))[1:]
-    return np.vstack([size * signs * (1.0, 0.7, 0.4, 0.9, 0.3, 0.6) for size in (1e-6, 1e-3, 1e-1)])
 
 
 class LinearMaterial:
@@ -58,6 +48,11 @@ class LinearMaterial:
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
+        if cls.stress is not LinearMaterial.stress:
+            raise MaterialError(
+                f"{cls.__name__} overrides stress, which is C strain, as materials are linear; override "
+                "compliance() or elasticity(), which gives C"
+            )
         MATERIALS.add(cls.__name__, cls, cls.__dict__.get("aliases", ()))
 
     def __post_init__(self) -> None:
@@ -143,7 +138,7 @@ class LinearMaterial:
         return C
 
     def stress(self, strain: ArrayLike) -> Array:
-        """Return the stress of a strain.
+        """Return the stress C strain; a class that overrides this is refused.
 
         Parameters
         ----------
@@ -162,35 +157,6 @@ class LinearMaterial:
         if e.shape[-1:] != (6,):
             raise InputError(f"a strain has six components xx yy zz xy yz zx; got shape {e.shape}")
         return e @ self.C.T
-
-    def check_stress(self) -> None:
-        """Check that `stress` is C strain, once for each material; what is solved is C."""
-        if type(self).stress is not LinearMaterial.stress:
-            _ = self._stress_is_checked
-
-    @cached_property
-    def _stress_is_checked(self) -> bool:
-        name = type(self).__name__
-        strains = _samples()
-        try:
-            found = np.asarray(self.stress(strains), dtype=float)
-            if found.shape != strains.shape:
-                raise ValueError(f"it returned shape {found.shape}")
-        except (ValueError, TypeError, IndexError) as error:
-            text = f"{name}.stress(strain) must take strains (..., 6); of {strains.shape}: {error}"
-            raise MaterialError(text) from None
-        expected = strains @ self.C.T
-        miss = np.abs(found - expected).max(axis=1) / np.abs(expected).max(axis=1)
-        k = int(np.argmax(np.where(np.isnan(miss), np.inf, miss)))
-        if not miss[k] <= SAME_STRESS:
-            values = (", ".join(f"{x:.6g}" for x in row) for row in (strains[k], found[k], expected[k]))
-            strain, stress, linear = values
-            raise MaterialError(
-                f"{name}.stress is not C strain: at the strain ({strain}) it gives ({stress}) Pa, C gives "
-                f"({linear}) Pa; materials are linear: override elasticity() so that C is that of the "
-                "stress, or compliance(), and leave stress() as it is"
-            )
-        return True
 
     @classmethod
     def from_variables(cls, values: dict[str, Any]) -> LinearMaterial:

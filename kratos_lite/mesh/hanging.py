@@ -8,17 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 
 from kratos_lite.errors import MeshError
-from kratos_lite.mesh.blocks import NO_ROWS, Block, with_rows
+from kratos_lite.mesh.blocks import Block, with_rows
 from kratos_lite.mesh.centers import Centers, Keys, are_among, keys_of, sorted_keys
 from kratos_lite.shapes import Shape
-from kratos_lite.shapes.faces import FACE_SHAPES, Line3
-from kratos_lite.typing import Array, Ints, Mask, Rows
+from kratos_lite.shapes.faces import FACE_SHAPES, Line2, Line3
+from kratos_lite.typing import Array, Ints, Mask
 
-NO_WEIGHTS: Array = np.zeros(0)
+Hanging: TypeAlias = "tuple[Ints, Ints, Array, int]"
+"""Hanging nodes (h,), their independents (h, k) and weights (k,), and `HangingNodes.around`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,9 +29,9 @@ class HangingNodes:
 
     Attributes
     ----------
-    nodes : (h,) int, rows of the hanging nodes.
+    nodes : (h,) int, indices of the hanging nodes.
     start : (h + 1,) int, where the independents of each begin.
-    independents : (k,) int, rows of the nodes of the larger edge or face, corners first.
+    independents : (k,) int, indices of the nodes of the larger edge or face, corners first.
     weights : (k,) float, their shape functions at the hanging node.
     around : (h,) int, how many corners the hanging node is in the very middle of, or 0.
     large, small : keys of faces (`kratos_lite.mesh.centers.keys_of`): one large face for each small one.
@@ -96,12 +98,12 @@ class HangingNodes:
         hangs, waiting, levels = np.zeros(n, dtype=bool), np.arange(len(self)), []
         hangs[self.nodes] = True
         while len(waiting):
-            held = np.bincount(owner[hangs[self.independents]], minlength=len(self))[waiting] > 0
-            if held.all():
+            hang_too = np.bincount(owner[hangs[self.independents]], minlength=len(self))[waiting] > 0
+            if hang_too.all():
                 raise MeshError("hanging nodes hang on each other in a circle; a mesh has them from `refine`")
-            levels.append(waiting[~held])
+            levels.append(waiting[~hang_too])
             hangs[self.nodes[levels[-1]]] = False
-            waiting = waiting[held]
+            waiting = waiting[hang_too]
         return levels
 
     def _rows(self, chosen: Ints) -> tuple[Ints, Ints]:
@@ -112,25 +114,20 @@ class HangingNodes:
         return first, take
 
 
-class _Found:
-    """Hanging nodes as they are found."""
+CHILDREN = {
+    ("line", -1): ((0, 2), (1, 2)),
+    ("triangle", -1): ((3, 4), (4, 5), (5, 3), (0, 3, 5), (1, 4, 3), (2, 5, 4), (3, 4, 5)),
+    ("quadrilateral", -1): (
+        *((4, 8), (5, 8), (6, 8), (7, 8)),
+        *((0, 4, 8, 7), (1, 5, 8, 4), (2, 6, 8, 5), (3, 7, 8, 6)),
+    ),
+    ("quadrilateral", 0): ((4, 6), (0, 4, 6, 3), (4, 1, 2, 6)),
+    ("quadrilateral", 1): ((5, 7), (1, 5, 7, 0), (5, 2, 3, 7)),
+}
+"""The smaller edges and faces inside a split edge or face, by its cell and `Split.half`.
 
-    def __init__(self) -> None:
-        self.nodes: list[Ints] = [NO_ROWS]
-        self.independents: list[Ints] = [NO_ROWS]
-        self.weights: list[Array] = [NO_WEIGHTS]
-        self.counts: list[Ints] = [NO_ROWS]
-        self.around: list[Ints] = [NO_ROWS]
-
-    def add(self, nodes: Ints, independents: Ints | Rows, weights: Array, around: int = 0) -> None:
-        """Take up nodes (h,), -1 for none, with independents (h, k) and weights (k,)."""
-        there = nodes >= 0
-        count = int(there.sum())
-        self.nodes.append(nodes[there])
-        self.independents.append(independents[there].ravel().astype(np.int64))
-        self.weights.append(np.tile(weights, count))
-        self.counts.append(np.full(count, len(weights)))
-        self.around.append(np.full(count, around))
+They are columns of the corners, then the middles of the edges, then the middle.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,44 +136,48 @@ class Split:
 
     Attributes
     ----------
-    shape : of the edge or face; None for an edge of two nodes, `Line3` for one of three.
+    shape : of the edge or face.
     nodes : (k, n) int.
     middles : (k, e) int, nodes in the middle of its edges, then, of four corners, in its own.
-    rows : (k,) int, element of each.
+    elements : (k,) int, element of each.
     half : 0 or 1 of four-sided faces that are halved, across the edges `half` and `half` + 2; else -1.
     """
 
-    shape: type[Shape] | None
+    shape: type[Shape]
     nodes: Ints
     middles: Ints
-    rows: Ints
+    elements: Ints
     half: int = -1
 
     @property
     def corners(self) -> Ints:
         """(k, c) int, the corners."""
-        return self.nodes[:, : 2 if self.shape in (None, Line3) else self.shape.corners]
+        return self.nodes[:, : self.shape.corners]
 
-    def parts(self) -> list[Ints]:
+    @property
+    def _columns(self) -> list[list[int]]:
+        return [list(columns) for columns in CHILDREN[self.shape.cell, self.half]]
+
+    def children(self) -> list[Ints]:
         """Return the corners (k, 2), (k, 3) or (k, 4) of the smaller edges and faces inside."""
-        c, m = self.corners, self.middles
-        n = c.shape[1]
-        if n == 2:
-            return [np.stack([c[:, i], m[:, 0]], axis=1) for i in (0, 1)]
-        if n == 3:
-            lines = [m[:, [i, (i + 1) % 3]] for i in range(3)]
-            faces = [np.stack([c[:, i], m[:, i], m[:, i - 1]], axis=1) for i in range(3)]
-            return [*lines, *faces, m]
-        if self.half >= 0:
-            one, other = m[:, self.half], m[:, self.half + 2]
-            ends = [c[:, (self.half + i) % 4] for i in range(4)]
-            return [
-                np.stack([one, other], axis=1),
-                np.stack([ends[0], one, other, ends[3]], axis=1),
-                np.stack([one, ends[1], ends[2], other], axis=1),
-            ]
-        lines = [m[:, [i, 4]] for i in range(4)]
-        return [*lines, *(np.stack([c[:, i], m[:, i], m[:, 4], m[:, (i + 3) % 4]], axis=1) for i in range(4))]
+        nodes = np.column_stack([self.corners, self.middles])
+        return [nodes[:, columns] for columns in self._columns]
+
+    def hanging(self, centers: Centers) -> Iterator[Hanging]:
+        """Yield the nodes in its middle and in those of its children that are not its own."""
+        shape, corners = self.shape, self.shape.nodes[: self.shape.corners]
+        middles = corners[np.array(shape.edges or ((0, 1),))].mean(axis=1)
+        places = np.vstack([corners, middles, corners.mean(axis=0)])
+        candidates = []
+        if self.half < 0 and shape.cell != "triangle":
+            candidates.append((self.middles[:, -1], corners.mean(axis=0), shape.corners))
+        if len(shape.nodes) > shape.corners:
+            for child, columns in zip(self.children(), self._columns, strict=True):
+                candidates.append((centers.find(keys_of(child)), places[columns].mean(axis=0), 0))
+        for nodes, xi, around in candidates:
+            there = nodes >= 0
+            if there.any() and np.abs(shape.nodes - xi).max(axis=1).min() > 1e-9:
+                yield nodes[there], self.nodes[there], shape.N(xi), around
 
 
 def split_edges(blocks: Sequence[Block], centers: Centers, corner: Mask) -> Iterator[Split]:
@@ -188,11 +189,11 @@ def split_edges(blocks: Sequence[Block], centers: Centers, corner: Mask) -> Iter
         pairs = block.nodes[:, np.array(shape.edges)].astype(np.int64)
         middle = centers.find(keys_of(pairs))
         cell, edge = np.nonzero((middle >= 0) & corner[middle])
-        found, m = pairs[cell, edge], middle[cell, edge][:, None]
+        ends, m = pairs[cell, edge], middle[cell, edge][:, None]
         if len(shape.nodes) > shape.corners:
-            yield Split(Line3, np.column_stack([found, m]), m, at.start + cell)
+            yield Split(Line3, np.column_stack([ends, m]), m, at.start + cell)
         else:
-            yield Split(None, found, m, at.start + cell)
+            yield Split(Line2, ends, m, at.start + cell)
 
 
 def split_faces(blocks: Sequence[Block], centers: Centers, corner: Mask, existing: Keys) -> Iterator[Split]:
@@ -207,17 +208,15 @@ def split_faces(blocks: Sequence[Block], centers: Centers, corner: Mask, existin
             around = nodes[:, np.array(kind.edges)]
             middles = centers.find(keys_of(around))
             ends = (middles >= 0) & corner[middles]
-            if kind.corners == 3:
-                cells = np.flatnonzero(ends.all(axis=1))
-                yield Split(kind, nodes[cells], middles[cells], at.start + cells)
-                continue
-            own = centers.find(keys_of(nodes[:, :4]))
-            quartered = ends.all(axis=1) & (own >= 0) & corner[own]
-            cells = np.flatnonzero(quartered)
-            middles = np.column_stack([middles, own])
+            whole = ends.all(axis=1)
+            if kind.corners == 4:
+                own = centers.find(keys_of(nodes[:, :4]))
+                whole &= (own >= 0) & corner[own]
+                middles = np.column_stack([middles, own])
+            cells = np.flatnonzero(whole)
             yield Split(kind, nodes[cells], middles[cells], at.start + cells)
-            for half in (0, 1):
-                cells = np.flatnonzero(ends[:, half] & ends[:, half + 2] & ~quartered)
+            for half in (0, 1) if kind.corners == 4 else ():
+                cells = np.flatnonzero(ends[:, half] & ends[:, half + 2] & ~whole)
                 if len(cells):
                     line = keys_of(middles[cells][:, [half, half + 2]])
                     cells = cells[are_among(line, existing)]
@@ -227,36 +226,34 @@ def split_faces(blocks: Sequence[Block], centers: Centers, corner: Mask, existin
 def hanging_nodes(blocks: Sequence[Block], centers: Centers, n_nodes: int) -> HangingNodes | None:
     """Return the hanging nodes of some elements, or None if there are none."""
     corner = is_corner(blocks, n_nodes)
-    found, large, small = _Found(), [], []
+    hanging: list[Hanging] = []
+    large, small = [], []
     for edge in split_edges(blocks, centers, corner):
-        _on_edges(edge, centers, found)
+        hanging += edge.hanging(centers)
     existing = existing_keys(blocks)
     for face in split_faces(blocks, centers, corner, existing):
-        if not len(face.rows):
-            continue
-        smaller = face.parts()
-        inside = [keys_of(part) for part in smaller if part.shape[1] > 2]
+        inside = [keys_of(child) for child in face.children() if child.shape[1] > 2]
         cut = are_among(np.stack(inside), existing).all(axis=0)
         if not cut.any():
             continue
-        coarse = Split(face.shape, face.nodes[cut], face.middles[cut], face.rows[cut], face.half)
-        _on_faces(coarse, centers, found)
+        coarse = Split(face.shape, face.nodes[cut], face.middles[cut], face.elements[cut], face.half)
+        hanging += coarse.hanging(centers)
         large += [keys_of(coarse.corners)] * len(inside)
         small += [keys[cut] for keys in inside]
-    if not sum(map(len, found.nodes)):
-        return None
-    return _gathered(found, large, small)
+    return _joined(hanging, large, small) if hanging else None
 
 
-def _gathered(found: _Found, large: list[Keys], small: list[Keys]) -> HangingNodes:
-    nodes, counts = np.concatenate(found.nodes), np.concatenate(found.counts)
+def _joined(hanging: Sequence[Hanging], large: list[Keys], small: list[Keys]) -> HangingNodes:
+    """Return hanging nodes, each once."""
     none = np.zeros(0, dtype=np.uint64)
+    nodes = np.concatenate([nodes for nodes, *_ in hanging])
+    counts = [np.full(len(nodes), len(weights)) for nodes, _, weights, _ in hanging]
     every = HangingNodes(
         nodes,
-        np.concatenate([[0], np.cumsum(counts)]),
-        np.concatenate(found.independents),
-        np.concatenate(found.weights),
-        np.concatenate(found.around),
+        np.concatenate([[0], np.cumsum(np.concatenate(counts))]),
+        np.concatenate([independents.ravel() for _, independents, _, _ in hanging]),
+        np.concatenate([np.tile(weights, len(nodes)) for nodes, _, weights, _ in hanging]),
+        np.concatenate([np.full(len(nodes), around) for nodes, _, _, around in hanging]),
         np.concatenate([none, *large]),
         np.concatenate([none, *small]),
     )
@@ -270,45 +267,6 @@ def _gathered(found: _Found, large: list[Keys], small: list[Keys]) -> HangingNod
         weights=every.weights[take],
         around=every.around[once],
     )
-
-
-def _on_edges(edge: Split, centers: Centers, found: _Found) -> None:
-    """Take up the nodes that hang on split edges."""
-    if edge.shape is None:
-        found.add(edge.middles[:, 0], edge.nodes, np.array([0.5, 0.5]), 2)
-        return
-    for half, xi in zip(edge.parts(), (-0.5, 0.5), strict=True):
-        found.add(centers.find(keys_of(half)), edge.nodes, Line3.N([xi]))
-
-
-def _on_faces(face: Split, centers: Centers, found: _Found) -> None:
-    """Take up the nodes that hang inside split faces, not on their edges."""
-    shape = face.shape
-    assert shape is not None
-    corners = shape.nodes[: shape.corners]
-    middles = corners[np.array(shape.edges)].mean(axis=1)
-    quadratic = len(shape.nodes) > shape.corners
-    if shape.corners == 3:
-        for i, line in enumerate(face.parts()[:3] if quadratic else ()):
-            xi = (middles[i] + middles[(i + 1) % 3]) / 2
-            found.add(centers.find(keys_of(line)), face.nodes, shape.N(xi))
-        return
-    if face.half >= 0:
-        if quadratic:
-            line, *halves = face.parts()
-            middle = centers.find(keys_of(line))
-            if len(shape.nodes) < 9:
-                found.add(middle, face.nodes, shape.N(np.zeros(2)))
-            for part, end in zip(halves, (-0.5, 0.5), strict=True):
-                xi = end * np.eye(2)[face.half]
-                found.add(centers.find(keys_of(part)), face.nodes, shape.N(xi))
-        return
-    if len(shape.nodes) < 9:
-        found.add(face.middles[:, 4], face.nodes, shape.N(np.zeros(2)), 4)
-    if quadratic:
-        places = [*(middles / 2), *(corners / 2)]
-        for part, xi in zip(face.parts(), places, strict=True):
-            found.add(centers.find(keys_of(part)), face.nodes, shape.N(xi))
 
 
 def known_centers(blocks: Sequence[Block], hanging: HangingNodes | None) -> Centers:

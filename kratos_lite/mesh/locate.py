@@ -44,8 +44,7 @@ class Located:
     ----------
     mesh : the mesh.
     points : (..., 3) float, m; the points.
-    rows : (...) int, row of the element, the lowest of those that contain the point; -1 outside the mesh.
-        Where many processes share the mesh, all take the same element; -1 where it is on others alone.
+    rows : (...) int, index of the element, the lowest of those that contain the point; -1 outside the mesh.
     block, cell : (...) int, the same as number of the block and row in it; -1 outside.
     xi : (..., 3) float, reference coordinates; nan outside.
     """
@@ -144,7 +143,7 @@ def locate(mesh: Cells, points: ArrayLike) -> Located:
     flat = x.reshape(-1, 3)
     search = _Search(mesh)
     parts = [search.find(flat[i : i + POINTS_AT_ONCE]) for i in range(0, len(flat), POINTS_AT_ONCE)]
-    rows = np.concatenate([np.zeros(0, dtype=np.int64), *(part[0] for part in parts)])
+    rows = np.concatenate([NO_ROWS, *(part[0] for part in parts)])
     xi = np.concatenate([np.zeros((0, 3)), *(part[1] for part in parts)])
     block = np.where(rows >= 0, search.block_of(rows), -1)
     cell = np.where(rows >= 0, rows - search.starts[block], -1)
@@ -177,13 +176,8 @@ class _Search:
         if len(x) > FEW:
             return self.tree.around(x)
         low, high = self.boxes
-        x_inside = (low[:, 0] <= x[:, :1]) & (x[:, :1] <= high[:, 0])
-        rows = []
-        for point, inside in zip(x, x_inside, strict=True):
-            near = np.flatnonzero(inside)
-            rows.append(near[((low[near] <= point) & (point <= high[near])).all(axis=1)])
-        none = np.zeros(0, dtype=np.int64)
-        return np.repeat(np.arange(len(x)), [len(r) for r in rows]), np.concatenate([none, *rows])
+        at, row = np.nonzero(((low <= x[:, None]) & (x[:, None] <= high)).all(axis=2))
+        return at, row
 
     def block_of(self, rows: Ints) -> Ints:
         """Return the number of the block of each element row."""

@@ -175,9 +175,9 @@ def _parts_of_split(mesh: Mesh, centers: Centers) -> tuple[Keys, Ints]:
     edges = split_edges(mesh.blocks, centers, corner)
     faces = split_faces(mesh.blocks, centers, corner, existing_keys(mesh.blocks))
     for split in (*edges, *faces):
-        inside = split.parts()
-        parts += [keys_of(part) for part in inside]
-        owners += [split.rows] * len(inside)
+        inside = split.children()
+        parts += [keys_of(child) for child in inside]
+        owners += [split.elements] * len(inside)
     return np.concatenate(parts), np.concatenate(owners)
 
 

@@ -116,13 +116,10 @@ class ConstrainedSystem:
         return MatrixFree(self.points, self.groups, self._assembled)
 
     def _assembled(self, split: bool = False) -> Any:
-        skipped: set[str] = set()
         assemble: Callable[..., Any] = assemble_stiffness
         if split:
             from kratos_lite.solvers.dilatation import assemble  # a quick start for small models
-        K = assemble(self.points, self.groups, self.pattern, self.progress, skipped)
-        self.skipped += sorted(skipped)
-        return K
+        return assemble(self.points, self.groups, self.pattern, self.progress)
 
     @cached_property
     def norm(self) -> float:

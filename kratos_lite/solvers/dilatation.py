@@ -69,7 +69,6 @@ def assemble(
     groups: Sequence[ElementGroup],
     pattern: Pattern,
     progress: Progress | None = None,
-    skipped: set[str] | None = None,
 ) -> SplitMatrix:
     """Return the stiffness matrix of elements some of which are nearly incompressible."""
     elastic, soft, at_once, parts = list(groups), list(groups), list(groups), {}
@@ -82,7 +81,7 @@ def assemble(
         elastic[number] = _softened(group, part.bulk)
         soft[number] = _softened(elastic[number], KEPT * shear)
         at_once[number] = elastic[number] if part.is_all() else group
-    K = assemble_stiffness(points, at_once, pattern, progress, skipped)
+    K = assemble_stiffness(points, at_once, pattern, progress)
     for number, part in parts.items():
         if not part.is_all():
             part.take_off(K, pattern, number)

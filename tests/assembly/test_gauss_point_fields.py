@@ -17,7 +17,6 @@ from kratos_lite.elements.kinematic_linear_3d4n import KinematicLinear3D4N
 from kratos_lite.elements.kinematic_linear_3d8n import KinematicLinear3D8N
 from kratos_lite.elements.kinematic_linear_3d20n import KinematicLinear3D20N
 from kratos_lite.errors import MeshError
-from kratos_lite.materials import MATERIALS
 from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.materials.orthotropic3d import Orthotropic3D
 from kratos_lite.mesh import Block, Mesh
@@ -156,21 +155,6 @@ def test_an_element_with_its_own_B_takes_it():
             close(a, 2 * b, 1e-13)
     assert fields.totals(points, [group], u)[0] == pytest.approx(4 * fields.totals(points, [usual], u)[0])
     close(*(fields.internal_load(points, [g], n * u) for g, n in ((group, 1), (usual, 4))), 1e-12)
-
-
-def test_a_material_with_its_own_stress_takes_it():
-    with MATERIALS.temporary():
-
-        class Hardened(Isotropic3D):
-            def stress(self, strain):
-                return 2 * super().stress(strain)
-
-    points, group = batch_of(KinematicLinear3D8N, Hardened(210e6, 0.3))
-    _, usual = batch_of(KinematicLinear3D8N)
-    u = 1e-3 * points**2
-    for stress, factor in ((True, 2), (False, 1)):
-        found, once = (fields.at_gauss(points, g, u, stress=stress) for g in (group, usual))
-        close(found, factor * once, 1e-13)
 
 
 # ---- exact values ----------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ import kratos_lite as kl
 from kratos_lite.assembly import element_groups, sparsity_pattern
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.sparsity_pattern import Pattern
-from kratos_lite.assembly.stiffness import CONSTANT_JACOBIANS, assemble_dense, assemble_stiffness
+from kratos_lite.assembly.stiffness import assemble_dense, assemble_stiffness
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.native import kernels
 
@@ -46,10 +46,10 @@ def pattern_of(points, groups):
     return Pattern(len(points), [group.nodes for group in groups])
 
 
-def assert_sum(points, groups, tolerance=1e-13, skipped=None):
+def assert_sum(points, groups, tolerance=1e-13):
     """Assert that the sparse matrix is the dense one, and return it."""
     want = assemble_dense(points, groups)
-    K = assemble_stiffness(points, groups, pattern_of(points, groups), skipped=skipped)
+    K = assemble_stiffness(points, groups, pattern_of(points, groups))
     np.testing.assert_allclose(K.scipy().toarray(), want, rtol=0, atol=tolerance * np.abs(want).max())
     return K
 
@@ -154,16 +154,6 @@ def test_an_element_class_with_a_local_system_of_its_own(path):
         K = assert_sum(points, [plain, doubled])
         once = assemble_stiffness(points, [group], pattern_of(points, [group]))
         assert np.abs(K.data).max() > 1.5 * np.abs(once.data).max()
-
-
-@pytest.mark.parametrize("name", ["KinematicLinear3D8N", "KinematicLinear3D27N"])
-def test_constant_jacobians_are_used_and_said(path, name):
-    skipped = set()
-    assert_sum(*scene(name, (4, 4, 1)), skipped=skipped)
-    assert skipped == {CONSTANT_JACOBIANS}
-    skipped.clear()
-    assert_sum(*scene(name, (4, 4, 1), 0.02), skipped=skipped)
-    assert not skipped
 
 
 def test_progress_ends_at_one(path):

@@ -282,7 +282,7 @@ def test_a_B_for_one_element_sees_its_own_element():
         ("dNdX", "override B"),
         ("_gauss", "give yours another name"),
         ("strain", "override B"),
-        ("stress", "belongs to a material"),
+        ("stress", "write a LinearMaterial with that C"),
         ("internal_force", "override local_system"),
         ("stiffness", "override local_system"),
         ("stiffness_by_axis", "override local_system"),

@@ -9,7 +9,7 @@ from kratos_lite.bodies.rotations import exp
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import InputError, MeshError
 from kratos_lite.mesh import Block, Mesh
-from kratos_lite.mesh.boxes import BoxTree, cell_boxes, distance_to_cell
+from kratos_lite.mesh.boxes import BoxTree, cell_boxes
 from kratos_lite.shapes.faces import Quadrilateral4
 from kratos_lite.shapes.inverse import inverse_map
 
@@ -230,7 +230,7 @@ def test_a_thin_gap_belongs_to_nobody():
     found = mesh.locate(np.column_stack([x, 0 * x + 0.3, 0 * x + 0.8]))
     assert found.inside.tolist() == [True, False, False, False, True]
     assert (found.rows >= 8).tolist() == [False, False, False, False, True]
-    with pytest.raises(MeshError, match=r"lies outside the mesh, 5e-07 m from element"):
+    with pytest.raises(MeshError, match=r"lies outside the mesh, about 4.9\de-07 m from element"):
         found[2].require()
 
 
@@ -310,11 +310,11 @@ def test_the_error_says_which_point_how_far_and_the_cure():
     with pytest.raises(
         MeshError,
         match=r"point 1 at \[1.25, 0.5, 0.5\] m \(and 1 more of 3\) lies outside the mesh, "
-        r"0.25 m from element 2 \(KinematicLinear3D8N\); move it into the mesh, or choose .*\.inside",
+        r"about 0.25 m from element 2 \(KinematicLinear3D8N\); move it into the mesh, or choose .*\.inside",
     ):
         mesh.locate(points, required=True)
     with pytest.raises(
-        MeshError, match=r"^the point at \[-1.0, 0.0, 0.0\] m lies outside the mesh, 1 m from"
+        MeshError, match=r"^the point at \[-1.0, 0.0, 0.0\] m lies outside the mesh, about 1 m from"
     ):
         mesh.locate([-1.0, 0.0, 0.0], required=True)
     with pytest.raises(MeshError, match=r"^point 0, 1 at"):
@@ -326,21 +326,6 @@ def test_the_error_says_which_point_how_far_and_the_cure():
     with pytest.raises(MeshError, match="the point at"):
         found.nodes_and_weights(2)
     assert found[found.inside].require().rows.tolist() == [0]
-
-
-def test_the_distance_to_curved_faces_triangles_and_quadrilaterals():
-    x = kl.box((2.0, 2.0, 2.0), (1, 1, 1), "KinematicLinear3D27N", origin=(-1.0, -1.0, -1.0)).points
-    ball = x * (np.abs(x).max(axis=1) / np.maximum(np.linalg.norm(x, axis=1), 1e-300))[:, None]
-    mesh = one_cell("KinematicLinear3D27N", ball[kl.box(element="KinematicLinear3D27N").blocks[0].nodes[0]])
-    shape = mesh.blocks[0].shape
-    assert distance_to_cell(shape, mesh.points, np.array([0.0, 0.0, 3.0])) == pytest.approx(2.0, rel=1e-6)
-    for name in ("KinematicLinear3D4N", "KinematicLinear3D10N"):
-        shape = ELEMENTS[name].shape
-        far = distance_to_cell(shape, shape.nodes, np.array([1.0, 1.0, 1.0]))
-        assert far == pytest.approx(2 / np.sqrt(3), rel=1e-6)
-        assert distance_to_cell(shape, shape.nodes, np.array([0.2, 0.3, -1e-6])) == pytest.approx(
-            1e-6, rel=1e-3
-        )
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import kratos_lite as kl
 from kratos_lite.analysis.nodal_loads import external_loads
 from kratos_lite.mesh.refinement import raised, refine
 from kratos_lite.model.loads import Load
-from kratos_lite.model.loads.conditions import ConditionLoads
+from kratos_lite.model.loads.surface import ConditionLoads
 from kratos_lite.model.refined import refined
 
 STEEL = kl.Isotropic3D(E=200e9, nu=0.3, density=7800.0)

@@ -163,8 +163,8 @@ MUTATIONS = [
     # ---- assembly, solvers, report
     Mutation(
         "assembly/gauss_point_fields.py",
-        "group.material.C)) + group.initial_stress(chunk)",
-        "group.material.C)) - group.initial_stress(chunk)",
+        "group.material.C.T + group.initial_stress(chunk)",
+        "group.material.C.T - group.initial_stress(chunk)",
         GAUSS,
     ),
     Mutation("assembly/gauss_point_fields.py", "* element.dV).sum()) / 2", "* element.dV).sum())", GAUSS),

@@ -719,10 +719,6 @@ def test_the_material_that_is_broken_below_conforms_before():
         ({"elasticity": lambda self: C_with(3, 3, -1e8)}, {"positive definite", "isotropy"}),
         ({"elasticity": lambda self: -Made().elasticity()}, {"positive definite"}),
         ({"elasticity": lambda self: 0 * Made().elasticity()}, {"positive definite"}),
-        ({"stress": lambda self, e: np.asarray(e) @ self.C * 1.001}, {"tangent"}),
-        ({"stress": lambda self, e: np.asarray(e) @ self.C + 1e3}, {"stress at rest", "isotropy"}),
-        ({"stress": lambda self, e: self.C @ np.asarray(e)}, {"broadcasting"}),
-        ({"stress": lambda self, e: np.asarray(e) @ self.C[:, [0, 1, 2, 3, 5, 4]]}, {"tangent", "isotropy"}),
         ({"density": property(lambda self: -1.0), "__init__": lambda self: None}, {"density"}),
     ],
 )

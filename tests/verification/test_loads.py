@@ -196,13 +196,13 @@ def test_loads_on_conditions_of_unknown_kind_are_refused():
     mesh = kl.Mesh(mesh.points, mesh.blocks, conditions=[odd], parts={"lid": part})
     for load in (kl.Traction("lid", (0, 0, 1)), kl.Pressure("lid", 1.0)):
         with pytest.raises(
-            kl.ModelError, match=r"meets conditions of the unknown kind Odd4N \(the first is 5\)"
+            kl.ModelError, match=r"meets conditions of the unknown type Odd4N \(the first is 5\)"
         ):
             nodal(mesh, load)
 
 
 def test_loads_of_conditions_are_their_own_plus_the_nodal_ones():
-    from kratos_lite.model.loads.conditions import ConditionLoads
+    from kratos_lite.model.loads.surface import ConditionLoads
 
     mesh = faces_as_conditions(kl.box(), "z+", flip=False)
     own, at_nodes = np.array([[1.0, 0, 0]]), np.zeros((8, 3))
@@ -214,7 +214,7 @@ def test_loads_of_conditions_are_their_own_plus_the_nodal_ones():
 
 
 def test_a_pressure_of_its_own_on_a_line_condition_is_refused():
-    from kratos_lite.model.loads.conditions import ConditionLoads
+    from kratos_lite.model.loads.surface import ConditionLoads
     from kratos_lite.shapes.faces import Line2
 
     box = kl.box()

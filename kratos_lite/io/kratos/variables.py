@@ -15,8 +15,7 @@ from kratos_lite.analysis.fields import FIELDS
 from kratos_lite.analysis.model import Model
 from kratos_lite.mesh import Mesh, ids_of, with_rows
 from kratos_lite.model.loads.body import Gravity
-from kratos_lite.model.loads.conditions import ConditionLoads
-from kratos_lite.model.loads.surface import SURFACES
+from kratos_lite.model.loads.surface import SURFACES, ConditionLoads
 from kratos_lite.typing import Array, Mask
 
 LOADS = {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Mapping, Sequence
+from copy import copy
 from types import FunctionType
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
@@ -77,9 +78,12 @@ class Load(ABC):
 
 
 class DistributedLoad(Load):
-    """A load over faces, lines or volumes, which may be a function of places."""
+    """A load over faces, lines or volumes `where`, which may be a function of places."""
 
     factors: ClassVar[int]
+    nodal: ClassVar[tuple[str, int]] = "", 0
+    """The value that may be a function or interpolated from nodes, and how many axes it then has."""
+    where: Any
 
     @abstractmethod
     def integral(self, mesh: Mesh, groups: Sequence[ElementGroup], factors: int) -> Array:
@@ -91,7 +95,7 @@ class DistributedLoad(Load):
 
     def warnings(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
         """Return a warning if the load is a function that jumps inside elements."""
-        if not any(callable(value) for name, value in vars(self).items() if name != "where"):
+        if not callable(getattr(self, self.nodal[0], None)):
             return []
         forces = self.integral(mesh, groups, self.factors + 2)  # one more point a direction, or two
         change = float(np.abs(self.forces(mesh, groups) - forces).sum())
@@ -102,6 +106,18 @@ class DistributedLoad(Load):
             f"{100 * change / np.abs(forces).sum():.2g} % with the next quadrature rule; "
             "put edges of elements where it does, or refine there"
         ]
+
+    def refined(self, finer: RefinedMesh) -> Load:
+        """Return the load where its faces, lines or elements are cut; nodal values are interpolated."""
+        new, (name, axes) = copy(self), self.nodal
+        new.where = self._refined_where(finer)
+        value: Any = getattr(self, name, None)
+        if axes and not callable(value) and np.ndim(value) == axes:
+            setattr(new, name, finer.interpolate(value))
+        return new
+
+    def _refined_where(self, finer: RefinedMesh) -> Any:
+        return finer.where(self.where)
 
 
 class TimeDependentLoad(Load):

@@ -11,8 +11,8 @@ from kratos_lite.assembly import gauss_point_fields
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh, WhereElements
-from kratos_lite.model.loads.base import DistributedLoad, Load, OfPlace, at_places, vectors
-from kratos_lite.typing import Array, Mask
+from kratos_lite.model.loads.base import DistributedLoad, OfPlace, at_places, vectors
+from kratos_lite.typing import Array
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -37,45 +37,15 @@ class BodyForce(DistributedLoad):
         self.where = where
 
     factors = 4  # N, and a polynomial of degree p + 2 over straight cells
+    nodal = "force", 2
 
-    def scale(self, group: ElementGroup) -> float:
-        """Return what multiplies the load.
-
-        Parameters
-        ----------
-        group : elements of one material.
-
-        Returns
-        -------
-        1, and the density in kg/m³ for `Gravity`.
-        """
+    def _scale(self, group: ElementGroup) -> float:
+        """Return what multiplies the force in a group: 1, or the density in kg/m³ for `Gravity`."""
         return 1.0
 
-    def carriers(self, mesh: Mesh) -> Mask:
-        """Return which elements carry it.
-
-        Parameters
-        ----------
-        mesh : elements and named parts.
-
-        Returns
-        -------
-        (m,) bool
-        """
-        chosen = np.zeros(mesh.n_elements, dtype=bool)
-        chosen[slice(None) if self.where is None else mesh.elements(self.where)] = True
-        return chosen
-
     def check(self, mesh: Mesh) -> None:
-        """Check that the elements which carry it exist.
-
-        Raises
-        ------
-        MeshError
-            There is no such part, property or element.
-        """
-        if self.where is not None:
-            mesh.elements(self.where)
+        """Raise MeshError if there is no such part, property or element."""
+        mesh.elements(self.where)
 
     def integral(self, mesh: Mesh, groups: Sequence[ElementGroup], factors: int) -> Array:
         """Return ∫ N b dV as nodal forces (n, 3) in N.
@@ -85,13 +55,15 @@ class BodyForce(DistributedLoad):
         InputError
             A nodal force has another number of nodes, or a function does not return forces.
         """
-        points, total, carriers = mesh.points, np.zeros_like(mesh.points), self.carriers(mesh)
+        points, total = mesh.points, np.zeros_like(mesh.points)
+        carriers = np.zeros(mesh.n_elements, dtype=bool)
+        carriers[mesh.elements(self.where)] = True
         force = at_places(self.force, self.what[0], (3,)) if callable(self.force) else self.force
         if not callable(force) and force.ndim == 2 and len(force) != len(points):
             name = type(self).__name__
             raise InputError(f"a nodal {name} needs shape ({len(points)}, 3); got {force.shape}")
         for group in groups:
-            part, scale = group.take(carriers[group.rows]), self.scale(group)
+            part, scale = group.take(carriers[group.rows]), self._scale(group)
             if not (len(part) and scale):
                 continue
             if callable(force):
@@ -100,11 +72,8 @@ class BodyForce(DistributedLoad):
                 total += gauss_point_fields.body_force(points, part, scale * force)
         return total
 
-    def refined(self, finer: RefinedMesh) -> Load:
-        """Return the load on a finer mesh; nodal values are interpolated."""
-        nodal = not callable(self.force) and self.force.ndim == 2
-        force = finer.interpolate(self.force) if nodal else self.force
-        return type(self)(force, finer.where_elements(self.where))
+    def _refined_where(self, finer: RefinedMesh) -> WhereElements:
+        return finer.where_elements(self.where)
 
 
 class Gravity(BodyForce):
@@ -127,6 +96,6 @@ class Gravity(BodyForce):
     def __init__(self, acceleration: ArrayLike | OfPlace, where: WhereElements = None) -> None:
         super().__init__(acceleration, where)
 
-    def scale(self, group: ElementGroup) -> float:
+    def _scale(self, group: ElementGroup) -> float:
         """Return the density."""
         return group.material.density

@@ -12,7 +12,7 @@ from kratos_lite.assembly.element_groups import ElementGroup, add_nodal
 from kratos_lite.elements.surface import FUNCTION, area_vectors, face_rule, surface_load, surface_pressure
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.mesh import Block, Mesh, Where, outward_signs
+from kratos_lite.mesh import Block, Mesh, Where, outward_signs, with_rows
 from kratos_lite.model.loads.base import DistributedLoad, Load, OfPlace, at_places, vectors
 from kratos_lite.typing import Array
 from kratos_lite.validation import finite, number
@@ -53,6 +53,7 @@ class Traction(FaceLoad):
     """
 
     cells: ClassVar[tuple[str, ...]] = SURFACES
+    nodal = "traction", 2
 
     def __init__(self, where: Where, traction: ArrayLike | OfPlace) -> None:
         self.where, self.traction = where, traction
@@ -66,10 +67,6 @@ class Traction(FaceLoad):
             assert block.shape is not None
             t = _on(block, self.traction, mesh, what, (3,))
             yield block, surface_load(block.shape, mesh.points[block.nodes], t, factors)
-
-    def refined(self, finer: RefinedMesh) -> Load:
-        """Return the load on a finer mesh: on the faces or lines that have come from those of the old one."""
-        return type(self)(finer.where(self.where), _refined(self.traction, finer, 2))
 
 
 class LineLoad(Traction):
@@ -101,6 +98,8 @@ class Pressure(FaceLoad):
         The normal is neither, or the pressure no number.
     """
 
+    nodal = "pressure", 1
+
     def __init__(self, where: Where, pressure: ArrayLike | OfPlace, normal: str = "outward") -> None:
         if normal not in ("outward", "nodes"):
             raise InputError(f"normal must be 'outward' or 'nodes'; got {normal!r}")
@@ -120,10 +119,6 @@ class Pressure(FaceLoad):
             if self.normal == "outward":
                 forces *= outward(mesh, block)[:, None, None]
             yield block, forces
-
-    def refined(self, finer: RefinedMesh) -> Load:
-        """Return the load on a finer mesh: on the faces that have come from those of the old one."""
-        return Pressure(finer.where(self.where), _refined(self.pressure, finer, 1), self.normal)
 
 
 class Resultant(FaceLoad):
@@ -191,9 +186,59 @@ class Resultant(FaceLoad):
             assert block.shape is not None
             yield block, surface_load(block.shape, mesh.points[block.nodes], traction, factors)
 
+
+class ConditionLoads(Load):
+    """Loads on the conditions of the mesh, as a file states them.
+
+    The load on a condition is its own value plus the one interpolated from its nodes.
+
+    Parameters
+    ----------
+    force : (c, 3) per condition; Pa on faces, N/m on lines, N on points.
+    nodal_force : (n, 3) per node, by the cell of the conditions that carry it.
+    pressure : (c,) per condition, Pa, positive against the normal about which the nodes of the
+        condition run counter-clockwise.
+    nodal_pressure : (n,) per node, Pa.
+    """
+
+    def __init__(
+        self, force: Array, nodal_force: dict[str, Array], pressure: Array, nodal_pressure: Array
+    ) -> None:
+        self.force, self.nodal_force = force, nodal_force
+        self.pressure, self.nodal_pressure = pressure, nodal_pressure
+
+    def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
+        """Return the nodal forces (n, 3) in N."""
+        total = np.zeros_like(mesh.points)
+        for block, at in with_rows(mesh.conditions):
+            _check_loadable(block, bool(self.force[at].any()), bool(self.pressure[at].any()))
+            if block.shape is None or not len(block):
+                continue
+            X = mesh.points[block.nodes]
+            force = self.force[at, None, :] + self.nodal_force[block.shape.cell][block.nodes]
+            if force.any():
+                add_nodal(total, block.nodes, surface_load(block.shape, X, force))
+            pressure = self.pressure[at, None] + self.nodal_pressure[block.nodes]
+            if pressure.any() and block.shape.cell in SURFACES:
+                add_nodal(total, block.nodes, surface_pressure(block.shape, X, pressure))
+        return total
+
     def refined(self, finer: RefinedMesh) -> Load:
-        """Return the load on a finer mesh: on the faces that have come from those of the old one."""
-        return Resultant(finer.where(self.where), self.force, self.moment, self.about)
+        """Return the loads on a finer mesh: conditions keep those of their parents, nodes interpolate."""
+        return ConditionLoads(
+            self.force[finer.conditions],
+            {cell: finer.interpolate(force) for cell, force in self.nodal_force.items()},
+            self.pressure[finer.conditions],
+            finer.interpolate(self.nodal_pressure),
+        )
+
+
+def _check_loadable(block: Block, force: bool, pressure: bool) -> None:
+    """Raise ModelError for a load stated on conditions that cannot carry it."""
+    if block.shape is None and (force or pressure):
+        raise ModelError(f"a load is given on conditions of the unknown type {block.name}")
+    if block.shape is not None and pressure and block.shape.cell not in SURFACES:
+        raise ModelError(f"a pressure acts on faces; {block.name} is not one")
 
 
 def _points_of(mesh: Mesh, faces: Sequence[Block], factors: int) -> Iterator[tuple[Array, Array]]:
@@ -216,11 +261,6 @@ def _on(block: Block, value: Any, mesh: Mesh, what: str, width: tuple[int, ...])
     return value[block.nodes]
 
 
-def _refined(value: Any, finer: RefinedMesh, dimensions: int) -> Any:
-    """Return a load on a finer mesh, where what nodes have is interpolated."""
-    return finer.interpolate(value) if not callable(value) and np.ndim(value) == dimensions else value
-
-
 def outward(mesh: Mesh, block: Block) -> Array:
     """Return +1 for faces whose nodes run counter-clockwise from outside the body, else -1."""
     signs = outward_signs(mesh.boundary, block)
@@ -237,9 +277,9 @@ def _faces(mesh: Mesh, where: Where, what: str, cells: Sequence[str] = SURFACES)
     wanted = "faces" if cells == SURFACES else "lines"
     for block in faces:
         if block.shape is None or block.shape.cell not in cells:
-            kind = "conditions of the unknown kind" if block.shape is None else "other conditions,"
+            other = "conditions of the unknown type" if block.shape is None else "other conditions,"
             raise ModelError(
-                f"{what} acts on {wanted}; it meets {kind} {block.name} (the first is {block.ids[0]})"
+                f"{what} acts on {wanted}; it meets {other} {block.name} (the first is {block.ids[0]})"
             )
     if mesh.whole and not faces:
         name = f"part {where!r}" if isinstance(where, str) else "the chosen nodes"
