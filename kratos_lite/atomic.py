@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from kratos_lite.errors import InputError, SolveError
 
-FULL = {errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", None), None}
-"""Errors of a full disk, of a file or user that may take no more, and of NumPy, which gives no number."""
+FULL = {errno.ENOSPC, getattr(errno, "EDQUOT", None), None}
+"""Errors of a full disk, of a user who may take no more, and of NumPy, which gives no number."""
 
 
 def read_arrays(path: str | Path, names: Sequence[str], what: str) -> dict[str, NDArray[Any]]:
@@ -113,4 +113,6 @@ def _text(path: Path, error: OSError) -> str:
     if missing:
         return f"{path}: cannot be written: there is no folder {folder}; create it or choose another path"
     cure = "free some space" if error.errno in FULL else "choose a file name in a folder where you may write"
+    if error.errno == errno.EFBIG:
+        cure = "raise the limit on the size of files (ulimit -f)"
     return f"{path}: cannot be written: {error.strerror or error}; {cure}"

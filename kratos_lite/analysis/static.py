@@ -190,7 +190,7 @@ class StaticAnalysis:
     def _warnings(self, case: LoadSet) -> list[str]:
         """Return the warnings of the model and of a load set."""
         idle = checks.check_loads(case.loads, self._state.groups, case.forces, self.model.supports)
-        return self.warnings + idle + equal_loads(case.loads)
+        return self.warnings + idle + equal_loads(case.loads, self.model.named_loads)
 
     def _equations_of(self, moving: Mask) -> Equations:
         """Return the equations of the components that move, made anew only for one that is new."""

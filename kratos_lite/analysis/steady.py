@@ -38,7 +38,7 @@ def solve_steady(
     with phase("load"):
         forces, inertia = e.load(0.0), e.inertia_load(0.0)
         nodal = e.system.scatter(forces).copy()
-        warnings += equal_loads(model.loads)
+        warnings += equal_loads(model.loads, model.named_loads)
         warnings += check_loads(model.loads, e.system.groups, nodal, model.supports)
     with phase("assemble"):
         A, symmetric = e.matrix(0.0, 0.0, 0.0, 1.0), e.is_symmetric(0.0, 0.0)

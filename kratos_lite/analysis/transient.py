@@ -96,7 +96,7 @@ class TransientAnalysis:
         lumped = flag(lumped, "lumped") or self.integrator.lumps_mass
         e = EquationsOfMotion(model, lumped=lumped, rayleigh=rayleigh, progress=progress)
         self.equations = e
-        e.warnings += equal_loads(model.loads)
+        e.warnings += equal_loads(model.loads, model.named_loads)
         self.integrator.check(e)
         self._version = _version(model)
         self._rate = RateWatch(e)

@@ -27,11 +27,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     gc.set_threshold(100_000)  # and a hundred times while modules are loaded, for 5 ms
     _escape_unknown_characters()
     words = with_values(sys.argv[1:] if arguments is None else arguments)
+    signals: list[KeyboardInterrupt] = []
     try:
-        with _ended_by_signals():
+        with _ended_by_signals(signals):
             return _run(words) if share(words) else 0
     except (Exception, KeyboardInterrupt) as error:
-        code, text = _verdict(error)
+        # a module that a signal keeps from loading says something else
+        code, text = _verdict(signals[0] if signals else error)
         if "--debug" in words and not isinstance(error, (KeyboardInterrupt, BrokenPipeError)):
             raise
         if text:
@@ -87,24 +89,24 @@ def _run(words: Sequence[str]) -> int:
 
 
 @contextmanager
-def _ended_by_signals() -> Iterator[None]:
+def _ended_by_signals(came: list[KeyboardInterrupt]) -> Iterator[None]:
     """Let SIGTERM and SIGHUP end the program as Ctrl-C does, unless they are ignored or used otherwise."""
 
     def end(number: int, _: object) -> None:
-        raise Terminated(number)
+        came.append(KeyboardInterrupt() if number == signal.SIGINT else Terminated(number))
+        raise came[-1]
 
-    ours = []
-    for name in ("SIGTERM", "SIGHUP"):
+    ours = {}
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
         number = getattr(signal, name, None)
-        if number is not None and signal.getsignal(number) is signal.SIG_DFL:
+        if number and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
             with suppress(ValueError):  # another thread than the main one
-                signal.signal(number, end)
-                ours.append(number)
+                ours[number] = signal.signal(number, end)
     try:
         yield
     finally:
-        for number in ours:
-            signal.signal(number, signal.SIG_DFL)
+        for number, handler in ours.items():
+            signal.signal(number, handler)
 
 
 def _escape_unknown_characters() -> None:

@@ -817,11 +817,15 @@ def interrupt(*_, **__):
     signal.raise_signal(signal.SIGINT)
 
 
-def test_ctrl_c_while_modules_are_imported_ends_with_130(run, box, monkeypatch):
+@pytest.mark.parametrize("error", [KeyboardInterrupt, ImportError], ids=["itself", "told as another error"])
+def test_ctrl_c_while_modules_are_imported_ends_with_130(run, box, monkeypatch, error):
     class Import:
         def find_spec(self, name, *_):
             if name == "kratos_lite.cli.commands":
-                interrupt()
+                try:
+                    interrupt()
+                except KeyboardInterrupt:
+                    raise error from None
 
     monkeypatch.delitem(sys.modules, "kratos_lite.cli.commands")
     monkeypatch.delattr("kratos_lite.cli.commands")

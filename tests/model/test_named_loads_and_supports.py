@@ -50,15 +50,24 @@ def test_equal_loads_are_warned_of_and_those_that_differ_in_any_value_are_not():
     model.add(kl.Traction(lambda X: X[:, 2] > 0.25, UP))
     for z in (0.1, 0.2):
         model.add(kl.Traction(lambda X, z=z: X[:, 2] > z, UP))
-    assert not equal_loads(model.loads)
+    assert not equal_loads(model.loads, model.named_loads)
     for load, amplitude in by_cell():  # the cell is run again
         model.add(load, amplitude=amplitude)
-    texts = equal_loads(model.loads)
+    texts = equal_loads(model.loads, model.named_loads)
     assert len(texts) == len(by_cell())
     assert all(text.startswith("2 equal loads ") for text in texts)
     assert set(texts) <= set(model.solve().report.warnings)
     warnings = model.transient().equations.warnings
     assert all(any(text in warning for warning in warnings) for text in texts)
+
+
+def test_equal_loads_of_two_names_are_meant():
+    model = a_model()
+    model.add(kl.Traction("x+", PUSH), name="wind")
+    model.add(kl.Traction("x+", PUSH), name="gust")
+    assert not model.solve().report.warnings
+    model.add(kl.Traction("x+", PUSH))
+    assert "3 equal loads" in str(model.solve().report.warnings)
 
 
 def test_an_equal_load_of_the_same_name_is_added_once():

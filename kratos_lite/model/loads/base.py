@@ -300,8 +300,9 @@ def key_of(value: Any, depth: int = 0) -> Hashable:
     return value if isinstance(value, Hashable) and depth <= DEEPEST else id(value)
 
 
-def equal_loads(loads: Sequence[Load]) -> list[str]:
-    """Return a warning for each load that acts more than once."""
+def equal_loads(loads: Sequence[Load], named: Mapping[str, Load]) -> list[str]:
+    """Return a warning for each load that acts more than once without a name that tells it is meant."""
+    meant = {id(load) for load in named.values()}
     alike: dict[Hashable, list[Load]] = {}
     for load in loads:
         alike.setdefault(key_of(load), []).append(load)
@@ -309,5 +310,5 @@ def equal_loads(loads: Sequence[Load]) -> list[str]:
         f"{len(same)} equal loads {same[0]!r}, which add up; if one alone is meant, give it a name, "
         "model.add(load, name=...), so that it is not added twice"
         for same in alike.values()
-        if len(same) > 1
+        if len(same) > 1 and any(id(load) not in meant for load in same)
     ]
