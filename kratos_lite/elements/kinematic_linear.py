@@ -246,7 +246,7 @@ class KinematicLinear(CellMass):
         return self._stiffness(C)
 
     def _stiffness(self, C: Array) -> Array:
-        """Return K (..., 3, n, 3, n) of B; a short way for isotropic materials where B is that of gradients."""
+        """Return K (..., 3, n, 3, n) of B; in a short way where C is isotropic and B that of gradients."""
         if C.ndim == 2 and self.has_standard_strain() and (lame := lame_constants(C)):
             return stiffness.isotropic(self._gauss[1], self.dV, lame)
         B = self._operator(C)

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
+from numpy.typing import ArrayLike
 
 from kratos_lite import voigt
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.materials.isotropic3d import Isotropic3D
+from kratos_lite.model.checks import HARD, HEAVY, SOFTEST, STIFFEST, young_moduli
 from kratos_lite.testing.report import ConformanceError, Finding, Measured, difference, largest, run
 from kratos_lite.typing import Array
 
@@ -15,12 +19,12 @@ STRAIN = 1e-3 * np.array([1.0, -0.7, 0.4, 0.9, -0.3, 0.6])
 
 
 def check_material(material: LinearMaterial) -> list[Finding]:
-    """Check a material: symmetry, stability, isotropy where claimed, density.
+    """Check a material: symmetry, stability, isotropy where claimed, magnitude, density.
 
     Parameters
     ----------
     material : an instance.  It claims isotropy if it is an Isotropic3D or if its class says
-        ``isotropic = True``.
+        ``isotropic = True``, about one axis if it says ``transversely_isotropic = (0, 0, 1)``.
 
     Returns
     -------
@@ -62,14 +66,29 @@ def positive_definite(material: LinearMaterial) -> Measured:
 
 
 def isotropy(material: LinearMaterial) -> Measured | str:
-    """Check that a turned strain gives the turned stress: by 90° and about a skew axis."""
+    """Check that a turned strain gives the turned stress: also about a skew axis, or the one claimed."""
     kind = type(material)
+    axis = getattr(kind, "transversely_isotropic", None)
+    if axis is not None:
+        return _turned(material, {f"{angle}° about {tuple(axis)}": _about(axis, angle) for angle in (90, 37)})
     if not getattr(kind, "isotropic", isinstance(material, Isotropic3D)):
-        return f"{kind.__name__} does not claim to be isotropic (isotropic = True in the class would)"
-    Q, _ = np.linalg.qr(np.random.default_rng(29).uniform(-1, 1, (3, 3)))
-    quarter = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
-    turns = {f"90° about {axis}": np.roll(quarter, k, axis=(0, 1)) for k, axis in enumerate("xyz")}
-    turns["an angle about a skew axis"] = Q
+        return (
+            f"{kind.__name__} claims no isotropy; isotropic = True in the class would, or "
+            "transversely_isotropic = (0, 0, 1), its axis"
+        )
+    turns = {f"90° about {name}": _about(unit, 90) for name, unit in zip("xyz", np.eye(3), strict=True)}
+    return _turned(material, {**turns, "37° about a skew axis": _about((1, 2, -3), 37)})
+
+
+def _about(axis: ArrayLike, degrees: float) -> Array:
+    """Return the rotation (3, 3) about an axis."""
+    x, y, z = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
+    W, angle = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]), np.radians(degrees)
+    return np.eye(3) + np.sin(angle) * W + (1 - np.cos(angle)) * W @ W
+
+
+def _turned(material: LinearMaterial, turns: Mapping[str, Array]) -> Measured:
+    """Compare the stress of a turned strain with the turned stress."""
     errors = {}
     doubled = np.array([1, 1, 1, 2, 2, 2])  # engineering shear is twice the tensor component
     for name, R in turns.items():
@@ -80,6 +99,18 @@ def isotropy(material: LinearMaterial) -> Measured | str:
     return largest(errors, 1e-13)
 
 
+def magnitude(material: LinearMaterial) -> Measured | str:
+    """Check that Young's moduli along the axes are those of a body in Pa, not a compliance or in MPa."""
+    if not positive_definite(material).value == 0:
+        return "C is not positive definite"
+    low, high = young_moduli(material)
+    text = f"Young's moduli along the axes are {low:.3g} … {high:.3g} Pa; "
+    if not SOFTEST <= low <= high <= STIFFEST:
+        return Measured(1, 0, f"{text}bodies have {SOFTEST:g} … {STIFFEST:g}: is C a compliance?")
+    is_soft = material.density > HEAVY and high < HARD
+    return Measured(float(is_soft), 0, f"{text}too soft for {material.density:g} kg/m³: are they in MPa?")
+
+
 def density(material: LinearMaterial) -> Measured:
     """Check that the density is a finite number ≥ 0."""
     rho = float(material.density)
@@ -88,4 +119,4 @@ def density(material: LinearMaterial) -> Measured:
     )
 
 
-CHECKS = (symmetry, positive_definite, isotropy, density)
+CHECKS = (symmetry, positive_definite, isotropy, magnitude, density)

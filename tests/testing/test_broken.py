@@ -7,6 +7,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
+import kratos_lite as kl
 from kratos_lite.elements import ELEMENTS, KinematicLinear
 from kratos_lite.elements.b_bar_3d8n import BBar3D8N
 from kratos_lite.elements.enhanced_strain_3d8n import EnhancedStrain3D8N
@@ -707,8 +708,14 @@ def C_with(i, j, value):
     return C
 
 
-def test_the_material_that_is_broken_below_conforms_before():
+HEAVY = {"density": property(lambda self: 7850.0), "__init__": lambda self: None}
+SLATE = kl.Orthotropic3D(9e9, 9e9, 5e9, 0.2, 0.27, 0.27, 3.75e9, 2e9, 2e9).C
+
+
+def test_the_materials_that_are_broken_below_conform_before():
     assert not failures(check_material(Made()))
+    slate = {"elasticity": lambda self: SLATE, "transversely_isotropic": (0, 0, 1)}
+    assert not failures(check_material(changed(**slate)))
 
 
 @pytest.mark.parametrize(
@@ -719,6 +726,9 @@ def test_the_material_that_is_broken_below_conforms_before():
         ({"elasticity": lambda self: C_with(3, 3, -1e8)}, {"positive definite", "isotropy"}),
         ({"elasticity": lambda self: -Made().elasticity()}, {"positive definite"}),
         ({"elasticity": lambda self: 0 * Made().elasticity()}, {"positive definite"}),
+        ({"elasticity": lambda self: np.linalg.inv(Made().elasticity())}, {"isotropy", "magnitude"}),
+        ({"elasticity": lambda self: Isotropic3D(210e3, 0.3).C, **HEAVY}, {"magnitude"}),
+        ({"elasticity": lambda self: SLATE, "transversely_isotropic": (1, 0, 0)}, {"isotropy"}),
         ({"density": property(lambda self: -1.0), "__init__": lambda self: None}, {"density"}),
     ],
 )
