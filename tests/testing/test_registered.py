@@ -26,7 +26,7 @@ EXAMPLES = {
     "Isotropic3D": [
         Isotropic3D(E=210e9, nu=0.3, density=7850.0),
         Isotropic3D(E=1.0, nu=0.0),
-        Isotropic3D(E=1e-6, nu=-0.9),
+        Isotropic3D(E=10.0, nu=-0.9),
         Isotropic3D(E=1e12, nu=0.4999),
     ],
     "Orthotropic3D": [ORTHOTROPIC, Orthotropic3D(1.0, 2.0, 3.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)],
