@@ -72,15 +72,7 @@ def finite(
     Traceback (most recent call last):
     kratos_lite.errors.InputError: a force must have shape (3,); got (2,)
     """
-    try:
-        array = np.asarray(value)
-        if array.dtype.kind not in "buifO":
-            raise TypeError
-        with np.errstate(all="ignore"):  # what is too large for a float becomes infinite
-            array = array.astype(float) if array.size <= MOST else array
-    except (TypeError, ValueError, OverflowError):
-        raise error(f"{what} must be made of real numbers; got {short(value)}") from None
-    _check_size(array, what, error)
+    array = reals(value, what, error, copy=True)
     if shape is not None and not _has(array.shape, shape):
         raise error(f"{what} must have shape ({_axes(shape)}); got {array.shape}")
     if not (np.abs(array) <= LARGEST).all():
@@ -88,6 +80,23 @@ def finite(
         wanted = f"at most {LARGEST:g} in size" if math.isfinite(array[first]) else "finite"
         found = f"{float(array[first])} at {list(first)}" if array.size > 9 else short(value)
         raise error(f"{what} must be {wanted}; got {found}")
+    return array
+
+
+def reals(
+    value: Any, what: str, error: type[KratosLiteError] = InputError, *, cure: str = "", copy: bool = False
+) -> Array:
+    """Return real numbers as floats; they need not be finite, as results may not be."""
+    try:
+        array = np.asarray(value)
+        if array.dtype.kind not in "buifO" or (array.dtype == object and None in array.ravel().tolist()):
+            raise TypeError
+        with np.errstate(all="ignore"):  # what is too large for a float becomes infinite
+            array = array.astype(float, copy=copy) if array.size <= MOST else array
+    except (TypeError, ValueError, OverflowError):
+        cure = f"; {cure}" if cure else ""
+        raise error(f"{what} must be made of real numbers; got {short(value)}{cure}") from None
+    _check_size(array, what, error)
     return array
 
 

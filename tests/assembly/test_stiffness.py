@@ -88,15 +88,6 @@ def test_nodes_that_are_not_there_are_refused(wrong):
         MODULE.pattern(10, [np.array([[0, 1, 2, wrong]], np.int32)])
 
 
-def test_positions_are_where_the_pairs_are():
-    points, groups = scene("KinematicLinear3D10N")
-    pattern = pattern_of(points, groups)
-    rows = np.repeat(np.arange(len(points)), np.diff(pattern.indptr))
-    (places,), nodes = pattern.positions, groups[0].nodes
-    np.testing.assert_array_equal(rows[places], np.broadcast_to(nodes[:, :, None], places.shape))
-    np.testing.assert_array_equal(pattern.indices[places], np.broadcast_to(nodes[:, None, :], places.shape))
-
-
 # ---- stiffness -------------------------------------------------------------------------------
 
 
@@ -154,15 +145,6 @@ def test_an_element_class_with_a_local_system_of_its_own(path):
         K = assert_sum(points, [plain, doubled])
         once = assemble_stiffness(points, [group], pattern_of(points, [group]))
         assert np.abs(K.data).max() > 1.5 * np.abs(once.data).max()
-
-
-def test_progress_ends_at_one(path):
-    points, groups = scene("KinematicLinear3D8N")
-    seen = []
-    assemble_stiffness(
-        points, groups, pattern_of(points, groups), lambda name, share: seen.append((name, share))
-    )
-    assert seen[-1] == ("assemble", 1.0)
 
 
 @compiled
