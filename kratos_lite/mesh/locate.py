@@ -38,23 +38,15 @@ STARTS = 4
 
 @dataclass(frozen=True, eq=False)
 class Located:
-    """Points (...) in a mesh: the element that contains each, and where in it the point lies.
+    """Points (...) in a mesh: the element that contains each, and where in it the point lies."""
 
-    Attributes
-    ----------
-    mesh : the mesh.
-    points : (..., 3) float, m; the points.
-    rows : (...) int, index of the element, the lowest of those that contain the point; -1 outside the mesh.
-    block, cell : (...) int, the same as number of the block and row in it; -1 outside.
-    xi : (..., 3) float, reference coordinates; nan outside.
-    """
-
-    mesh: Cells
-    points: Array
+    mesh: Cells  # the mesh
+    points: Array  # (..., 3) float, m; the points
+    # (...) int, index of the element, the lowest of those that contain the point; -1 outside the mesh
     rows: Ints
-    block: Ints
+    block: Ints  # (...) int, the same as number of the block and row in it; -1 outside
     cell: Ints
-    xi: Array
+    xi: Array  # (..., 3) float, reference coordinates; nan outside
 
     @property
     def inside(self) -> Mask:
@@ -96,11 +88,6 @@ class Located:
         """Return the shape functions as a sparse matrix W (m, n), one row per point.
 
         W v are nodal values v (n, ...) at the points, W.T f are forces f (m, ...) at them as nodal forces.
-
-        Raises
-        ------
-        MeshError
-            A point lies outside the mesh.
         """
         from scipy.sparse import csr_array
 
@@ -112,13 +99,7 @@ class Located:
         return csr_array((entries, (rows, columns)), shape=(self.rows.size, len(self.mesh.points)))
 
     def nodes_and_weights(self, point: int = 0) -> tuple[Ints, Array]:
-        """Return the nodes (k,) of the element that contains one point, and their shape functions (k,).
-
-        >>> from kratos_lite import box
-        >>> nodes, weights = box().locate([0.5, 0.5, 0.5]).nodes_and_weights()
-        >>> nodes.tolist(), weights.tolist()
-        ([0, 4, 6, 2, 1, 5, 7, 3], [0.125, 0.125, 0.125, 0.125, 0.125, 0.125, 0.125, 0.125])
-        """
+        """Return the nodes (k,) of the element that contains one point, and their shape functions (k,)."""
         one = self[point] if self.rows.ndim else self
         _, nodes, N = next(one.require()._by_block())
         return nodes[0].astype(np.int64), N[0]

@@ -205,12 +205,7 @@ def _compressed(sources: Sequence[tuple[Ints, Array]]) -> tuple[Ints, Ints, Arra
 
 
 def name_of(name: str, shape: type[Shape]) -> str:
-    """Return the name of the same kind of element or condition with another shape.
-
-    >>> from kratos_lite.shapes.hexahedra import Hexahedron20
-    >>> name_of("KinematicLinear3D8N", Hexahedron20)
-    'KinematicLinear3D20N'
-    """
+    """Return the name of the same kind of element or condition with another shape."""
     stem = name.rstrip("N").rstrip("0123456789")
     wanted = f"{stem}{len(shape.nodes)}N"
     if name in ELEMENTS and wanted not in ELEMENTS:

@@ -19,25 +19,16 @@ from kratos_lite.validation import finite
 
 @dataclass(frozen=True, eq=False)
 class RefinedMesh:
-    """A mesh made from a coarser one, whose nodes are the first of its own.
+    """A mesh made from a coarser one, whose nodes are the first of its own."""
 
-    Attributes
-    ----------
-    coarse, mesh : the two.
-    elements : (m',) int, row of the coarse element that each element has come from.
-    conditions : (c',) int, likewise of the conditions.
-    start, nodes, weights : new nodes from old ones, in compressed rows.
-    inside : (k,) key of the corners of the edge, face or cell in which each new node lies.
-    """
-
-    coarse: Mesh
+    coarse: Mesh  # the two
     mesh: Mesh
-    elements: Ints
-    conditions: Ints
-    start: Ints
+    elements: Ints  # (m',) int, row of the coarse element that each element has come from
+    conditions: Ints  # (c',) int, likewise of the conditions
+    start: Ints  # new nodes from old ones, in compressed rows
     nodes: Ints
     weights: Array
-    inside: Keys
+    inside: Keys  # (k,) key of the corners of the edge, face or cell in which each new node lies
 
     def interpolate(self, values: Array) -> Array:
         """Return nodal values (n, ...) of the coarse mesh on all nodes of the finer one."""

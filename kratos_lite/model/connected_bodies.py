@@ -15,19 +15,12 @@ FEW = 40
 
 @dataclass(frozen=True)
 class Bodies:
-    """Which nodes belong to which bodies: a node has one pair (node, body) for each body around it.
+    """Which nodes belong to which bodies: a node has one pair (node, body) for each body around it."""
 
-    Attributes
-    ----------
-    part : (n,) int, the first body of each node, -1 for nodes without elements.
-    node, body : all pairs, sorted by node.
-    count : number of bodies.
-    """
-
-    part: Ints
-    node: Ints
+    part: Ints  # (n,) int, the first body of each node, -1 for nodes without elements
+    node: Ints  # all pairs, sorted by node
     body: Ints
-    count: int
+    count: int  # number of bodies
 
     @property
     def joints(self) -> tuple[Ints, Ints]:

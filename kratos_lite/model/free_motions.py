@@ -35,25 +35,16 @@ TOGETHER = 1e-5
 
 @dataclass(frozen=True, eq=False)
 class FreeMotions:
-    """Rigid motions that supports and constraints leave free, by parts of a model.
+    """Rigid motions that supports and constraints leave free, by parts of a model."""
 
-    Attributes
-    ----------
-    mesh, supports, groups : of the model.
-    bodies, frames : its bodies, their centers (b, 3) and sizes (b,).
-    group_of : (b,) int, the part of each body: bodies that neither nodes nor constraints tie to others.
-    counts : (p,) int, how many free motions each part has.
-    modes : (b, 6, k), what they are of the six modes of each body, 0 beyond their number.
-    """
-
-    mesh: Mesh
+    mesh: Mesh  # of the model
     supports: Supports
     groups: Sequence[ElementGroup]
-    bodies: Bodies
+    bodies: Bodies  # its bodies, their centers (b, 3) and sizes (b,)
     frames: tuple[Array, Array]
-    group_of: Ints
-    counts: Ints
-    modes: Array
+    group_of: Ints  # (b,) int, the part of each body: bodies that neither nodes nor constraints tie to others
+    counts: Ints  # (p,) int, how many free motions each part has
+    modes: Array  # (b, 6, k), what they are of the six modes of each body, 0 beyond their number
 
     @property
     def any(self) -> bool:
