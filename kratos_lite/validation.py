@@ -50,7 +50,10 @@ def finite(
     *,
     error: type[KratosLiteError] = InputError,
 ) -> Array:
-    """Return finite real numbers as floats, of a shape such as (3,) or ("n", 3): a word is any length."""
+    """Return finite real numbers as floats, of a shape such as (3,) or ("n", 3).
+
+    A word stands for any length, "..." at the start for any leading axes.
+    """
     array = reals(value, what, error, copy=True)
     if shape is not None and not _has(array.shape, shape):
         raise error(f"{what} must have shape ({_axes(shape)}); got {array.shape}")
@@ -130,6 +133,8 @@ def _axes(shape: tuple[int | str, ...]) -> str:
 
 
 def _has(found: tuple[int, ...], wanted: tuple[int | str, ...]) -> bool:
+    if wanted[:1] == ("...",):  # any leading axes
+        found, wanted = found[max(len(found) - len(wanted) + 1, 0) :], wanted[1:]
     return len(found) == len(wanted) and all(
         isinstance(w, str) or w == n for n, w in zip(found, wanted, strict=True)
     )

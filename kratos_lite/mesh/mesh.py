@@ -367,7 +367,7 @@ class Mesh(Tabular):
 
         Parameters
         ----------
-        where : part name, property id, indices, or None for all.
+        where : part name, property id, indices, a mask, or None for all.
 
         Returns
         -------

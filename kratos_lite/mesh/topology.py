@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from kratos_lite.mesh.blocks import NO_ROWS, Block, with_rows
-from kratos_lite.mesh.centers import Keys, keys_of, mixed
+from kratos_lite.mesh.centers import Centers, Keys, keys_of, mixed
 from kratos_lite.native import kernels
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array, Ints, Mask, Numbers, Rows
@@ -169,17 +169,15 @@ def outward_signs(boundary: Sequence[Block], block: Block) -> Array:
     outside = [b.nodes[:, :c] for b in boundary if b.shape is not None and b.shape.corners == c]
     known = np.vstack([np.zeros((0, c), dtype=np.int32), *outside])
     corners = block.nodes[:, :c]
-    both = np.sort(np.vstack([known, corners]), axis=1)
-    _, key = np.unique(both, axis=0, return_inverse=True)
-    key = key.ravel()
-    owner = np.full(key.max(initial=-1) + 1, -1)
-    owner[key[: len(known)]] = np.arange(len(known))
-    match = owner[key[len(known) :]]
+    numbers = Centers()
+    numbers.add(keys_of(known), np.arange(len(known)))
+    numbers.sort()
+    match = numbers.find(keys_of(corners))
     signs = np.zeros(len(block))
     on = np.flatnonzero(match >= 0)
-    mate = known[match[on]]
-    start = np.argmax(mate == corners[on, :1], axis=1)
-    following = np.take_along_axis(mate, ((start + 1) % c)[:, None], axis=1)[:, 0]
+    other = known[match[on]]
+    start = np.argmax(other == corners[on, :1], axis=1)
+    following = np.take_along_axis(other, ((start + 1) % c)[:, None], axis=1)[:, 0]
     signs[on] = np.where(following == corners[on, 1], 1.0, -1.0)
     return signs
 

@@ -79,7 +79,7 @@ class Structure(Tabular):
         material: LinearMaterial | Mapping[Any, LinearMaterial] | None = None,
         formulation: str | None = None,
     ) -> None:
-        self._mesh = checks.checked_mesh(mesh)
+        self._mesh = instance(mesh, "a mesh", Mesh, "kl.box()")
         self._materials: list[LinearMaterial] = []
         self._material_of = np.full(mesh.n_elements, -1)
         self._rules: dict[int, Rule | int] = {}

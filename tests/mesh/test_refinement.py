@@ -244,7 +244,8 @@ def test_a_mesh_with_hanging_nodes_keeps_its_order():
 
 
 @pytest.mark.parametrize(
-    ("rows", "words"), [([9], "rows of elements"), ([True], "mask of elements"), ([0.5], "rows of elements")]
+    ("rows", "words"),
+    [([9], "element indices"), ([True], "mask of elements"), ([0.5], "elements are chosen")],
 )
 def test_wrong_marks_are_refused(rows, words):
     with pytest.raises(kl.MeshError, match=words):
