@@ -129,24 +129,6 @@ def test_an_element_of_a_user_with_seven_nodes(path):
         assert_sum(points, [group])
 
 
-def test_an_element_class_with_a_local_system_of_its_own(path):
-    with ELEMENTS.temporary():
-
-        class Doubled(ELEMENTS["KinematicLinear3D8N"]):
-            def local_system(self, C, u):
-                K, r = super().local_system(C, u)
-                return 2 * K, 2 * r
-
-        points, (group,) = scene("KinematicLinear3D8N", distortion=0.02)
-        plain, doubled = (
-            ElementGroup(element, group.rule, STEEL, group.nodes[rows], group.rows[rows])
-            for element, rows in ((group.element, slice(0, 5)), (Doubled, slice(5, None)))
-        )
-        K = assert_sum(points, [plain, doubled])
-        once = assemble_stiffness(points, [group], pattern_of(points, [group]))
-        assert np.abs(K.data).max() > 1.5 * np.abs(once.data).max()
-
-
 @compiled
 @pytest.mark.parametrize("order", ["given", "scattered"])
 @pytest.mark.parametrize(
