@@ -173,23 +173,23 @@ class Cells(Protocol):
         """Return a cell in words."""
 
 
-def blocks_of(given: Any, what: str = "blocks") -> tuple[Block, ...]:
-    """Return blocks given as ``{element name: nodes}``, numbered through, or as a sequence."""
-    if isinstance(given, Mapping):
+def blocks_of(values: Any, what: str = "blocks") -> tuple[Block, ...]:
+    """Return blocks from ``{element name: nodes}``, numbered through, or from a sequence."""
+    if isinstance(values, Mapping):
         blocks: list[Block] = []
-        for name, nodes in given.items():
+        for name, nodes in values.items():
             block, first = Block(name, nodes), sum(map(len, blocks)) + 1
             if name not in ELEMENTS:
                 raise MeshError(f"there is no element {name!r}{_elements_of(block.nodes.shape[1])}")
             blocks.append(replace(block, ids=np.arange(first, first + len(block))))
         return tuple(blocks)
-    found = tuple(given) if isinstance(given, Sequence) else (given,)
-    if not all(isinstance(block, Block) for block in found):
+    sequence = tuple(values) if isinstance(values, Sequence) else (values,)
+    if not all(isinstance(block, Block) for block in sequence):
         raise MeshError(
             f"{what} must be nodes by element name, as in kl.Mesh(points, {{'KinematicLinear3D8N': nodes}}), "
-            f"or a list of kl.Block(name, nodes); got {short(given)}"
+            f"or a list of kl.Block(name, nodes); got {short(values)}"
         )
-    return found
+    return sequence
 
 
 def _elements_of(width: int) -> str:

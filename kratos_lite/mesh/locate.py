@@ -12,7 +12,6 @@ import numpy as np
 from kratos_lite.errors import InputError, MeshError
 from kratos_lite.mesh.blocks import NO_ROWS, Cells, with_rows
 from kratos_lite.mesh.boxes import BoxTree, cell_boxes, curvature, is_solid, nearest_element
-from kratos_lite.shapes import Shape
 from kratos_lite.shapes.inverse import inverse_map, outside_by
 from kratos_lite.typing import Array, Ints, Mask, Rows
 from kratos_lite.validation import finite
@@ -170,22 +169,22 @@ class _Search:
         distance = ((x[at] - self.middle[row]) ** 2).sum(axis=1) / self.size[row] ** 2
         order = np.lexsort((row, distance, at))
         at, row = at[order], row[order]
-        found, xi = np.full(len(x), -1), np.full((len(x), 3), np.nan)
+        element, xi = np.full(len(x), -1), np.full((len(x), 3), np.nan)
         first = np.searchsorted(at, np.arange(len(x) + 1))
         tried = first[:-1].copy()
         pending = np.flatnonzero(tried < first[1:])
         while len(pending):
-            self._try(x, pending, row[tried[pending]], found, xi)
+            self._try(x, pending, row[tried[pending]], element, xi)
             tried[pending] += 1
-            pending = pending[(found[pending] < 0) & (tried[pending] < first[pending + 1])]
-        lost = found[at] < 0
-        self._retry(x, at[lost], row[lost], found, xi)
-        lower = self._near_edge(found, xi)[at] & (row < found[at])
+            pending = pending[(element[pending] < 0) & (tried[pending] < first[pending + 1])]
+        lost = element[at] < 0
+        self._retry(x, at[lost], row[lost], element, xi)
+        lower = self._near_edge(element, xi)[at] & (row < element[at])
         order = np.lexsort((-row[lower], at[lower]))  # the lowest row is the last to be written
-        self._try(x, at[lower][order], row[lower][order], found, xi)
-        return found, xi
+        self._try(x, at[lower][order], row[lower][order], element, xi)
+        return element, xi
 
-    def _try(self, x: Array, at: Ints, rows: Ints, found: Ints, xi: Array) -> None:
+    def _try(self, x: Array, at: Ints, rows: Ints, element: Ints, xi: Array) -> None:
         """Write row and xi of those points x[at] that lie in the elements in `rows`."""
         numbers = self.block_of(rows)
         hits, where = np.zeros(len(at), dtype=bool), np.zeros((len(at), 3))
@@ -194,13 +193,13 @@ class _Search:
             if len(chosen) and block.shape is not None:
                 inverse = inverse_map(block.shape, self._nodes(number, rows[chosen]), x[at[chosen]])
                 hits[chosen], where[chosen] = inverse.inside, inverse.xi
-        found[at[hits]], xi[at[hits]] = rows[hits], where[hits]
+        element[at[hits]], xi[at[hits]] = rows[hits], where[hits]
 
     def _nodes(self, number: int, rows: Ints) -> Array:
         """Return the nodes (m, k, 3) of elements of a block."""
         return self.mesh.points[self.mesh.blocks[number].nodes[rows - self.starts[number]]]
 
-    def _retry(self, x: Array, at: Ints, rows: Ints, found: Ints, xi: Array) -> None:
+    def _retry(self, x: Array, at: Ints, rows: Ints, element: Ints, xi: Array) -> None:
         """Try strongly curved cells again from elsewhere; from the middle Newton may reach another xi."""
         numbers = self.block_of(rows)
         for number, block in enumerate(self.mesh.blocks):
@@ -210,31 +209,26 @@ class _Search:
             pyramid = block.shape.cell == "pyramid"
             curved = curvature(block.shape, self._nodes(number, rows[chosen])) > (0 if pyramid else CURVED)
             chosen = chosen[curved]
-            starts = _starts(block.shape)
+            middle = block.shape.nodes[: block.shape.corners].mean(axis=0)
+            starts = middle + 0.8 * (block.shape.nodes - middle)  # on the way from there to each node
             images = block.shape.N(starts) @ self._nodes(number, rows[chosen])
             order = ((images - x[at[chosen], None]) ** 2).sum(axis=2).argsort(axis=1)
             for start in order.T[: len(starts) if pyramid else STARTS]:
-                left = found[at[chosen]] < 0
+                left = element[at[chosen]] < 0
                 pairs = chosen[left]
                 X = self._nodes(number, rows[pairs])
                 inverse = inverse_map(
                     block.shape, X, x[at[pairs]], max_iterations=15, start=starts[start[left]]
                 )
                 hits = pairs[inverse.inside]
-                found[at[hits]], xi[at[hits]] = rows[hits], inverse.xi[inverse.inside]
+                element[at[hits]], xi[at[hits]] = rows[hits], inverse.xi[inverse.inside]
 
-    def _near_edge(self, found: Ints, xi: Array) -> Mask:
+    def _near_edge(self, element: Ints, xi: Array) -> Mask:
         """Return which points lie so near the boundary of their cell that others may contain them too."""
-        near = np.zeros(len(found), dtype=bool)
-        numbers = np.where(found >= 0, self.block_of(found), -1)
+        near = np.zeros(len(element), dtype=bool)
+        numbers = np.where(element >= 0, self.block_of(element), -1)
         for number, block in enumerate(self.mesh.blocks):
             chosen = np.flatnonzero(numbers == number)
             if len(chosen) and block.shape is not None:
                 near[chosen] = outside_by(block.shape.cell, xi[chosen]) > -NEAR_EDGE
         return near
-
-
-def _starts(shape: type[Shape]) -> Array:
-    """Return points (k, 3) on the way from the centroid to each node."""
-    middle = shape.nodes[: shape.corners].mean(axis=0)
-    return middle + 0.8 * (shape.nodes - middle)

@@ -90,13 +90,13 @@ class CellRefiner:
         self, blocks: Sequence[Block], into: _Cells, cuts: Callable[[Block, slice], Sequence[Cut]]
     ) -> None:
         for block, at in with_rows(blocks):
-            found = cuts(block, at)
+            cut = cuts(block, at)
             kept = np.ones(len(block), dtype=bool)
-            for cells, _ in found:
+            for cells, _ in cut:
                 kept[cells] = False
             if kept.any():
                 into.add(block.take(kept), at.start + np.flatnonzero(kept))
-            for cells, pieces in found:
+            for cells, pieces in cut:
                 self._cut(block, cells, at.start, pieces, into)
 
     def _cut(self, block: Block, cells: Ints, first: int, pieces: Sequence[Piece], into: _Cells) -> None:

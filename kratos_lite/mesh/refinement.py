@@ -80,9 +80,9 @@ def axes_along(mesh: Mesh, block: Block, direction: Array) -> Ints:
     shape = block.shape
     assert shape is not None
     corners = shape.nodes[: shape.corners]
-    found = np.full(len(block), -1)
+    axes = np.full(len(block), -1)
     if shape.cell not in ("hexahedron", "wedge", "quadrilateral", "line"):
-        return found
+        return axes
     for axis in (2,) if shape.cell == "wedge" else range(shape.nodes.shape[1]):
         steps = [(a, b) for a, b in shape.edges or ((0, 1),) if np.ptp(corners[[a, b]], axis=0)[axis] > 0]
         ends = np.array(
@@ -91,8 +91,8 @@ def axes_along(mesh: Mesh, block: Block, direction: Array) -> Ints:
         edges = mesh.points[block.nodes[:, ends[:, 1]]] - mesh.points[block.nodes[:, ends[:, 0]]]
         across = np.linalg.norm(np.cross(edges, direction), axis=-1)
         length = np.linalg.norm(edges, axis=-1) * np.linalg.norm(direction)
-        found[(across <= 1e-6 * length).all(axis=1)] = axis
-    return found
+        axes[(across <= 1e-6 * length).all(axis=1)] = axis
+    return axes
 
 
 def _cuts_across(mesh: Mesh, block: Block, cells: Ints, direction: Array) -> list[Cut]:

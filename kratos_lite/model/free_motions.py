@@ -79,9 +79,9 @@ class FreeMotions:
 
     def _by_part(self, values: Array, largest: bool = False) -> Array:
         """Return sum or largest (p, ...) of values ≥ 0 at nodes (n, ...) in each part."""
-        found, used = np.zeros((len(self.counts), *values.shape[1:])), self.part >= 0
-        (np.maximum if largest else np.add).at(found, self.part[used], values[used])
-        return found
+        totals, used = np.zeros((len(self.counts), *values.shape[1:])), self.part >= 0
+        (np.maximum if largest else np.add).at(totals, self.part[used], values[used])
+        return totals
 
     # ---- solutions without them ----------------------------------------------------------------------
 
@@ -163,9 +163,9 @@ class FreeMotions:
     @cached_property
     def _hangs(self) -> Mask:
         """Which bodies (b,) hang on nodes or edges of others."""
-        found = self.bodies
-        at = np.concatenate(found.joined(self.mesh)[:2]) if found.count > 1 else NO_ROWS
-        return np.isin(np.arange(found.count), at)
+        bodies = self.bodies
+        at = np.concatenate(bodies.joined(self.mesh)[:2]) if bodies.count > 1 else NO_ROWS
+        return np.isin(np.arange(bodies.count), at)
 
     @cached_property
     def _is_hinged(self) -> Mask:

@@ -313,7 +313,7 @@ def _tensors(inertia: ArrayLike | None, euler: ArrayLike | None) -> tuple[Array,
     J = _symmetric(tensor(inertia, what="the inertia"), "inertia") if inertia is not None else None
     if E is None:
         assert J is not None
-        E = _trace(J) / 2 - J
+        E = np.trace(J, axis1=-2, axis2=-1)[..., None, None] / 2 * np.eye(3) - J
     elif J is None:
         J = _from_euler(E)
     elif J.shape != E.shape or _differ(J, _from_euler(E)):
@@ -328,11 +328,6 @@ def _tensors(inertia: ArrayLike | None, euler: ArrayLike | None) -> tuple[Array,
             f"{smallest[bad][0]:.3g} kg m²; a body that is not a straight line has three positive ones"
         )
     return J, E
-
-
-def _trace(A: Array) -> Array:
-    """Return tr(A) 1."""
-    return np.asarray(np.trace(A, axis1=-2, axis2=-1)[..., None, None] * np.eye(3))
 
 
 def _from_euler(E: Array) -> Array:

@@ -33,9 +33,9 @@ REST = 1e-6
 
 def free_motions(mesh: Mesh, supports: Supports, groups: Sequence[ElementGroup]) -> FreeMotions:
     """Return the rigid motions that the supports leave free, part by part."""
-    components = bodies(mesh)
-    frames = components.frames(mesh)
-    equations = _equations(mesh, components, supports)
+    connected = bodies(mesh)
+    frames = connected.frames(mesh)
+    equations = _equations(mesh, connected, supports)
     group_of = _groups(len(frames[0]), equations)
     members, their_equations = _by_group(group_of, equations)
     free = [
@@ -46,7 +46,7 @@ def free_motions(mesh: Mesh, supports: Supports, groups: Sequence[ElementGroup])
     modes = np.zeros((len(group_of), 6, int(counts.max(initial=0))))
     for group, free_modes in zip(members, free, strict=True):
         modes[group, :, : free_modes.shape[2]] = free_modes
-    return FreeMotions(mesh, supports, groups, components, frames, group_of, counts, modes)
+    return FreeMotions(mesh, supports, groups, connected, frames, group_of, counts, modes)
 
 
 @dataclass(frozen=True)
@@ -63,9 +63,9 @@ class _Constraints:
         return _Constraints(self.row[rows], self.dof[rows], self.body[rows], self.weight[rows])
 
 
-def _equations(mesh: Mesh, found: Bodies, supports: Supports) -> _Constraints:
+def _equations(mesh: Mesh, connected: Bodies, supports: Supports) -> _Constraints:
     """Return fixed components, constraints, and the equal motion of bodies where they are joined."""
-    part, (node, second) = found.part, found.joints
+    part, (node, second) = connected.part, connected.joints
     row, dof, weight = supports.constraint_rows()
     body = part[dof // 3]
     first = int(row.max(initial=-1)) + 1
