@@ -21,13 +21,7 @@ FULL = {errno.ENOSPC, getattr(errno, "EDQUOT", None), None}
 
 
 def read_arrays(path: str | Path, names: Sequence[str], what: str) -> dict[str, NDArray[Any]]:
-    """Return arrays of an .npz file by name; InputError if it is damaged or not `what` it should be.
-
-    >>> folder = getfixture("tmp_path")
-    >>> write_arrays(folder / "a.npz", {"time": 2.0})
-    >>> float(read_arrays(folder / "a.npz", ["time"], "a state")["time"])
-    2.0
-    """
+    """Return arrays of an .npz file by name; InputError if it is damaged or not `what` it should be."""
     try:
         with np.load(io.BytesIO(Path(path).read_bytes()), allow_pickle=False) as file:
             return {name: np.asarray(file[name]) for name in names}

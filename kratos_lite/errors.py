@@ -38,18 +38,7 @@ class SolveError(KratosLiteError):
 
 
 class Problems:
-    """Collect problems and raise them together.
-
-    Examples
-    --------
-    >>> problems = Problems("cube.mdpa")
-    >>> problems.add("id -8 is not allowed; ids are 1 .. 2^63-1", line=18)
-    >>> try:
-    ...     problems.raise_if_any()
-    ... except InputError as error:
-    ...     print(error)
-    cube.mdpa:18: id -8 is not allowed; ids are 1 .. 2^63-1
-    """
+    """Collect problems and raise them together."""
 
     def __init__(self, source: str = "", kind: type[KratosLiteError] = InputError) -> None:
         self.source = source
@@ -93,13 +82,7 @@ RENAMED = {
 
 @contextmanager
 def naming(source: str) -> Iterator[None]:
-    """Let errors of the library name the file that they come from, where they do not yet.
-
-    >>> with naming("a/beam.msh"):
-    ...     raise MeshError("points must be finite")
-    Traceback (most recent call last):
-    kratos_lite.errors.MeshError: a/beam.msh: points must be finite
-    """
+    """Let errors of the library name the file that they come from, where they do not yet."""
     try:
         yield
     except KratosLiteError as error:
@@ -115,15 +98,7 @@ def _plain(word: str) -> str:
 
 
 def nearest(name: str, known: Iterable[str], count: int = 3) -> str:
-    """Return a hint that names the known words closest to `name`, or an empty string.
-
-    >>> nearest("KinematicLinear3D9N", ["KinematicLinear3D8N", "Isotropic3D"])
-    ' Did you mean KinematicLinear3D8N?'
-    >>> nearest("HHT", ["hht"])
-    ' Did you mean hht?'
-    >>> nearest("z++", ["z+", "z+"])
-    ' Did you mean z+?'
-    """
+    """Return a hint that names the known words closest to `name`, or an empty string."""
     from difflib import get_close_matches
 
     known = list(dict.fromkeys(known))

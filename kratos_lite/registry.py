@@ -25,16 +25,7 @@ def remembered(function: Callable[P, R]) -> Callable[P, R]:
 
 
 class Registry(Generic[T]):
-    """Names to classes, with aliases and a helpful answer to an unknown name.
-
-    Examples
-    --------
-    >>> class Red: ...
-    >>> colors = Registry[type]("color")
-    >>> colors.add("red", Red, aliases=["rouge"])
-    >>> colors["rouge"].__name__, sorted(colors)
-    ('Red', ['red'])
-    """
+    """Names to classes, with aliases and a helpful answer to an unknown name."""
 
     def __init__(self, kind: str) -> None:
         self.kind = kind
@@ -48,13 +39,7 @@ class Registry(Generic[T]):
         self._aliases.update(dict.fromkeys(aliases, name))
 
     def add(self, name: str, item: T, aliases: Iterable[str] = ()) -> None:
-        """Register `item`; one of the same name and file is replaced, as a script or a cell may be run twice.
-
-        Raises
-        ------
-        InputError
-            There is one of this name or alias from another file.
-        """
+        """Register `item`, in place of one of the same name and file; InputError for one of another file."""
         aliases = list(aliases)
         for word in (name, *aliases):
             self._refuse_taken(word, item)
@@ -112,15 +97,7 @@ class Registry(Generic[T]):
 
     @contextmanager
     def temporary(self) -> Iterator[None]:
-        """Forget, on leaving, whatever was registered or replaced inside the ``with`` block.
-
-        >>> class Red: ...
-        >>> colors = Registry[type]("color")
-        >>> with colors.temporary():
-        ...     colors.add("red", Red)
-        >>> "red" in colors
-        False
-        """
+        """Forget, on leaving, whatever was registered or replaced inside the ``with`` block."""
         self._import(*self._expected)
         items, aliases = dict(self._items), dict(self._aliases)
         try:

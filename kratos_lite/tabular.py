@@ -11,12 +11,7 @@ def names_of(kind: type) -> tuple[str, ...]:
 
 
 def aligned(rows: list[tuple[str, str]]) -> str:
-    """Return labels and values as lines of two columns.
-
-    >>> print(aligned([("E", "210e9 Pa"), ("nu", "0.3")]))
-    E   210e9 Pa
-    nu  0.3
-    """
+    """Return labels and values as lines of two columns."""
     width = max((len(label) for label, _ in rows), default=0)
     return "\n".join(f"{label:<{width}}  {value}" for label, value in rows)
 

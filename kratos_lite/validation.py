@@ -50,37 +50,11 @@ def finite(
     *,
     error: type[KratosLiteError] = InputError,
 ) -> Array:
-    """Return a finite real number or array of them as floats.
+    """Return finite real numbers as floats, of a shape such as (3,) or ("n", 3).
 
-    Parameters
-    ----------
-    value : what the caller gave.
-    what : what it is for, with its article.
-    shape : lengths of the axes; a word such as ``"n"`` stands for any length.
-    error : class of the error.
-
-    Raises
-    ------
-    InputError
-        If it is not made of real numbers, not finite, absurdly large, or of another shape.
-
-    Examples
-    --------
-    >>> finite([1, 2], "a force")
-    array([1., 2.])
-    >>> finite([1, 2], "a force", (3,))
-    Traceback (most recent call last):
-    kratos_lite.errors.InputError: a force must have shape (3,); got (2,)
+    A word stands for any length, "..." at the start for any leading axes.
     """
-    try:
-        array = np.asarray(value)
-        if array.dtype.kind not in "buifO":
-            raise TypeError
-        with np.errstate(all="ignore"):  # what is too large for a float becomes infinite
-            array = array.astype(float) if array.size <= MOST else array
-    except (TypeError, ValueError, OverflowError):
-        raise error(f"{what} must be made of real numbers; got {short(value)}") from None
-    _check_size(array, what, error)
+    array = reals(value, what, error, copy=True)
     if shape is not None and not _has(array.shape, shape):
         raise error(f"{what} must have shape ({_axes(shape)}); got {array.shape}")
     if not (np.abs(array) <= LARGEST).all():
@@ -88,6 +62,23 @@ def finite(
         wanted = f"at most {LARGEST:g} in size" if math.isfinite(array[first]) else "finite"
         found = f"{float(array[first])} at {list(first)}" if array.size > 9 else short(value)
         raise error(f"{what} must be {wanted}; got {found}")
+    return array
+
+
+def reals(
+    value: Any, what: str, error: type[KratosLiteError] = InputError, *, cure: str = "", copy: bool = False
+) -> Array:
+    """Return real numbers as floats; they need not be finite, as results may not be."""
+    try:
+        array = np.asarray(value)
+        if array.dtype.kind not in "buifO" or (array.dtype == object and None in array.ravel().tolist()):
+            raise TypeError
+        with np.errstate(all="ignore"):  # what is too large for a float becomes infinite
+            array = array.astype(float, copy=copy) if array.size <= MOST else array
+    except (TypeError, ValueError, OverflowError):
+        cure = f"; {cure}" if cure else ""
+        raise error(f"{what} must be made of real numbers; got {short(value)}{cure}") from None
+    _check_size(array, what, error)
     return array
 
 
@@ -130,11 +121,7 @@ def _check_size(array: AnyArray, what: str, error: type[KratosLiteError]) -> Non
 
 
 def read_only(array: AnyArray) -> AnyArray:
-    """Return an array that nobody can change: itself if it is one, else a copy.
-
-    >>> read_only(np.zeros(3)).flags.writeable
-    False
-    """
+    """Return an array that nobody can change: itself if it is one, else a copy."""
     if array.flags.writeable or not array.flags.owndata:
         array = array.copy()
         array.flags.writeable = False
@@ -146,6 +133,8 @@ def _axes(shape: tuple[int | str, ...]) -> str:
 
 
 def _has(found: tuple[int, ...], wanted: tuple[int | str, ...]) -> bool:
+    if wanted[:1] == ("...",):  # any leading axes
+        found, wanted = found[max(len(found) - len(wanted) + 1, 0) :], wanted[1:]
     return len(found) == len(wanted) and all(
         isinstance(w, str) or w == n for n, w in zip(found, wanted, strict=True)
     )
@@ -161,26 +150,7 @@ def number(
     unit: str = "",
     error: type[KratosLiteError] = InputError,
 ) -> float:
-    """Return one finite real number as a float.
-
-    Parameters
-    ----------
-    above, least, below : bounds: the value must be > `above`, ≥ `least` and < `below`.
-    unit : of the value, for the message.
-
-    Raises
-    ------
-    InputError
-        If it is not one finite number within the bounds.
-
-    Examples
-    --------
-    >>> number(2, "a length")
-    2.0
-    >>> number(-1, "a length", above=0, unit="m")
-    Traceback (most recent call last):
-    kratos_lite.errors.InputError: a length must be one number > 0, in m; got -1
-    """
+    """Return one finite real number > `above`, ≥ `least` and < `below`, each if given, as a float."""
     array = finite(value, what, error=error)
     x = float(array) if not array.ndim else math.nan
     bounds = {">": (above, operator.gt), "≥": (least, operator.ge), "<": (below, operator.lt)}
@@ -192,11 +162,7 @@ def number(
 
 
 def positive_step(dt: Any) -> float:
-    """Return a time step in s.
-
-    >>> positive_step(0.5)
-    0.5
-    """
+    """Return a time step in s."""
     h = number(dt, "a step", above=0, unit="s")
     if h * h < np.finfo(float).tiny:
         raise InputError(f"a step of {h:g} s is too short to compute with; take a longer one")
@@ -212,11 +178,7 @@ def whole_number(
     most: int | None = None,
     error: type[KratosLiteError] = InputError,
 ) -> int:
-    """Return a whole number from `least` to `most`; `otherwise` says what else the caller takes.
-
-    >>> whole_number(3, "steps")
-    3
-    """
+    """Return a whole number from `least` to `most`; `otherwise` says what else the caller takes."""
     fits = isinstance(value, (int, np.integer)) and not isinstance(value, bool) and value >= least
     if not fits or (most is not None and value > most):
         limits = f"≥ {least}" if most is None else f"from {least} to {most}"
@@ -225,12 +187,7 @@ def whole_number(
 
 
 def choice(value: Any, what: str, known: Iterable[str], *, error: type[KratosLiteError] = InputError) -> str:
-    """Return one of some names.
-
-    >>> choice("node", "at", ("nodes", "elements"))
-    Traceback (most recent call last):
-    kratos_lite.errors.InputError: at must be one of nodes, elements; got 'node'. Did you mean nodes?
-    """
+    """Return one of some names."""
     names = list(known)
     if not isinstance(value, str) or value not in names:
         hint = nearest(value, names, 1) if isinstance(value, str) else ""
@@ -240,31 +197,20 @@ def choice(value: Any, what: str, known: Iterable[str], *, error: type[KratosLit
 
 
 def flag(value: Any, what: str) -> bool:
-    """Return True or False.
-
-    >>> flag(True, "lumped")
-    True
-    """
+    """Return True or False."""
     if not isinstance(value, (bool, np.bool_)):
         raise InputError(f"{what} must be True or False; got {short(value)}")
     return bool(value)
 
 
 def function_or_none(value: Any, must: str) -> None:
-    """Raise InputError, which says what the value must be, for neither a function nor None.
-
-    >>> function_or_none(print, "progress must be a function")
-    """
+    """Raise InputError, which says what the value must be, for neither a function nor None."""
     if value is not None and not callable(value):
         raise InputError(f"{must}; got {short(value)}")
 
 
 def takes(function: Any, count: int) -> bool:
-    """Return whether something can be called with so many arguments, as far as Python knows.
-
-    >>> takes(lambda t: t, 1), takes(lambda: 0, 1), takes(float, 1), takes(3.0, 1)
-    (True, False, True, False)
-    """
+    """Return whether something can be called with so many arguments, as far as Python knows."""
     import inspect
 
     if not callable(function):
@@ -279,11 +225,7 @@ def takes(function: Any, count: int) -> bool:
 
 
 def path_of(value: Any) -> Path:
-    """Return a path to a file.
-
-    >>> path_of("a.json").name
-    'a.json'
-    """
+    """Return a path to a file."""
     if not isinstance(value, (str, PathLike)):
         raise InputError(f"a path to a file must be text or a pathlib.Path; got {short(value)}")
     from pathlib import Path  # a quick start without files
@@ -299,12 +241,7 @@ def instance(
     *,
     error: type[KratosLiteError] = InputError,
 ) -> T:
-    """Return an instance of a class, or of one of several; `example` says how to make one.
-
-    >>> instance("soil", "material", float, "2.0")
-    Traceback (most recent call last):
-    kratos_lite.errors.InputError: material must be a float, such as 2.0; got 'soil'
-    """
+    """Return an instance of a class, or of one of several; `example` says how to make one."""
     if not isinstance(value, kind):
         names = " or ".join(k.__name__ for k in (kind if isinstance(kind, tuple) else (kind,)))
         such = f", such as {example}" if example else ""
@@ -313,10 +250,6 @@ def instance(
 
 
 def short(value: Any) -> str:
-    """Return a value as text of at most 100 characters, for a message.
-
-    >>> short("x" * 200)[-5:]
-    'xx...'
-    """
+    """Return a value as text of at most 100 characters, for a message."""
     text = repr(value)
     return text if len(text) <= 100 else text[:97] + "..."

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,11 +19,7 @@ HALF_SHEAR = np.array([1, 1, 1, 0.5, 0.5, 0.5])
 
 
 def tensor(stress: ArrayLike) -> Array:
-    """Return the symmetric tensor (..., 3, 3) of a stress vector (..., 6).
-
-    >>> tensor([1, 2, 3, 4, 5, 6])
-    array([[1., 4., 6.], [4., 2., 5.], [6., 5., 3.]])
-    """
+    """Return the symmetric tensor (..., 3, 3) of a stress vector (..., 6)."""
     s = np.asarray(stress, dtype=float)
     return s[..., [[0, 3, 5], [3, 1, 4], [5, 4, 2]]]
 
@@ -37,48 +32,32 @@ def vector(stress: ArrayLike) -> Array:
 
 
 def acoustic_tensor(C: Array, direction: Array) -> Array:
-    """Return Γ_ik = n_j C_ijkl n_l (3, 3) in Pa of a unit vector n: its eigenvalues are ρ c² of plane waves.
-
-    >>> acoustic_tensor(np.diag([4.0, 4, 4, 2, 2, 2]), np.array([1.0, 0, 0])).diagonal().tolist()
-    [4.0, 2.0, 2.0]
-    """
+    """Return Γ_ik = n_j C_ijkl n_l (3, 3) in Pa of a unit vector n: its eigenvalues are ρ c² of waves."""
     gradients = np.eye(3)[:, :, None] * np.asarray(direction)  # of unit displacements along x, y, z
     strain = symmetric_gradient(gradients)
     return strain @ C @ strain.T
 
 
 def von_mises(stress: ArrayLike) -> Array:
-    """Return the von Mises stress of (..., 6) in the unit of the stress.
-
-    >>> float(von_mises([5.0, 0, 0, 0, 0, 0]))
-    5.0
-    """
+    """Return the von Mises stress of (..., 6) in the unit of the stress."""
     xx, yy, zz, xy, yz, zx = np.moveaxis(np.asarray(stress, dtype=float), -1, 0)
     normal = ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) / 2
     return np.sqrt(normal + 3 * (xy**2 + yz**2 + zx**2))
 
 
 def tresca(stress: ArrayLike) -> Array:
-    """Return the Tresca stress σ1 - σ3 of (..., 6), twice the largest shear stress.
-
-    A mean stress that is much larger does not disturb it.
-
-    >>> round(float(tresca([0, 0, 0, 5.0, 0, 0])), 12)
-    10.0
-    """
-    _, radius, angle = _lode(stress)
-    return np.sqrt(2) * radius * np.sin(angle + np.pi / 3)
+    """Return the Tresca stress σ1 - σ3 of (..., 6), which a much larger mean stress leaves exact."""
+    values = principal_values(deviator(stress))
+    return values[..., 0] - values[..., 2]
 
 
 def principal_values(stress: ArrayLike) -> Array:
-    """Return the principal values σ1 ≥ σ2 ≥ σ3 (..., 3) of (..., 6), as accurate as those of LAPACK.
-
-    >>> principal_values([3.0, 3, 1, 2, 0, 0]).round(12).tolist()
-    [5.0, 1.0, 1.0]
-    """
-    mean, radius, angle = _lode(stress)
-    turns = angle[..., None] - 2 * np.pi / 3 * np.arange(3)
-    return mean[..., None] + np.sqrt(2 / 3) * radius[..., None] * np.cos(turns)
+    """Return the principal values σ1 ≥ σ2 ≥ σ3 (..., 3) of (..., 6); nan of what is not finite."""
+    tensors = tensor(stress)
+    finite = np.isfinite(tensors).all(axis=(-2, -1))
+    values = np.full(tensors.shape[:-1], np.nan)
+    values[finite] = np.linalg.eigvalsh(tensors[finite])[..., ::-1]
+    return values
 
 
 def principal_directions(stress: ArrayLike) -> Array:
@@ -86,63 +65,19 @@ def principal_directions(stress: ArrayLike) -> Array:
 
     They are right-handed, and the largest component of the first two is positive.  Those of equal values are
     any that are orthogonal.
-
-    >>> principal_directions([1.0, 2, 0, 0, 0, 0]).tolist()
-    [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]
     """
-    s = np.moveaxis(_deviator(np.moveaxis(np.asarray(stress, dtype=float), -1, 0)), 0, -1)
-    axes = np.swapaxes(np.linalg.eigh(tensor(s))[1], -1, -2)[..., ::-1, :]
+    axes = np.swapaxes(np.linalg.eigh(tensor(deviator(stress)))[1], -1, -2)[..., ::-1, :]
     largest = np.take_along_axis(axes, np.abs(axes).argmax(axis=-1)[..., None], axis=-1)
     axes = axes * np.sign(largest)
     axes[..., 2, :] = np.cross(axes[..., 0, :], axes[..., 1, :])
     return axes + 0.0  # no -0
 
 
-def _lode(stress: ArrayLike) -> tuple[Array, Array, Array]:
-    """Return Lode's coordinates (...): mean stress, size of the deviator and its angle, 0 to π/3.
-
-    The deviator s and that of s², t, are vectors of one plane, and t is turned by three times the angle: sine
-    and cosine of it are |s ∧ t| and s·t.  As a sum of squares the sine is exact where two values are equal,
-    which the arc cosine of the third invariant is not.
-
-    Source of the angle: W. Lode, Z. Physik 36 (1926) 913-939.
-    """
-    s = np.asarray(stress, dtype=float)
-    flat = s.reshape(-1, 6)
-    parts = [_lode_of_few(flat[i : i + 4096]) for i in range(0, len(flat), 4096)]  # stays in the cache
-    mean, radius, angle = np.concatenate([np.zeros((3, 0)), *parts], axis=1)
-    shape = s.shape[:-1]
-    return mean.reshape(shape), radius.reshape(shape), angle.reshape(shape)
-
-
-def _lode_of_few(stress: Array) -> Array:
-    """Return Lode's coordinates (3, m) of (m, 6)."""
-    deviator = _deviator(stress.T)
-    size = np.abs(deviator).max(axis=0, initial=0.0)
-    dx, dy, dz, xy, yz, zx = deviator / np.where(size > 0, size, 1.0)  # squares of tiny ones are not 0
-    r = np.sqrt(2)
-    s = np.array([dx, dy, dz, r * xy, r * yz, r * zx])
-    t = np.array(
-        [
-            dx * dx + xy * xy + zx * zx,
-            dy * dy + xy * xy + yz * yz,
-            dz * dz + yz * yz + zx * zx,
-            r * (yz * zx - dz * xy),
-            r * (xy * zx - dx * yz),
-            r * (xy * yz - dy * zx),
-        ]
-    )
-    t[:3] -= t[:3].mean(axis=0)
-    squares = sum((s[i] * t[j] - s[j] * t[i]) ** 2 for i, j in combinations(range(6), 2))
-    angle = np.arctan2(np.sqrt(squares), (s * t).sum(axis=0)) / 3
-    return np.array([stress[:, :3].sum(axis=1) / 3, np.sqrt((s * s).sum(axis=0)) * size, angle])
-
-
-def _deviator(stress: Array) -> Array:
-    """Return the deviator of (6, ...), from differences, which a large mean stress leaves exact."""
-    xx, yy, zz, xy, yz, zx = stress
+def deviator(stress: ArrayLike) -> Array:
+    """Return the deviator (..., 6) of (..., 6), from differences, which a large mean stress leaves exact."""
+    xx, yy, zz, *shear = np.moveaxis(np.asarray(stress, dtype=float), -1, 0)
     x, y, z = xx - yy, yy - zz, zz - xx
-    return np.array([(x - z) / 3, (y - x) / 3, (z - y) / 3, xy, yz, zx])
+    return np.stack([(x - z) / 3, (y - x) / 3, (z - y) / 3, *shear], axis=-1)
 
 
 def symmetric_gradient(gradient: Array) -> Array:

@@ -256,7 +256,7 @@ class Result(ElementFields, Tabular):
     def _error(self) -> ErrorEstimate:
         from kratos_lite.analysis.error_estimate import energy_error  # as for the recovery
 
-        squares = self._recovery.squared_errors(self._strained, self.mesh.n_elements)
+        squares = self._recovery.products(self._strained, self._strained, self.mesh.n_elements)
         return energy_error(*squares, 2 * self.energy(), self.groups, self.mesh)
 
     def _stated_error(self) -> str:

@@ -14,11 +14,7 @@ if TYPE_CHECKING:
 
 
 def block_rows(indptr: Rows) -> Ints:
-    """Return the row of each block of rows that start at indptr (n + 1,), as (nnz,).
-
-    >>> block_rows(np.array([0, 2, 3], np.int32)).tolist()
-    [0, 0, 1]
-    """
+    """Return the row of each block of rows that start at indptr (n + 1,), as (nnz,)."""
     return np.repeat(np.arange(len(indptr) - 1), np.diff(indptr))
 
 

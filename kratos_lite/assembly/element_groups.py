@@ -162,20 +162,15 @@ def element_groups_of(
         for material, rule, cells in _alike(mesh, block, material_of[at], rule_of[at]):
             element = element_of(block.name, formulation, materials[material].C, unnamed)
             rows = at.start + cells
-            chosen = _rule_of(element, rules[rule] if rules and rule >= 0 else None)
+            other = rules[rule] if rules and rule >= 0 else None
+            proven = other is None and is_builtin(element)
+            chosen = element.rule if proven else _fitting(element, element.rule if other is None else other)
             nodes = block.nodes if len(cells) == len(block) else block.nodes[cells]
             stress = None if prestress is None else prestress[rows]
             groups.append(ElementGroup(element, chosen, materials[material], nodes, rows, stress))
     if mesh.whole and not groups:
         raise ModelError("the model has no elements; nothing can be solved")
     return groups
-
-
-def _rule_of(element: type[KinematicLinear], other: Rule | int | None) -> Rule:
-    """Return the rule of an element, or one that replaces it, if it fits."""
-    if other is None and is_builtin(element):
-        return element.rule
-    return _fitting(element, element.rule if other is None else other)
 
 
 def group_of_element(mesh: Mesh, groups: Sequence[ElementGroup], id: int) -> ElementGroup:

@@ -169,7 +169,9 @@ def _neighborhoods(around: Lists, corners: Ints, outer: Mask, is_corner: Mask) -
     # nodes inside count by the elements that they share, others by the elements around them
     at, c = np.flatnonzero(inner), corners.shape[1]
     host, center, count = distinct(node[at // c], near.ravel()[at], len(outer))
-    chosen = _largest(host, count, len(outer))
+    best = np.zeros(len(outer), dtype=count.dtype)
+    np.maximum.at(best, host, count)
+    chosen = count == best[host]
     host, center = host[chosen], center[chosen]
     without = np.ones(len(outer), dtype=bool)
     without[host] = False
@@ -184,13 +186,6 @@ def _neighborhoods(around: Lists, corners: Ints, outer: Mask, is_corner: Mask) -
     patch = around.take(center)
     pairs = np.concatenate([host[patch.owner], node]), np.concatenate([patch.entries, element])
     return distinct(*pairs, len(outer))[:2]
-
-
-def _largest(owner: Ints, count: Ints, n: int) -> Mask:
-    """Return a mask of the entries that have the largest count of their owner."""
-    best = np.zeros(n, dtype=count.dtype)
-    np.maximum.at(best, owner, count)
-    return count == best[owner]
 
 
 def _contain(owner: Ints, element: Ints, corners: Ints) -> Mask:
@@ -212,7 +207,7 @@ def _patches_of_nodes(
     entries.append(number[leaders.entries[known]])
     done[hanging] = True
     for block in blocks:
-        for a, support in enumerate(_supports(block)):
+        for a, support in enumerate(_supports(block.shape, block.nodes.shape[1])):
             open_ = np.flatnonzero(~done[block.nodes[:, a]])
             if not len(open_):
                 continue
@@ -225,16 +220,12 @@ def _patches_of_nodes(
     return lists(np.concatenate(owner), np.concatenate(entries), len(is_corner))
 
 
-def _supports(block: Block) -> list[list[int]]:
-    """Return the corners of the edge, face or cell in which each node of a cell lies."""
-    if block.shape is None:
-        return [[a] for a in range(block.nodes.shape[1])]
-    return _supports_in(block.shape)
-
-
 @remembered
-def _supports_in(shape: type[Shape]) -> list[list[int]]:
+def _supports(shape: type[Shape] | None, n: int) -> list[list[int]]:
+    """Return the corners of the edge, face or cell in which each of the n nodes of a cell lies."""
+    if shape is None:
+        return [[a] for a in range(n)]
     linear = shape.linear()
     if linear is None:
-        return [[a] if a < shape.corners else list(range(shape.corners)) for a in range(len(shape.nodes))]
+        return [[a] if a < shape.corners else list(range(shape.corners)) for a in range(n)]
     return [np.flatnonzero(np.abs(linear.N(xi)) > 1e-9).tolist() for xi in shape.nodes]

@@ -148,15 +148,13 @@ def _regions(mesh: Mesh, groups: Sequence[ElementGroup]) -> list[Region]:
     known = _KNOWN.get(mesh)
     if known is None or not (np.array_equal(known[0], material) and np.array_equal(known[1], place)):
         outside, outer = outer_corners(mesh, material)
-        around = [_patches(mesh, part, outer[outside == i]) for i, part in enumerate(parts)]
-        known = _KNOWN[mesh] = material, place, around
-    return [_region(mesh, part, *around) for part, around in zip(parts, known[2], strict=True)]
-
-
-def _region(mesh: Mesh, groups: list[ElementGroup], nodes: Ints, around: Patches) -> Region:
-    number = np.zeros(mesh.n_nodes, dtype=np.int64)
-    number[nodes] = np.arange(len(nodes))
-    return Region(groups, nodes, [number[group.nodes] for group in groups], around)
+        patches_of = [_patches(mesh, part, outer[outside == i]) for i, part in enumerate(parts)]
+        known = _KNOWN[mesh] = material, place, patches_of
+    regions, number = [], np.zeros(mesh.n_nodes, dtype=np.int64)
+    for part, (nodes, around) in zip(parts, known[2], strict=True):
+        number[nodes] = np.arange(len(nodes))
+        regions.append(Region(part, nodes, [number[group.nodes] for group in part], around))
+    return regions
 
 
 def _patches(mesh: Mesh, groups: list[ElementGroup], outer: Ints) -> tuple[Ints, Patches]:
@@ -230,16 +228,12 @@ class Recovery:
                     row[group.rows] = _products((star, raw), (other_star, other_raw), nodes, N, dV, S)
         return energies[0], energies[1]
 
-    def squared_errors(self, u: Array, n_elements: int) -> tuple[Array, Array]:
-        """Return ∫ (σ* - σ) : C⁻¹ : (σ* - σ) dV of each element, (m,) in J, of recovered and averaged σ*."""
-        return self.products(u, u, n_elements)
-
     def _recovered(self, u: Array, keep: bool = True) -> list[tuple[list[Array], Array]]:
         """Return C ε at the points of the groups, and recovered at the nodes, of each region."""
         known = self._last[1] if self._last is not None and self._last[0] is u else None
         recovered = []
         for i, region in enumerate(self.regions):
-            values = [at_gauss(self.points, _plain(group), u) for group in region.groups]
+            values = [at_gauss(self.points, replace(group, prestress=None), u) for group in region.groups]
             recovered.append((values, known[i] if known else region.at_nodes(self.points, values)))
         if keep:
             self._last = u, [nodal for _, nodal in recovered]
@@ -262,10 +256,6 @@ def recovered_at(recovery: Recovery, located: Located, u: Array, *, stress: bool
             nodal[region.nodes] = values
             out[inside] = located[inside].interpolate(nodal)
     return out
-
-
-def _plain(group: ElementGroup) -> ElementGroup:
-    return group if group.prestress is None else replace(group, prestress=None)
 
 
 def _compared_at(group: ElementGroup) -> ElementGroup:

@@ -6,29 +6,18 @@ from typing import Any
 
 import numpy as np
 
-from kratos_lite.errors import InputError, KratosLiteError
+from kratos_lite.errors import InputError
 from kratos_lite.typing import Array
-from kratos_lite.validation import finite, short
+from kratos_lite.validation import finite, reals
 
 
 def real(value: Any, what: str, tail: tuple[int, ...], cure: str = "", *, error: Any = InputError) -> Array:
-    """Return real numbers (..., *tail) as floats; they need not be finite, as results may not be."""
-    try:
-        array = np.asarray(value)
-        if array.dtype.kind not in "buifO" or (array.dtype == object and None in array.ravel().tolist()):
-            raise TypeError
-        with np.errstate(all="ignore"):  # what is too large for a float becomes infinite
-            array = array.astype(float, copy=False)
-    except (TypeError, ValueError, OverflowError):
-        raise _wrong(error, f"{what} must be made of real numbers; got {short(value)}", cure) from None
+    """Return real numbers (..., *tail) as floats, which need not be finite."""
+    array = reals(value, what, error, cure=cure)
     if array.ndim < len(tail) or array.shape[array.ndim - len(tail) :] != tail:
-        axes = ", ".join(["...", *map(str, tail)])
-        raise _wrong(error, f"{what} must have shape ({axes}); got {array.shape}", cure)
+        axes, more = ", ".join(["...", *map(str, tail)]), f"; {cure}" if cure else ""
+        raise error(f"{what} must have shape ({axes}); got {array.shape}{more}")
     return array
-
-
-def _wrong(error: type[KratosLiteError], text: str, cure: str) -> KratosLiteError:
-    return error(f"{text}; {cure}" if cure else text)
 
 
 def points(xi: Any) -> Array:

@@ -6,10 +6,10 @@ import numpy as np
 
 from kratos_lite.elements.custom import is_builtin
 from kratos_lite.elements.kinematic_linear import ELEMENTS, UNNAMED, KinematicLinear
-from kratos_lite.errors import InputError, nearest
+from kratos_lite.errors import InputError
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array
-from kratos_lite.validation import short
+from kratos_lite.validation import choice
 
 NON_LOCKING = "non_locking"
 """The word for the element of a shape that does not lock with a material."""
@@ -58,10 +58,7 @@ def element_of(
 def checked_formulation(word: object) -> str:
     """Return the word of a formulation; InputError if no element has it."""
     known = sorted({element.formulation for element in ELEMENTS.values()} | {NON_LOCKING})
-    if not isinstance(word, str) or word not in known:
-        hint = nearest(word, known) if isinstance(word, str) else ""
-        raise InputError(f"formulation must be one of {', '.join(known)}; got {short(word)}.{hint}")
-    return word
+    return choice(word, "formulation", known)
 
 
 def is_nearly_incompressible(C: Array) -> bool:

@@ -29,9 +29,22 @@ def face_rule(shape: type[Shape], factors: int = 2) -> Rule:
 def area_vectors(shape: type[Shape], X: ArrayLike, rule: Rule | None = None) -> Array:
     """Return normal × area (..., g, 3) in m² of faces X (..., k, 3); nodes run counter-clockwise about it."""
     rule = rule or face_rule(shape)
-    _, dN = tabulate(shape, rule)
-    tangents = np.einsum("...ai,gaj->...gji", np.asarray(X, dtype=float), dN)
+    tangents = _tangents(shape, np.asarray(X, dtype=float), rule)
     return np.cross(tangents[..., 0, :], tangents[..., 1, :]) * rule.weights[:, None]
+
+
+def _tangents(shape: type[Shape], X: Array, rule: Rule) -> Array:
+    """Return dX/dxi (..., g, 1 or 2, 3) in m of lines or faces at the points of a rule."""
+    return np.einsum("...ai,gaj->...gji", X, tabulate(shape, rule)[1])
+
+
+def _measure(shape: type[Shape], X: Array, rule: Rule) -> Array:
+    """Return area, length or 1 (..., g) that the points of a rule stand for on faces, lines or points."""
+    if shape.cell == "point":
+        return np.ones((*X.shape[:-2], 1))
+    if shape.cell == "line":
+        return np.linalg.norm(_tangents(shape, X, rule)[..., 0, :], axis=-1) * rule.weights
+    return np.linalg.norm(area_vectors(shape, X, rule), axis=-1)
 
 
 def surface_load(
@@ -43,14 +56,7 @@ def surface_load(
     """
     X = np.asarray(X, dtype=float)
     rule = face_rule(shape, factors if callable(traction) else 2)
-    N, dN = tabulate(shape, rule)
-    if shape.cell == "point":
-        measure = np.ones((*X.shape[:-2], 1))
-    elif shape.cell == "line":
-        tangents = np.einsum("...ai,gaj->...gji", X, dN)
-        measure = np.linalg.norm(tangents[..., 0, :], axis=-1) * rule.weights
-    else:
-        measure = np.linalg.norm(area_vectors(shape, X, rule), axis=-1)
+    N, measure = tabulate(shape, rule)[0], _measure(shape, X, rule)
     if callable(traction):
         return N.T @ (measure[..., None] * traction(N @ X))
     t = np.asarray(traction, dtype=float)
@@ -62,8 +68,7 @@ def surface_load(
 def surface_mass(shape: type[Shape], X: ArrayLike) -> Array:
     """Return ∫ N N^T dA of faces X (..., k, 3) as (..., k, k) in m²."""
     rule = face_rule(shape)
-    N, _ = tabulate(shape, rule)
-    measure = np.linalg.norm(area_vectors(shape, X, rule), axis=-1)
+    N, measure = tabulate(shape, rule)[0], _measure(shape, np.asarray(X, dtype=float), rule)
     return (N.T * measure[..., None, :]) @ N
 
 
@@ -73,7 +78,7 @@ def surface_pressure_tangent(shape: type[Shape], X: ArrayLike, pressure: ArrayLi
     X, p = np.asarray(X, dtype=float), np.asarray(pressure, dtype=float)
     rule = face_rule(shape)
     N, dN = tabulate(shape, rule)
-    tangents = np.einsum("...ai,gaj->...gji", X, dN)
+    tangents = _tangents(shape, X, rule)
     across = np.cross(tangents[..., None, :], np.eye(3))  # (t × e_i) in row i
     change = np.einsum("...gic,gb->...gbic", across[..., 0, :, :], dN[..., 1])
     change -= np.einsum("...gic,gb->...gbic", across[..., 1, :, :], dN[..., 0])

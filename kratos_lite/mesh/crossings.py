@@ -42,7 +42,7 @@ def crossings(mesh: Mesh, a: Array, b: Array) -> Array:
 def _near(mesh: Mesh, a: Array, b: Array) -> Ints:
     """Return the indices of the elements whose boxes, as spheres, reach the line."""
     length = np.linalg.norm(b - a)
-    found = [NO_ROWS]
+    near = [NO_ROWS]
     for block, at in with_rows(mesh.blocks):
         if not is_solid(block):
             continue
@@ -50,5 +50,5 @@ def _near(mesh: Mesh, a: Array, b: Array) -> Ints:
         middle, radius = (low + high) / 2 - a, np.linalg.norm(high - low, axis=1) / 2
         along = np.clip(middle @ (b - a) / length, 0, length)
         apart = np.linalg.norm(middle - along[:, None] * (b - a) / length, axis=1)
-        found.append(at.start + np.flatnonzero(apart <= radius))
-    return np.concatenate(found)
+        near.append(at.start + np.flatnonzero(apart <= radius))
+    return np.concatenate(near)

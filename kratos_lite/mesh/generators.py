@@ -82,11 +82,7 @@ def _check_size(counts: Sequence[int], shape: type[Shape]) -> None:
 
 
 def _full_name(element: str) -> str:
-    """Return the name that a number of nodes means.
-
-    >>> _full_name("20N"), _full_name("3D20N"), _full_name("BBar3D8N")
-    ('Element3D20N', 'Element3D20N', 'BBar3D8N')
-    """
+    """Return the name that a number of nodes means."""
     nodes = element.upper().removeprefix("3D")
     return f"{UNNAMED}{nodes[:-1]}N" if nodes[-1:] == "N" and nodes[:-1].isdigit() else element
 

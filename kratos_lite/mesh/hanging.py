@@ -25,24 +25,14 @@ Hanging: TypeAlias = "tuple[Ints, Ints, Array, int]"
 
 @dataclass(frozen=True, eq=False)
 class HangingNodes:
-    """Nodes whose displacement others interpolate, and the faces that meet without sharing their nodes.
+    """Nodes whose displacement others interpolate, and the faces that meet without sharing their nodes."""
 
-    Attributes
-    ----------
-    nodes : (h,) int, indices of the hanging nodes.
-    start : (h + 1,) int, where the independents of each begin.
-    independents : (k,) int, indices of the nodes of the larger edge or face, corners first.
-    weights : (k,) float, their shape functions at the hanging node.
-    around : (h,) int, how many corners the hanging node is in the very middle of, or 0.
-    large, small : keys of faces (`kratos_lite.mesh.centers.keys_of`): one large face for each small one.
-    """
-
-    nodes: Ints
-    start: Ints
-    independents: Ints
-    weights: Array
-    around: Ints
-    large: Keys
+    nodes: Ints  # (h,) int, indices of the hanging nodes
+    start: Ints  # (h + 1,) int, where the independents of each begin
+    independents: Ints  # (k,) int, indices of the nodes of the larger edge or face, corners first
+    weights: Array  # (k,) float, their shape functions at the hanging node
+    around: Ints  # (h,) int, how many corners the hanging node is in the very middle of, or 0
+    large: Keys  # keys of faces (`kratos_lite.mesh.centers.keys_of`): one large face for each small one
     small: Keys
 
     def __len__(self) -> int:
@@ -132,21 +122,13 @@ They are columns of the corners, then the middles of the edges, then the middle.
 
 @dataclass(frozen=True, eq=False)
 class Split:
-    """Edges or faces of elements whose middle is a corner of smaller elements.
+    """Edges or faces of elements whose middle is a corner of smaller elements."""
 
-    Attributes
-    ----------
-    shape : of the edge or face.
-    nodes : (k, n) int.
-    middles : (k, e) int, nodes in the middle of its edges, then, of four corners, in its own.
-    elements : (k,) int, element of each.
-    half : 0 or 1 of four-sided faces that are halved, across the edges `half` and `half` + 2; else -1.
-    """
-
-    shape: type[Shape]
-    nodes: Ints
-    middles: Ints
-    elements: Ints
+    shape: type[Shape]  # of the edge or face
+    nodes: Ints  # (k, n) int
+    middles: Ints  # (k, e) int, nodes in the middle of its edges, then, of four corners, in its own
+    elements: Ints  # (k,) int, element of each
+    # 0 or 1 of four-sided faces that are halved, across the edges `half` and `half` + 2; else -1
     half: int = -1
 
     @property

@@ -12,7 +12,6 @@ import numpy as np
 from kratos_lite.errors import InputError, MeshError
 from kratos_lite.mesh.blocks import NO_ROWS, Cells, with_rows
 from kratos_lite.mesh.boxes import BoxTree, cell_boxes, curvature, is_solid, nearest_element
-from kratos_lite.shapes import Shape
 from kratos_lite.shapes.inverse import inverse_map, outside_by
 from kratos_lite.typing import Array, Ints, Mask, Rows
 from kratos_lite.validation import finite
@@ -38,23 +37,15 @@ STARTS = 4
 
 @dataclass(frozen=True, eq=False)
 class Located:
-    """Points (...) in a mesh: the element that contains each, and where in it the point lies.
+    """Points (...) in a mesh: the element that contains each, and where in it the point lies."""
 
-    Attributes
-    ----------
-    mesh : the mesh.
-    points : (..., 3) float, m; the points.
-    rows : (...) int, index of the element, the lowest of those that contain the point; -1 outside the mesh.
-    block, cell : (...) int, the same as number of the block and row in it; -1 outside.
-    xi : (..., 3) float, reference coordinates; nan outside.
-    """
-
-    mesh: Cells
-    points: Array
+    mesh: Cells  # the mesh
+    points: Array  # (..., 3) float, m; the points
+    # (...) int, index of the element, the lowest of those that contain the point; -1 outside the mesh
     rows: Ints
-    block: Ints
+    block: Ints  # (...) int, the same as number of the block and row in it; -1 outside
     cell: Ints
-    xi: Array
+    xi: Array  # (..., 3) float, reference coordinates; nan outside
 
     @property
     def inside(self) -> Mask:
@@ -96,11 +87,6 @@ class Located:
         """Return the shape functions as a sparse matrix W (m, n), one row per point.
 
         W v are nodal values v (n, ...) at the points, W.T f are forces f (m, ...) at them as nodal forces.
-
-        Raises
-        ------
-        MeshError
-            A point lies outside the mesh.
         """
         from scipy.sparse import csr_array
 
@@ -112,13 +98,7 @@ class Located:
         return csr_array((entries, (rows, columns)), shape=(self.rows.size, len(self.mesh.points)))
 
     def nodes_and_weights(self, point: int = 0) -> tuple[Ints, Array]:
-        """Return the nodes (k,) of the element that contains one point, and their shape functions (k,).
-
-        >>> from kratos_lite import box
-        >>> nodes, weights = box().locate([0.5, 0.5, 0.5]).nodes_and_weights()
-        >>> nodes.tolist(), weights.tolist()
-        ([0, 4, 6, 2, 1, 5, 7, 3], [0.125, 0.125, 0.125, 0.125, 0.125, 0.125, 0.125, 0.125])
-        """
+        """Return the nodes (k,) of the element that contains one point, and their shape functions (k,)."""
         one = self[point] if self.rows.ndim else self
         _, nodes, N = next(one.require()._by_block())
         return nodes[0].astype(np.int64), N[0]
@@ -189,22 +169,22 @@ class _Search:
         distance = ((x[at] - self.middle[row]) ** 2).sum(axis=1) / self.size[row] ** 2
         order = np.lexsort((row, distance, at))
         at, row = at[order], row[order]
-        found, xi = np.full(len(x), -1), np.full((len(x), 3), np.nan)
+        element, xi = np.full(len(x), -1), np.full((len(x), 3), np.nan)
         first = np.searchsorted(at, np.arange(len(x) + 1))
         tried = first[:-1].copy()
         pending = np.flatnonzero(tried < first[1:])
         while len(pending):
-            self._try(x, pending, row[tried[pending]], found, xi)
+            self._try(x, pending, row[tried[pending]], element, xi)
             tried[pending] += 1
-            pending = pending[(found[pending] < 0) & (tried[pending] < first[pending + 1])]
-        lost = found[at] < 0
-        self._retry(x, at[lost], row[lost], found, xi)
-        lower = self._near_edge(found, xi)[at] & (row < found[at])
+            pending = pending[(element[pending] < 0) & (tried[pending] < first[pending + 1])]
+        lost = element[at] < 0
+        self._retry(x, at[lost], row[lost], element, xi)
+        lower = self._near_edge(element, xi)[at] & (row < element[at])
         order = np.lexsort((-row[lower], at[lower]))  # the lowest row is the last to be written
-        self._try(x, at[lower][order], row[lower][order], found, xi)
-        return found, xi
+        self._try(x, at[lower][order], row[lower][order], element, xi)
+        return element, xi
 
-    def _try(self, x: Array, at: Ints, rows: Ints, found: Ints, xi: Array) -> None:
+    def _try(self, x: Array, at: Ints, rows: Ints, element: Ints, xi: Array) -> None:
         """Write row and xi of those points x[at] that lie in the elements in `rows`."""
         numbers = self.block_of(rows)
         hits, where = np.zeros(len(at), dtype=bool), np.zeros((len(at), 3))
@@ -213,13 +193,13 @@ class _Search:
             if len(chosen) and block.shape is not None:
                 inverse = inverse_map(block.shape, self._nodes(number, rows[chosen]), x[at[chosen]])
                 hits[chosen], where[chosen] = inverse.inside, inverse.xi
-        found[at[hits]], xi[at[hits]] = rows[hits], where[hits]
+        element[at[hits]], xi[at[hits]] = rows[hits], where[hits]
 
     def _nodes(self, number: int, rows: Ints) -> Array:
         """Return the nodes (m, k, 3) of elements of a block."""
         return self.mesh.points[self.mesh.blocks[number].nodes[rows - self.starts[number]]]
 
-    def _retry(self, x: Array, at: Ints, rows: Ints, found: Ints, xi: Array) -> None:
+    def _retry(self, x: Array, at: Ints, rows: Ints, element: Ints, xi: Array) -> None:
         """Try strongly curved cells again from elsewhere; from the middle Newton may reach another xi."""
         numbers = self.block_of(rows)
         for number, block in enumerate(self.mesh.blocks):
@@ -229,31 +209,26 @@ class _Search:
             pyramid = block.shape.cell == "pyramid"
             curved = curvature(block.shape, self._nodes(number, rows[chosen])) > (0 if pyramid else CURVED)
             chosen = chosen[curved]
-            starts = _starts(block.shape)
+            middle = block.shape.nodes[: block.shape.corners].mean(axis=0)
+            starts = middle + 0.8 * (block.shape.nodes - middle)  # on the way from there to each node
             images = block.shape.N(starts) @ self._nodes(number, rows[chosen])
             order = ((images - x[at[chosen], None]) ** 2).sum(axis=2).argsort(axis=1)
             for start in order.T[: len(starts) if pyramid else STARTS]:
-                left = found[at[chosen]] < 0
+                left = element[at[chosen]] < 0
                 pairs = chosen[left]
                 X = self._nodes(number, rows[pairs])
                 inverse = inverse_map(
                     block.shape, X, x[at[pairs]], max_iterations=15, start=starts[start[left]]
                 )
                 hits = pairs[inverse.inside]
-                found[at[hits]], xi[at[hits]] = rows[hits], inverse.xi[inverse.inside]
+                element[at[hits]], xi[at[hits]] = rows[hits], inverse.xi[inverse.inside]
 
-    def _near_edge(self, found: Ints, xi: Array) -> Mask:
+    def _near_edge(self, element: Ints, xi: Array) -> Mask:
         """Return which points lie so near the boundary of their cell that others may contain them too."""
-        near = np.zeros(len(found), dtype=bool)
-        numbers = np.where(found >= 0, self.block_of(found), -1)
+        near = np.zeros(len(element), dtype=bool)
+        numbers = np.where(element >= 0, self.block_of(element), -1)
         for number, block in enumerate(self.mesh.blocks):
             chosen = np.flatnonzero(numbers == number)
             if len(chosen) and block.shape is not None:
                 near[chosen] = outside_by(block.shape.cell, xi[chosen]) > -NEAR_EDGE
         return near
-
-
-def _starts(shape: type[Shape]) -> Array:
-    """Return points (k, 3) on the way from the centroid to each node."""
-    middle = shape.nodes[: shape.corners].mean(axis=0)
-    return middle + 0.8 * (shape.nodes - middle)

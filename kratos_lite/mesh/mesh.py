@@ -367,7 +367,7 @@ class Mesh(Tabular):
 
         Parameters
         ----------
-        where : part name, property id, indices, or None for all.
+        where : part name, property id, indices, a mask, or None for all.
 
         Returns
         -------
@@ -406,14 +406,14 @@ class Mesh(Tabular):
         Examples
         --------
         >>> from kratos_lite import box
-        >>> found = box(cells=(2, 1, 1)).locate([[0.75, 0.5, 0.5], [3.0, 0.0, 0.0]])
-        >>> found.rows.tolist(), found.xi[0].tolist()
+        >>> located = box(cells=(2, 1, 1)).locate([[0.75, 0.5, 0.5], [3.0, 0.0, 0.0]])
+        >>> located.rows.tolist(), located.xi[0].tolist()
         ([1, -1], [0.0, 0.0, 0.0])
         """
         from kratos_lite.mesh.locate import locate  # a quick start without it
 
-        found = locate(self, points)
-        return found.require() if required else found
+        located = locate(self, points)
+        return located.require() if required else located
 
     # ---- for other programs ------------------------------------------------------------------
 

@@ -90,13 +90,13 @@ class CellRefiner:
         self, blocks: Sequence[Block], into: _Cells, cuts: Callable[[Block, slice], Sequence[Cut]]
     ) -> None:
         for block, at in with_rows(blocks):
-            found = cuts(block, at)
+            cut = cuts(block, at)
             kept = np.ones(len(block), dtype=bool)
-            for cells, _ in found:
+            for cells, _ in cut:
                 kept[cells] = False
             if kept.any():
                 into.add(block.take(kept), at.start + np.flatnonzero(kept))
-            for cells, pieces in found:
+            for cells, pieces in cut:
                 self._cut(block, cells, at.start, pieces, into)
 
     def _cut(self, block: Block, cells: Ints, first: int, pieces: Sequence[Piece], into: _Cells) -> None:
@@ -205,12 +205,7 @@ def _compressed(sources: Sequence[tuple[Ints, Array]]) -> tuple[Ints, Ints, Arra
 
 
 def name_of(name: str, shape: type[Shape]) -> str:
-    """Return the name of the same kind of element or condition with another shape.
-
-    >>> from kratos_lite.shapes.hexahedra import Hexahedron20
-    >>> name_of("KinematicLinear3D8N", Hexahedron20)
-    'KinematicLinear3D20N'
-    """
+    """Return the name of the same kind of element or condition with another shape."""
     stem = name.rstrip("N").rstrip("0123456789")
     wanted = f"{stem}{len(shape.nodes)}N"
     if name in ELEMENTS and wanted not in ELEMENTS:

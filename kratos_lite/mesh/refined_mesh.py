@@ -11,37 +11,30 @@ from kratos_lite.mesh.blocks import Block, Part
 from kratos_lite.mesh.centers import Keys, are_among, corners_around, keys_of, sorted_keys
 from kratos_lite.mesh.mesh import Mesh
 from kratos_lite.mesh.selection import Where, WhereElements, elements_among
-from kratos_lite.shapes import Shape
 from kratos_lite.shapes.faces import FACE_SHAPES
-from kratos_lite.typing import Array, Ints, Mask, Rows
+from kratos_lite.typing import Array, Ints, Mask
 from kratos_lite.validation import finite
 
 
 @dataclass(frozen=True, eq=False)
 class RefinedMesh:
-    """A mesh made from a coarser one, whose nodes are the first of its own.
+    """A mesh made from a coarser one, whose nodes are the first of its own."""
 
-    Attributes
-    ----------
-    coarse, mesh : the two.
-    elements : (m',) int, row of the coarse element that each element has come from.
-    conditions : (c',) int, likewise of the conditions.
-    start, nodes, weights : new nodes from old ones, in compressed rows.
-    inside : (k,) key of the corners of the edge, face or cell in which each new node lies.
-    """
-
-    coarse: Mesh
+    coarse: Mesh  # the two
     mesh: Mesh
-    elements: Ints
-    conditions: Ints
-    start: Ints
+    elements: Ints  # (m',) int, row of the coarse element that each element has come from
+    conditions: Ints  # (c',) int, likewise of the conditions
+    start: Ints  # new nodes from old ones, in compressed rows
     nodes: Ints
     weights: Array
-    inside: Keys
+    inside: Keys  # (k,) key of the corners of the edge, face or cell in which each new node lies
 
     def interpolate(self, values: Array) -> Array:
         """Return nodal values (n, ...) of the coarse mesh on all nodes of the finer one."""
-        return np.concatenate([values, _interpolated(values, self.start, self.nodes, self.weights)])
+        if len(self.start) == 1:
+            return values.copy()
+        weighted = self.weights.reshape(-1, *[1] * (values.ndim - 1)) * values[self.nodes]
+        return np.concatenate([values, np.add.reduceat(weighted, self.start[:-1])])
 
     def onto(self, geometry: Mapping[str, Callable[[Array], Array]]) -> RefinedMesh:
         """Return the same with the new nodes of parts moved onto the true surfaces.
@@ -72,7 +65,7 @@ class RefinedMesh:
 
     def children(self, rows: Ints) -> Ints:
         """Return the elements of the finer mesh that have come from elements of the coarse one."""
-        return _descendants(self.elements, rows, self.coarse.n_elements)
+        return np.flatnonzero(np.isin(self.elements, rows))
 
     def where(self, where: Where) -> Where:
         """Return what nodes of the coarse mesh are chosen by, as a choice of nodes of the finer one."""
@@ -88,7 +81,7 @@ class RefinedMesh:
 
     def part(self, part: Part) -> Part:
         """Return a part of the coarse mesh as one of the finer mesh."""
-        conditions = _descendants(self.conditions, part.conditions, self.coarse.n_conditions)
+        conditions = np.flatnonzero(np.isin(self.conditions, part.conditions))
         elements = part.elements if len(part.elements) else elements_among(part.nodes, self.coarse)
         return replace(
             part,
@@ -96,19 +89,6 @@ class RefinedMesh:
             elements=self.children(elements),
             conditions=conditions,
         )
-
-
-def _interpolated(values: Array, start: Ints, nodes: Ints, weights: Array) -> Array:
-    if not len(start) - 1:
-        return np.zeros((0, *values.shape[1:]))
-    weighted = weights.reshape(-1, *[1] * (values.ndim - 1)) * values[nodes]
-    return np.add.reduceat(weighted, start[:-1])
-
-
-def _descendants(parents: Ints, rows: Ints, size: int) -> Ints:
-    chosen = np.zeros(size, dtype=bool)
-    chosen[rows] = True
-    return np.flatnonzero(chosen[parents])
 
 
 # ---- sets of nodes -----------------------------------------------------------------------------------
@@ -123,17 +103,12 @@ def _keys_among(mesh: Mesh, rows: Ints) -> Keys:
     for faces in mesh.boundary:
         chosen = faces.nodes[inside[faces.nodes].all(axis=1)]
         alone[chosen] = False
-        keys += _edges_and_face(chosen, FACE_SHAPES[faces.nodes.shape[1]])
+        shape = FACE_SHAPES[faces.nodes.shape[1]]
+        keys += [keys_of(chosen[:, list(columns)]) for columns in (range(shape.corners), *shape.edges)]
     if alone.any():
         for block in mesh.blocks:
             keys += _with_lone_nodes(block, inside, alone)
     return sorted_keys(*keys)
-
-
-def _edges_and_face(nodes: Rows, shape: type[Shape]) -> list[Keys]:
-    """Return the keys of faces (m, k) and of their edges."""
-    columns = [range(shape.corners), *shape.edges]
-    return [keys_of(nodes[:, list(picked)]) for picked in columns]
 
 
 def _with_lone_nodes(block: Block, inside: Mask, alone: Mask) -> list[Keys]:
@@ -141,24 +116,13 @@ def _with_lone_nodes(block: Block, inside: Mask, alone: Mask) -> list[Keys]:
     shape = block.shape
     if shape is None or not len(block):
         return []
-    around = [tuple(sorted(set(corners))) for corners in (*shape.edges, *_corner_faces(shape))]
-    around.append(tuple(range(shape.corners)))
-    found = []
+    faces = [face[: FACE_SHAPES[len(face)].corners] for face in shape.faces]
+    around = [tuple(sorted(corners)) for corners in (*shape.edges, *faces, range(shape.corners))]
+    inside_of = [set(corners_around(shape.cell, xi)) for xi in shape.nodes]
+    keys = []
     for corners in around:
-        own = _nodes_on(shape, corners)
-        nodes = block.nodes[:, list(own)]
+        nodes = block.nodes[:, [node for node, among in enumerate(inside_of) if among <= set(corners)]]
         chosen = block.nodes[inside[nodes].all(axis=1) & alone[nodes].any(axis=1)]
         parts = [part for part in around if set(part) <= set(corners)]
-        found += [keys_of(chosen[:, list(part)]) for part in parts]
-    return found
-
-
-def _corner_faces(shape: type[Shape]) -> list[tuple[int, ...]]:
-    return [face[: FACE_SHAPES[len(face)].corners] for face in shape.faces]
-
-
-def _nodes_on(shape: type[Shape], corners: tuple[int, ...]) -> list[int]:
-    """Return the nodes of a shape that lie on the edge, face or cell between some corners."""
-    return [
-        node for node, xi in enumerate(shape.nodes) if set(corners_around(shape.cell, xi)) <= set(corners)
-    ]
+        keys += [keys_of(chosen[:, list(part)]) for part in parts]
+    return keys

@@ -34,7 +34,7 @@ from kratos_lite.shapes.pyramids import Pyramid13
 from kratos_lite.shapes.tetrahedra import Tetrahedron4, Tetrahedron10
 from kratos_lite.shapes.wedges import Wedge15
 from kratos_lite.typing import Array, Ints, Mask
-from kratos_lite.validation import finite, whole_numbers
+from kratos_lite.validation import finite
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -52,7 +52,8 @@ def refine(mesh: Mesh, elements: ArrayLike | None = None, keep: ArrayLike | None
     A hexahedron, tetrahedron or wedge gives 8, a pyramid 6 and 4 tetrahedra.  Where a neighbor stays as it
     is, nodes hang: they take what its edge or face interpolates.
     """
-    marked = _mask(mesh, elements)
+    marked = np.zeros(mesh.n_elements, dtype=bool)
+    marked[mesh.elements(elements)] = True
     centers = known_centers(mesh.blocks, mesh.hanging)
     if mesh.hanging is not None:
         marked = _closed(mesh, centers, marked)
@@ -62,21 +63,6 @@ def refine(mesh: Mesh, elements: ArrayLike | None = None, keep: ArrayLike | None
     cut = _cut_entities(mesh, marked)
     refiner.conditions(lambda block, at: _condition_cuts(mesh, block, cut, direction))
     return refiner.refined_mesh()
-
-
-def _mask(mesh: Mesh, elements: ArrayLike | None) -> Mask:
-    """Return which elements (m,) are marked."""
-    m = mesh.n_elements
-    if elements is None:
-        return np.ones(m, dtype=bool)
-    chosen = np.asarray(elements)
-    if chosen.dtype == np.bool_:
-        if chosen.shape != (m,):
-            raise MeshError(f"a mask of elements must have shape ({m},); got {chosen.shape}")
-        return chosen.copy()
-    marked = np.zeros(m, dtype=bool)
-    marked[whole_numbers(elements, "rows of elements to refine", ("k",), size=m, error=MeshError)] = True
-    return marked
 
 
 def _target(block: Block, cell: str) -> tuple[str, type[Shape]]:
@@ -94,9 +80,9 @@ def axes_along(mesh: Mesh, block: Block, direction: Array) -> Ints:
     shape = block.shape
     assert shape is not None
     corners = shape.nodes[: shape.corners]
-    found = np.full(len(block), -1)
+    axes = np.full(len(block), -1)
     if shape.cell not in ("hexahedron", "wedge", "quadrilateral", "line"):
-        return found
+        return axes
     for axis in (2,) if shape.cell == "wedge" else range(shape.nodes.shape[1]):
         steps = [(a, b) for a, b in shape.edges or ((0, 1),) if np.ptp(corners[[a, b]], axis=0)[axis] > 0]
         ends = np.array(
@@ -105,8 +91,8 @@ def axes_along(mesh: Mesh, block: Block, direction: Array) -> Ints:
         edges = mesh.points[block.nodes[:, ends[:, 1]]] - mesh.points[block.nodes[:, ends[:, 0]]]
         across = np.linalg.norm(np.cross(edges, direction), axis=-1)
         length = np.linalg.norm(edges, axis=-1) * np.linalg.norm(direction)
-        found[(across <= 1e-6 * length).all(axis=1)] = axis
-    return found
+        axes[(across <= 1e-6 * length).all(axis=1)] = axis
+    return axes
 
 
 def _cuts_across(mesh: Mesh, block: Block, cells: Ints, direction: Array) -> list[Cut]:
@@ -233,10 +219,6 @@ def raised(mesh: Mesh, element_of: Callable[[str], str] | None = None) -> Refine
 
 
 def quadratic(name: str) -> str:
-    """Return the name of the quadratic element of the same family as an element.
-
-    >>> quadratic("KinematicLinear3D6N")
-    'KinematicLinear3D15N'
-    """
+    """Return the name of the quadratic element of the same family as an element."""
     shape = ELEMENTS[name].shape
     return name if len(shape.nodes) > shape.corners else name_of(name, QUADRATIC[shape.cell])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -65,10 +65,8 @@ def find_nodes(where: Callable[[Array], ArrayLike] | ArrayLike, mesh: Cells) -> 
             )
         return rows
     n, chosen = len(points), where(points.copy()) if callable(where) else where
-    if getattr(chosen, "dtype", None) == np.bool_ or (isinstance(chosen, (list, tuple)) and _flags(chosen)):
-        if np.shape(chosen) != (n,):
-            raise MeshError(f"a node mask must have shape ({n},); got {np.shape(chosen)}")
-        return np.flatnonzero(chosen)
+    if _is_mask(chosen):
+        return _indices(chosen, "nodes", n)
     known = "nodes are chosen by part name, point (x, y, z), predicate, mask or indices; these"
     rows = whole_numbers(chosen, known, error=MeshError)
     return without_repeats(whole_numbers(rows, "node indices", size=n, error=MeshError).ravel())
@@ -106,8 +104,17 @@ def nodes_at(point: Array, points: Array) -> tuple[Ints, str]:
     return rows[np.argsort(distance[rows], kind="stable")], text
 
 
-def _flags(chosen: Sequence[Any]) -> bool:
-    return len(chosen) > 0 and all(isinstance(one, (bool, np.bool_)) for one in chosen)
+def _is_mask(chosen: Any) -> bool:
+    """Return whether a choice is made of True and False."""
+    if isinstance(chosen, (list, tuple)):
+        return len(chosen) > 0 and all(isinstance(item, (bool, np.bool_)) for item in chosen)
+    return getattr(chosen, "dtype", None) == np.bool_
+
+
+def _indices(mask: Any, what: str, n: int) -> Ints:
+    if np.shape(mask) != (n,):
+        raise MeshError(f"a mask of {what} must have shape ({n},); got {np.shape(mask)}")
+    return np.flatnonzero(mask)
 
 
 def find_elements(where: WhereElements, part: Part | None, mesh: Cells) -> Ints:
@@ -123,9 +130,12 @@ def find_elements(where: WhereElements, part: Part | None, mesh: Cells) -> Ints:
         if mesh.whole and not len(rows):
             raise MeshError(f"part {where!r} has no elements")
         return rows
-    what = "elements are chosen by part name, property id or indices; these"
+    m = sum(map(len, mesh.blocks))
+    if _is_mask(where):
+        return _indices(where, "elements", m)
+    what = "elements are chosen by part name, property id, mask or indices; these"
     rows = whole_numbers(where, what, ("k",), error=MeshError)
-    return whole_numbers(rows, "element indices", size=sum(map(len, mesh.blocks)), error=MeshError)
+    return whole_numbers(rows, "element indices", size=m, error=MeshError)
 
 
 def elements_among(nodes: Ints, mesh: Cells) -> Ints:

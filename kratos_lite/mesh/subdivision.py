@@ -66,25 +66,25 @@ def _of_octahedron(X: Array, diagonal: int) -> list[Piece]:
     (a, b), (c, d) = DIAGONALS[diagonal]
     ends = (X[a] + X[b]) / 2, (X[c] + X[d]) / 2
     ring = [(X[i] + X[j]) / 2 for i, j in ((a, c), (c, b), (b, d), (d, a))]
-    found = []
+    cells = []
     for i in range(4):
         corners = np.array([*ends, ring[i], ring[(i + 1) % 4]])
         if np.linalg.det(corners[1:] - corners[0]) < 0:
             corners = corners[[1, 0, 2, 3]]
-        found.append(Piece("tetrahedron", corners))
-    return found
+        cells.append(Piece("tetrahedron", corners))
+    return cells
 
 
 def _of_pyramid(X: Array) -> tuple[Piece, ...]:
     """Return a pyramid in each corner, one upside down between them, and tetrahedra at the sides."""
     base, apex = X[:4], X[4]
     rising, center = (base + apex) / 2, base.mean(axis=0)
-    found = [Piece("pyramid", (X + x) / 2) for x in X]
-    found.append(Piece("pyramid", np.vstack([rising[::-1], center])))
+    cells = [Piece("pyramid", (X + x) / 2) for x in X]
+    cells.append(Piece("pyramid", np.vstack([rising[::-1], center])))
     for i in range(4):
         j = (i + 1) % 4
-        found.append(Piece("tetrahedron", np.array([(base[i] + base[j]) / 2, center, rising[i], rising[j]])))
-    return tuple(found)
+        cells.append(Piece("tetrahedron", np.array([(base[i] + base[j]) / 2, center, rising[i], rising[j]])))
+    return tuple(cells)
 
 
 @remembered
@@ -95,14 +95,14 @@ def across(cell: str, axis: int) -> tuple[Piece, ...]:
     """
     whole = pieces(cell)
     X = LINEAR[cell].nodes
-    found: dict[tuple[float, ...], Piece] = {}
+    cells: dict[tuple[float, ...], Piece] = {}
     for piece in whole:
         corners = piece.corners.copy()
         corners[:, axis] = X[:, axis]
-        found.setdefault(
+        cells.setdefault(
             tuple(np.delete(corners, axis, axis=1).mean(axis=0).round(9).tolist()), Piece(cell, corners)
         )
-    return tuple(found.values())
+    return tuple(cells.values())
 
 
 def shortest_diagonal(corners: Array) -> Ints:

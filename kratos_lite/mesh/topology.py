@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from kratos_lite.mesh.blocks import NO_ROWS, Block, with_rows
-from kratos_lite.mesh.centers import Keys, keys_of, mixed
+from kratos_lite.mesh.centers import Centers, Keys, keys_of, mixed
 from kratos_lite.native import kernels
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array, Ints, Mask, Numbers, Rows
@@ -28,10 +28,6 @@ def equal_sets(groups: Sequence[Sets]) -> tuple[Ints, Ints]:
 
     Sets count through the groups, then the tuples of columns, then the cells.  Each set is paired
     with the next one that is equal.
-
-    >>> one, other = equal_sets([(np.array([[0, 1, 2], [5, 2, 1]]), [(0, 1), (1, 2)])])
-    >>> one.tolist(), other.tolist()
-    ([2], [3])
     """
     few = sum(len(cells) * len(columns) for cells, columns in groups) <= FEW_SETS
     compiled = None if few else kernels("mesh")
@@ -67,11 +63,7 @@ def _equal_keys(keys: Keys) -> tuple[Ints, Ints]:
 
 
 def components(n: int, pairs: Ints) -> Ints:
-    """Return the smallest member of the connected part of each of n members; pairs (p, 2) connect them.
-
-    >>> components(5, np.array([[3, 1], [4, 3]])).tolist()
-    [0, 1, 2, 1, 1]
-    """
+    """Return the smallest member of the connected part of each of n members; pairs (p, 2) connect them."""
     compiled = kernels("mesh") if len(pairs) else None
     if compiled is not None:
         return compiled.components(n, np.ascontiguousarray(pairs, dtype=np.int64))
@@ -163,11 +155,7 @@ def faces_of(block: Block) -> tuple[tuple[int, ...], ...]:
 
 
 def corners(face: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the corners of a face: the first three of a triangle, the first four of a quadrilateral.
-
-    >>> corners((0, 2, 1, 6, 5, 4))
-    (0, 2, 1)
-    """
+    """Return the corners of a face: the first three of a triangle, the first four of a quadrilateral."""
     return face[: 3 if len(face) in (3, 6) else 4]
 
 
@@ -181,28 +169,21 @@ def outward_signs(boundary: Sequence[Block], block: Block) -> Array:
     outside = [b.nodes[:, :c] for b in boundary if b.shape is not None and b.shape.corners == c]
     known = np.vstack([np.zeros((0, c), dtype=np.int32), *outside])
     corners = block.nodes[:, :c]
-    both = np.sort(np.vstack([known, corners]), axis=1)
-    _, key = np.unique(both, axis=0, return_inverse=True)
-    key = key.ravel()
-    owner = np.full(key.max(initial=-1) + 1, -1)
-    owner[key[: len(known)]] = np.arange(len(known))
-    match = owner[key[len(known) :]]
+    numbers = Centers()
+    numbers.add(keys_of(known), np.arange(len(known)))
+    numbers.sort()
+    match = numbers.find(keys_of(corners))
     signs = np.zeros(len(block))
     on = np.flatnonzero(match >= 0)
-    mate = known[match[on]]
-    start = np.argmax(mate == corners[on, :1], axis=1)
-    following = np.take_along_axis(mate, ((start + 1) % c)[:, None], axis=1)[:, 0]
+    other = known[match[on]]
+    start = np.argmax(other == corners[on, :1], axis=1)
+    following = np.take_along_axis(other, ((start + 1) % c)[:, None], axis=1)[:, 0]
     signs[on] = np.where(following == corners[on, 1], 1.0, -1.0)
     return signs
 
 
 def mirror(shape: type[Shape]) -> Ints:
-    """Return the node order of the mirror image of a cell: its reflection in r = s.
-
-    >>> from kratos_lite.shapes.tetrahedra import Tetrahedron4
-    >>> mirror(Tetrahedron4).tolist()
-    [0, 2, 1, 3]
-    """
+    """Return the node order of the mirror image of a cell: its reflection in r = s."""
     swapped = shape.nodes[:, [1, 0, 2]]
     distance = np.abs(swapped[:, None, :] - shape.nodes[None, :, :]).max(axis=2)
     return distance.argmin(axis=1)

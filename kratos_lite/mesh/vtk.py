@@ -30,13 +30,7 @@ def with_shape(mesh: Cells) -> tuple[list[Block], Mask | slice]:
 
 
 def vtk_cells(blocks: Sequence[Block], n_nodes: int) -> tuple[Numbers, Numbers, Numbers]:
-    """Return nodes of all cells in the order of VTK, the end of each cell in them, and its type (m,).
-
-    >>> from kratos_lite import box
-    >>> nodes, ends, types = vtk_cells(box().blocks, 8)
-    >>> nodes.tolist(), ends.tolist(), types.tolist()
-    ([0, 4, 6, 2, 1, 5, 7, 3], [8], [12])
-    """
+    """Return nodes of all cells in the order of VTK, the end of each cell in them, and its type (m,)."""
     size = sum(block.nodes.size for block in blocks)
     index = "<i4" if max(size, n_nodes) < 2**31 else "<i8"
     nodes = np.empty(size, dtype=index)

@@ -13,13 +13,14 @@ from kratos_lite.assembly.element_groups import ElementGroup, element_class
 from kratos_lite.assembly.gauss_point_fields import clearly_positive, volumes
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.tables import gradients_at_nodes, tabulate
-from kratos_lite.errors import MAX_PROBLEMS, InputError, MeshError, ModelError, Problems, SolveError
+from kratos_lite.errors import MAX_PROBLEMS, MeshError, ModelError, Problems, SolveError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.model.loads import Load
 from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.supports import Supports
 from kratos_lite.typing import Array, Mask
+from kratos_lite.validation import instance
 
 SLOWEST, QUICKEST = 1.0, 2.5e4
 """Speeds of waves in m/s: jelly is above the one, diamond and graphene below the other."""
@@ -37,18 +38,9 @@ LOADS_ON_SUPPORTS = "all loads act on fixed components, so nothing moves"
 """The warning of loads that only supports carry."""
 
 
-def checked_mesh(mesh: object) -> Mesh:
-    """Return a mesh; InputError if it is not a mesh."""
-    if not isinstance(mesh, Mesh):
-        raise InputError(f"a Mesh is needed, such as kratos_lite.box() gives; got {type(mesh).__name__}")
-    return mesh
-
-
 def checked_material(material: object) -> LinearMaterial:
     """Return a material; InputError if it is not a material."""
-    if not isinstance(material, LinearMaterial):
-        raise InputError(f"a material such as Isotropic3D is needed; got {type(material).__name__}")
-    return material
+    return instance(material, "a material", LinearMaterial, "kl.Isotropic3D(E=210e9, nu=0.3)")
 
 
 def check_geometry(mesh: Mesh, formulation: str | None = None) -> list[str]:

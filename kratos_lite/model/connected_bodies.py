@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kratos_lite.mesh import Faces, Mesh, components, distinct, with_rows
+from kratos_lite.mesh import Mesh, components, distinct, with_rows
 from kratos_lite.typing import Array, Ints
 
 FEW = 40
@@ -15,19 +15,12 @@ FEW = 40
 
 @dataclass(frozen=True)
 class Bodies:
-    """Which nodes belong to which bodies: a node has one pair (node, body) for each body around it.
+    """Which nodes belong to which bodies: a node has one pair (node, body) for each body around it."""
 
-    Attributes
-    ----------
-    part : (n,) int, the first body of each node, -1 for nodes without elements.
-    node, body : all pairs, sorted by node.
-    count : number of bodies.
-    """
-
-    part: Ints
-    node: Ints
+    part: Ints  # (n,) int, the first body of each node, -1 for nodes without elements
+    node: Ints  # all pairs, sorted by node
     body: Ints
-    count: int
+    count: int  # number of bodies
 
     @property
     def joints(self) -> tuple[Ints, Ints]:
@@ -42,7 +35,9 @@ class Bodies:
 
     def frames(self, mesh: Mesh) -> tuple[Array, Array]:
         """Return the center (b, 3) and the size (b,) of each body."""
-        low, high = extents(mesh, self.node, self.body, self.count)
+        order = np.argsort(self.body, kind="stable")
+        X, start = mesh.points[self.node[order]], np.flatnonzero(np.diff(self.body[order], prepend=-1))
+        low, high = np.minimum.reduceat(X, start), np.maximum.reduceat(X, start)
         return (low + high) / 2, np.maximum((high - low).max(axis=1), np.finfo(float).tiny)
 
     def described(self, mesh: Mesh) -> tuple[Ints, Ints]:
@@ -52,45 +47,28 @@ class Bodies:
         return np.bincount(self.body, minlength=self.count), mesh.node_ids[first]
 
 
-def extents(mesh: Mesh, node: Ints, group: Ints, count: int) -> tuple[Array, Array]:
-    """Return the lowest and highest coordinates (count, 3) of nodes (k,) by their group (k,)."""
-    low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
-    if len(node):
-        order = np.argsort(group, kind="stable")
-        X, start = mesh.points[node[order]], np.flatnonzero(np.diff(group[order], prepend=-1))
-        there = group[order][start]
-        low[there], high[there] = np.minimum.reduceat(X, start), np.maximum.reduceat(X, start)
-    return low, high
-
-
-def bodies(mesh: Mesh, faces: Faces | None = None) -> Bodies:
+def bodies(mesh: Mesh) -> Bodies:
     """Return the bodies of a mesh: sets of elements that are joined by faces."""
-    body, count = bodies_of_elements(mesh, faces or mesh.all_faces)
-    found = _of_elements(mesh, body, count)
-    while len(pairs := _locked(mesh, found)):
+    faces = mesh.all_faces
+    pairs = np.stack([faces.element[faces.one], faces.element[faces.other]], axis=1)
+    body, count = np.arange(mesh.n_elements), mesh.n_elements
+    while True:
         label = components(count, pairs)
         known = distinct(label)
         body, count = np.searchsorted(known, label)[body], len(known)
-        found = _of_elements(mesh, body, count)
-    return found
+        joined = _of_elements(mesh, body, count)
+        if not len(pairs := _locked(mesh, joined)):
+            return joined
 
 
-def bodies_of_elements(mesh: Mesh, faces: Faces) -> tuple[Ints, int]:
-    """Return the number of the body of each element (m,), and how many bodies there are."""
-    joined = np.stack([faces.element[faces.one], faces.element[faces.other]], axis=1)
-    root = components(mesh.n_elements, joined)
-    is_root = root == np.arange(len(root))
-    return (np.cumsum(is_root) - 1)[root], int(is_root.sum())
-
-
-def _locked(mesh: Mesh, found: Bodies) -> Ints:
+def _locked(mesh: Mesh, connected: Bodies) -> Ints:
     """Return pairs (k, 2), among many bodies, that share three nodes not in a line: neither can turn."""
-    if found.count <= FEW:
+    if connected.count <= FEW:
         return np.zeros((0, 2), dtype=np.int64)
-    one, other, X = found.joined(mesh)
+    one, other, X = connected.joined(mesh)
     if len(one) < 3:
         return np.zeros((0, 2), dtype=np.int64)
-    key = one * found.count + other
+    key = one * connected.count + other
     order = np.argsort(key, kind="stable")
     X, start = X[order], np.flatnonzero(np.diff(key[order], prepend=-1))
     count = np.diff(np.append(start, len(order)))

@@ -35,25 +35,16 @@ TOGETHER = 1e-5
 
 @dataclass(frozen=True, eq=False)
 class FreeMotions:
-    """Rigid motions that supports and constraints leave free, by parts of a model.
+    """Rigid motions that supports and constraints leave free, by parts of a model."""
 
-    Attributes
-    ----------
-    mesh, supports, groups : of the model.
-    bodies, frames : its bodies, their centers (b, 3) and sizes (b,).
-    group_of : (b,) int, the part of each body: bodies that neither nodes nor constraints tie to others.
-    counts : (p,) int, how many free motions each part has.
-    modes : (b, 6, k), what they are of the six modes of each body, 0 beyond their number.
-    """
-
-    mesh: Mesh
+    mesh: Mesh  # of the model
     supports: Supports
     groups: Sequence[ElementGroup]
-    bodies: Bodies
+    bodies: Bodies  # its bodies, their centers (b, 3) and sizes (b,)
     frames: tuple[Array, Array]
-    group_of: Ints
-    counts: Ints
-    modes: Array
+    group_of: Ints  # (b,) int, the part of each body: bodies that neither nodes nor constraints tie to others
+    counts: Ints  # (p,) int, how many free motions each part has
+    modes: Array  # (b, 6, k), what they are of the six modes of each body, 0 beyond their number
 
     @property
     def any(self) -> bool:
@@ -88,9 +79,9 @@ class FreeMotions:
 
     def _by_part(self, values: Array, largest: bool = False) -> Array:
         """Return sum or largest (p, ...) of values ≥ 0 at nodes (n, ...) in each part."""
-        found, used = np.zeros((len(self.counts), *values.shape[1:])), self.part >= 0
-        (np.maximum if largest else np.add).at(found, self.part[used], values[used])
-        return found
+        totals, used = np.zeros((len(self.counts), *values.shape[1:])), self.part >= 0
+        (np.maximum if largest else np.add).at(totals, self.part[used], values[used])
+        return totals
 
     # ---- solutions without them ----------------------------------------------------------------------
 
@@ -172,9 +163,9 @@ class FreeMotions:
     @cached_property
     def _hangs(self) -> Mask:
         """Which bodies (b,) hang on nodes or edges of others."""
-        found = self.bodies
-        at = np.concatenate(found.joined(self.mesh)[:2]) if found.count > 1 else NO_ROWS
-        return np.isin(np.arange(found.count), at)
+        bodies = self.bodies
+        at = np.concatenate(bodies.joined(self.mesh)[:2]) if bodies.count > 1 else NO_ROWS
+        return np.isin(np.arange(bodies.count), at)
 
     @cached_property
     def _is_hinged(self) -> Mask:

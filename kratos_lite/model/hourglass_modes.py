@@ -33,7 +33,7 @@ def hourglass_modes(element: type[KinematicLinear], rule: Rule) -> int:
     X, C = element.shape.nodes, Isotropic3D(E=1.0, nu=0.3).C
     size = DISTORTION * float(np.ptp(X, axis=0).max())
     cells = (X, X + np.random.default_rng(3).uniform(-size, size, X.shape))
-    found = []
+    counts = []
     for cell in cells:
         K = np.asarray(element(cell, rule).stiffness(C))
         if K.shape != (X.size, X.size):
@@ -44,8 +44,8 @@ def hourglass_modes(element: type[KinematicLinear], rule: Rule) -> int:
         if not np.isfinite(K).all():
             return 0  # what is no number is found by other checks
         values = np.linalg.eigvalsh((K + K.T) / 2)
-        found.append(int((values <= NO_ENERGY * np.abs(values).max()).sum()) - 6)
-    return max(0, *found)
+        counts.append(int((values <= NO_ENERGY * np.abs(values).max()).sum()) - 6)
+    return max(0, *counts)
 
 
 def check_rules(mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:

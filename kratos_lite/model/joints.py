@@ -70,17 +70,17 @@ def check_coincident(mesh: Mesh, constraints: Constraints | None = None) -> list
         return []
     X, ids = mesh.points[rows], mesh.node_ids[rows]
     size = max(float(np.ptp(x)) for x in X.T)  # by columns, which is faster
-    found = _nodes_at_one_place(X, ids, 1e-8 * size / len(rows) ** (1 / 3))
-    if found and constraints is not None:
+    coincident = _nodes_at_one_place(X, ids, 1e-8 * size / len(rows) ** (1 / 3))
+    if coincident and constraints is not None:
         ends = constraints.dependents[constraints.owner] // 3, constraints.independents // 3
         pairs = np.unique(np.stack(ends, axis=1), axis=0)
         tied = set(map(frozenset, mesh.node_ids[pairs].tolist()))
-        found = [pair for pair in found if frozenset(pair) not in tied]
-    if not found:
+        coincident = [pair for pair in coincident if frozenset(pair) not in tied]
+    if not coincident:
         return []
-    shown = ", ".join(f"{min(pair)} and {max(pair)}" for pair in found[:3])
-    more = " …" if len(found) > 3 else ""
-    return [f"{len(found)} pairs of nodes coincide ({shown}{more}); they are not joined"]
+    shown = ", ".join(f"{min(pair)} and {max(pair)}" for pair in coincident[:3])
+    more = " …" if len(coincident) > 3 else ""
+    return [f"{len(coincident)} pairs of nodes coincide ({shown}{more}); they are not joined"]
 
 
 def _nodes_at_one_place(X: Array, ids: Ints, tolerance: float) -> list[tuple[int, int]]:

@@ -37,14 +37,14 @@ def check_locking(mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
 
 def _near_half(groups: Sequence[ElementGroup]) -> list[str]:
     """Warn of plain elements with ν near ½; ten-node tetrahedra have sound displacements."""
-    found: dict[str, str] = {}
+    replacements: dict[str, str] = {}
     for kind, C in ((group.element, group.material.C) for group in groups):
         plain = not kind.custom and kind.formulation == "standard"
         if plain and kind.__name__ != "KinematicLinear3D10N" and bulk_over_shear(C) > NEAR_HALF:
-            found[kind.__name__] = better_element(kind, "BBar")
-    if not found:
+            replacements[kind.__name__] = better_element(kind, "BBar")
+    if not replacements:
         return []
-    names, better = ", ".join(sorted(found)), ", ".join(sorted(set(found.values())))
+    names, better = ", ".join(sorted(replacements)), ", ".join(sorted(set(replacements.values())))
     return [f"Poisson's ratio lies so near 0.5 that {names} may lock (come out far too stiff); take {better}"]
 
 

@@ -77,7 +77,7 @@ class MassProperties:
             "mass": (_check_positive(finite(mass, "the mass of a body"), "mass", "kg"), 0),
             "inertia": (J, 2),
             "volume": (_volume(volume), 0),
-            "center": (_with_tail(center, (3,), "the center of a body"), 1),
+            "center": (finite(center, "the center of a body", ("...", 3)), 1),
             "euler": (E, 2),
         }
         try:
@@ -182,7 +182,7 @@ class MassProperties:
         >>> MassProperties.box((0.4, 0.6, 1.0), 1000.0).inertia.diagonal().round(9).tolist()
         [27.2, 23.2, 10.4]
         """
-        sides = _with_tail(sides, (3,), "the sides of a box")
+        sides = finite(sides, "the sides of a box", ("...", 3))
         rho = _check_positive(finite(density, "a density"), "density", "kg/m³")
         volume = _check_positive(sides, "side", "m").prod(axis=-1)
         mass = np.asarray(rho * volume)
@@ -237,7 +237,7 @@ class MassProperties:
         >>> round(float(body.mass), 9), body.center.round(9).tolist()
         (240.0, [0.2, 0.3, 0.5])
         """
-        X = _with_tail(points, (3,), "the points of a mesh")
+        X = finite(points, "the points of a mesh", ("...", 3))
         groups = [group for group in groups if len(group)]
         if not groups:
             raise MeshError("the mesh has no elements, so no volume; a body needs at least one")
@@ -298,14 +298,6 @@ def _volume(value: ArrayLike) -> Array:
     return np.where(unknown, np.nan, _check_positive(known, "volume", "m³"))
 
 
-def _with_tail(value: ArrayLike, tail: tuple[int, ...], what: str) -> Array:
-    """Return finite floats of shape (..., *tail)."""
-    array = finite(value, what)
-    if array.shape[-len(tail) :] != tail:
-        raise InputError(f"{what} must have shape (..., {', '.join(map(str, tail))}); got {array.shape}")
-    return array
-
-
 def _check_positive(value: Array, what: str, unit: str) -> Array:
     if (value <= 0).any():
         raise ModelError(f"the {what} of a body must be > 0 {unit}; got {value.min():g}")
@@ -316,12 +308,12 @@ def _tensors(inertia: ArrayLike | None, euler: ArrayLike | None) -> tuple[Array,
     """Return inertia and Euler tensor, one from the other where only one is given, both checked."""
     if inertia is None and euler is None:
         raise InputError("a body needs its inertia=… or its Euler tensor euler=…, (3, 3) in kg m²")
-    tensor = partial(_with_tail, tail=(3, 3))
+    tensor = partial(finite, shape=("...", 3, 3))
     E = _symmetric(tensor(euler, what="the Euler tensor"), "Euler tensor") if euler is not None else None
     J = _symmetric(tensor(inertia, what="the inertia"), "inertia") if inertia is not None else None
     if E is None:
         assert J is not None
-        E = _trace(J) / 2 - J
+        E = np.trace(J, axis1=-2, axis2=-1)[..., None, None] / 2 * np.eye(3) - J
     elif J is None:
         J = _from_euler(E)
     elif J.shape != E.shape or _differ(J, _from_euler(E)):
@@ -336,11 +328,6 @@ def _tensors(inertia: ArrayLike | None, euler: ArrayLike | None) -> tuple[Array,
             f"{smallest[bad][0]:.3g} kg m²; a body that is not a straight line has three positive ones"
         )
     return J, E
-
-
-def _trace(A: Array) -> Array:
-    """Return tr(A) 1."""
-    return np.asarray(np.trace(A, axis1=-2, axis2=-1)[..., None, None] * np.eye(3))
 
 
 def _from_euler(E: Array) -> Array:

@@ -18,11 +18,7 @@ S = TypeVar("S", bound=Structure)
 
 
 def refined(structure: S, finer: RefinedMesh) -> S:
-    """Return a structure on a finer mesh.
-
-    Parts and predicates choose nodes anew, sets of nodes are those of `RefinedMesh.refined_nodes`; prescribed
-    values and nodal loads are interpolated unless they are functions of places, forces on nodes stay there.
-    """
+    """Return a structure on a finer mesh; what nodes have is interpolated, forces on nodes stay there."""
     if structure.motion is not None:
         raise ModelError(
             "a model whose material moves through the mesh cannot be carried over to a finer one"

@@ -23,8 +23,6 @@ from kratos_lite.typing import Array, Ints
 
 FREE = 1e-7
 """Singular value, as a fraction of the largest and of 1, the size of an equation, of a free mode at most."""
-SAMPLE = 48
-"""Equations for each body that are looked at first: a few of very many show that nothing is free."""
 SOFT = 1e-13
 """Fraction of the largest squared singular value that is added to those of many bodies."""
 PASSES, PROBES = 12, 12
@@ -35,20 +33,20 @@ REST = 1e-6
 
 def free_motions(mesh: Mesh, supports: Supports, groups: Sequence[ElementGroup]) -> FreeMotions:
     """Return the rigid motions that the supports leave free, part by part."""
-    found = bodies(mesh)
-    frames = found.frames(mesh)
-    equations = _equations(mesh, found, supports)
+    connected = bodies(mesh)
+    frames = connected.frames(mesh)
+    equations = _equations(mesh, connected, supports)
     group_of = _groups(len(frames[0]), equations)
     members, their_equations = _by_group(group_of, equations)
     free = [
         (_free_modes if len(group) <= FEW else _free_modes_of_many)(mesh, frames, group, some)
         for group, some in zip(members, their_equations, strict=True)
     ]
-    counts = np.array([one.shape[2] for one in free], dtype=np.int64)
+    counts = np.array([free_modes.shape[2] for free_modes in free], dtype=np.int64)
     modes = np.zeros((len(group_of), 6, int(counts.max(initial=0))))
-    for group, one in zip(members, free, strict=True):
-        modes[group, :, : one.shape[2]] = one
-    return FreeMotions(mesh, supports, groups, found, frames, group_of, counts, modes)
+    for group, free_modes in zip(members, free, strict=True):
+        modes[group, :, : free_modes.shape[2]] = free_modes
+    return FreeMotions(mesh, supports, groups, connected, frames, group_of, counts, modes)
 
 
 @dataclass(frozen=True)
@@ -65,9 +63,9 @@ class _Constraints:
         return _Constraints(self.row[rows], self.dof[rows], self.body[rows], self.weight[rows])
 
 
-def _equations(mesh: Mesh, found: Bodies, supports: Supports) -> _Constraints:
+def _equations(mesh: Mesh, connected: Bodies, supports: Supports) -> _Constraints:
     """Return fixed components, constraints, and the equal motion of bodies where they are joined."""
-    part, (node, second) = found.part, found.joints
+    part, (node, second) = connected.part, connected.joints
     row, dof, weight = supports.constraint_rows()
     body = part[dof // 3]
     first = int(row.max(initial=-1)) + 1
@@ -89,8 +87,6 @@ def _equations(mesh: Mesh, found: Bodies, supports: Supports) -> _Constraints:
 
 def _groups(n_bodies: int, equations: _Constraints) -> Ints:
     """Return for each body (b,) the number of its group: bodies that equations tie together."""
-    if n_bodies == 1:
-        return np.zeros(1, dtype=np.int64)
     order = np.argsort(equations.row, kind="stable")
     row, body = equations.row[order], equations.body[order]
     tied = (row[1:] == row[:-1]) & (body[1:] != body[:-1])
@@ -114,32 +110,13 @@ def _free_modes(mesh: Mesh, frames: tuple[Array, Array], group: Ints, equations:
 
     A rotation is scaled with the size of its body, so that all modes move points about as far.
     """
-    rows = distinct(equations.row)
-    row = np.searchsorted(rows, equations.row)
-    if len(rows) > 2 * SAMPLE * len(group):
-        count = SAMPLE * len(group)
-        chosen = np.linspace(0, len(rows) - 3, count).astype(np.int64) + np.arange(count) % 3
-        some = np.full(len(rows), -1)
-        some[chosen] = np.arange(count)
-        sample = np.flatnonzero(some[row] >= 0)
-        least = _spectrum(mesh, frames, group, equations.take(sample), some[row[sample]])[0].min()
-        # further equations lift the smallest value; the largest is at most the root of all squares
-        if least > 2 * FREE * (6 * len(group) * len(rows)) ** 0.5:
-            return np.zeros((len(group), 6, 0))
-    values, directions = _spectrum(mesh, frames, group, equations, row)
-    free = directions[values <= FREE * values.max(initial=1.0)].T
-    return free.reshape(len(group), 6, -1)
-
-
-def _spectrum(
-    mesh: Mesh, frames: tuple[Array, Array], group: Ints, equations: _Constraints, row: Ints
-) -> tuple[Array, Array]:
-    """Return singular values and right singular vectors of equations, by number `row`, on rigid modes."""
+    row = np.searchsorted(distinct(equations.row), equations.row)
     C = np.zeros((int(row.max(initial=-1)) + 1, 6 * len(group)))
     np.add.at(C, (row[:, None], _columns(group, equations)), _on_modes(mesh, frames, equations))
     triangle = np.linalg.qr(np.vstack([C, np.zeros((C.shape[1], C.shape[1]))]), mode="r")
     _, values, directions = np.linalg.svd(triangle)
-    return values, directions
+    free = directions[values <= FREE * values.max(initial=1.0)].T
+    return free.reshape(len(group), 6, -1)
 
 
 def _columns(group: Ints, equations: _Constraints) -> Ints:

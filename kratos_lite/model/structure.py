@@ -79,7 +79,7 @@ class Structure(Tabular):
         material: LinearMaterial | Mapping[Any, LinearMaterial] | None = None,
         formulation: str | None = None,
     ) -> None:
-        self._mesh = checks.checked_mesh(mesh)
+        self._mesh = instance(mesh, "a mesh", Mesh, "kl.box()")
         self._materials: list[LinearMaterial] = []
         self._material_of = np.full(mesh.n_elements, -1)
         self._rules: dict[int, Rule | int] = {}
@@ -526,12 +526,12 @@ class Structure(Tabular):
         """
         named = self.named_loads
         wanted = named.get(load) if isinstance(load, str) else load
-        place = _place(self.loads, wanted)
-        if place is None:
+        places = [i for i, other in enumerate(self.loads) if wanted in (other, getattr(other, "load", other))]
+        if not places:
             names = f"; the names are {', '.join(named)}" if named else "; none has a name"
             hint = nearest(load, named) if isinstance(load, str) else ""
             raise ModelError(f"there is no load {load!r}{names}.{hint}")
-        del self.loads[place]
+        del self.loads[places[-1]]
 
     # ---- checks -------------------------------------------------------------------------------
 
@@ -636,9 +636,3 @@ CHECKS: tuple[Callable[[Structure, Sequence[ElementGroup]], list[str]], ...] = (
     lambda model, groups: [text for load in model.loads for text in load.warnings(model.mesh, groups)],
 )
 """What is checked of each model with sound cells: a check returns warnings, or raises an error."""
-
-
-def _place(loads: list[Load], wanted: object) -> int | None:
-    """Return where a load stands in a list, the last one if it does several times, or None."""
-    found = [i for i, load in enumerate(loads) if wanted in (load, getattr(load, "load", load))]
-    return found[-1] if found else None

@@ -26,11 +26,7 @@ CONSTANT = -1
 
 
 def axis_numbers(axes: str) -> list[int]:
-    """Return the axis numbers of a word such as ``"xz"``.
-
-    >>> axis_numbers("xz")
-    [0, 2]
-    """
+    """Return the axis numbers of a word such as ``"xz"``."""
     known = isinstance(axes, str) and axes and set(axes) <= set(AXES)
     if not known or len(set(axes)) != len(axes):
         raise InputError(f"axes must be some of x, y, z, each once, such as 'xz'; got {axes!r}")
@@ -39,27 +35,16 @@ def axis_numbers(axes: str) -> list[int]:
 
 @dataclass(frozen=True, eq=False)
 class DirichletCondition:
-    """One call of `Structure.fix` or `Structure.release`, from which a refined mesh is supported alike.
+    """One call of `Structure.fix` or `Structure.release`, from which a refined mesh is supported alike."""
 
-    Attributes
-    ----------
-    where, nodes : the nodes as the caller chose them, and their indices.
-    axes : such as ``"xz"``.
-    value : m; as the caller gave it, or a function of time in s.
-    field : function of places, or None.
-    override : whether it replaces earlier ones.
-    name : of the support, or None.
-    released : whether the nodes are released along the axes instead.
-    """
-
-    where: Where
+    where: Where  # the nodes as the caller chose them, and their indices
     nodes: Ints
-    axes: str
-    value: ArrayLike | Callable[[float], float] = 0.0
-    field: Callable[[Array], ArrayLike] | None = None
-    override: bool = False
-    name: str | None = None
-    released: bool = False
+    axes: str  # such as ``"xz"``
+    value: ArrayLike | Callable[[float], float] = 0.0  # m; as the caller gave it, or a function of time in s
+    field: Callable[[Array], ArrayLike] | None = None  # function of places, or None
+    override: bool = False  # whether it replaces earlier ones
+    name: str | None = None  # of the support, or None
+    released: bool = False  # whether the nodes are released along the axes instead
 
     def __str__(self) -> str:
         where = self.where if isinstance(self.where, str) else f"{len(self.nodes)} nodes"

@@ -255,26 +255,6 @@ def test_highest_frequencies_of_the_reference_cells():
     assert finite_strain.highest_frequency(points, groups, lumped=True) == pytest.approx(2.5**0.5, rel=1e-12)
 
 
-def test_critical_step_of_a_spinning_box():
-    """2/ω of the box 0.4 x 0.6 x 1 m in one element, and a bound of it in eight."""
-    material, critical = Isotropic3D(1e6, 0.3, 1000.0), {1: 0.010115, 2: 0.0053560}
-    steps = {}
-    for n in critical:
-        model = kl.Model(kl.box((0.4, 0.6, 1.0), (n, n, n)), material)
-        steps[n] = 2 / finite_strain.highest_frequency(model.mesh.points, model.element_groups(), lumped=True)
-    assert steps[1] == pytest.approx(critical[1], rel=5e-5)
-    assert 0.9 * critical[2] < steps[2] <= critical[2]
-
-
-def test_boxes_need_one_eigenproblem():
-    model = kl.Model(kl.box((0.1, 0.1, 1.0), (2, 2, 20), element="KinematicLinear3D8N"), UNIT)
-    points, (group,) = model.mesh.points, model.element_groups()
-    assert len(finite_strain._distinct(points, group)) == 1
-    bound = finite_strain.highest_frequency(points, [group])
-    alone = finite_strain.highest_frequency(points, [group], np.zeros_like(points))
-    assert bound == pytest.approx(alone, rel=1e-10)
-
-
 def test_frequency_needs_a_density():
     model = kl.Model(kl.box(), Isotropic3D(1.0, 0.3))
     with pytest.raises(MaterialError, match="density > 0"):

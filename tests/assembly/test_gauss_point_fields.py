@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from computing import compiled, printed, same_on_all_threads
 from meshes import changed_at, joined, with_block
-from rounding import all_close, close
+from rounding import all_close
 
 import kratos_lite as kl
 from kratos_lite.assembly import element_groups, mass_and_convection, nodal_values
@@ -137,38 +137,7 @@ def test_elements_of_others_are_computed_by_the_kernels(monkeypatch):
     assert fields.at_gauss(points, group, points).shape == (12, 27, 6)
 
 
-def test_an_element_with_its_own_B_takes_it():
-    with ELEMENTS.temporary():
-
-        class Doubled8N(KinematicLinear3D8N):
-            def B(self, xi):
-                return 2 * super().B(xi)
-
-    points, group = batch_of(Doubled8N)
-    _, usual = batch_of(KinematicLinear3D8N)
-    u = 1e-3 * points**2
-    for stress in (True, False):
-        twice, once = (fields.at_gauss(points, g, u, stress=stress) for g in (group, usual))
-        close(twice, 2 * once, 1e-13)
-        both = (nodal_values.averages(points, [g], u, 12, stress=stress) for g in (group, usual))
-        for a, b in zip(*both, strict=True):
-            close(a, 2 * b, 1e-13)
-    assert fields.totals(points, [group], u)[0] == pytest.approx(4 * fields.totals(points, [usual], u)[0])
-    close(*(fields.internal_load(points, [g], n * u) for g, n in ((group, 1), (usual, 4))), 1e-12)
-
-
 # ---- exact values ----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_volume_weight_and_mass_of_a_box(name):
-    mesh = kl.box(size=(3.0, 2.0, 2.0), cells=(3, 2, 2), element=name)
-    groups = kl.Model(mesh, SOIL).element_groups()
-    total = sum(fields.volumes(mesh.points, group).sum() for group in groups)
-    assert total == pytest.approx(12.0, rel=1e-14)
-    assert mass_and_convection.lumped_mass(mesh.points, groups).sum() == pytest.approx(12 * 7620.0, rel=1e-13)
-    weight = kl.Gravity((0.0, 0.0, -9.81)).forces(mesh, groups)
-    np.testing.assert_allclose(weight.sum(axis=0), [0, 0, -12 * 7620.0 * 9.81], rtol=1e-13, atol=1e-9)
 
 
 def test_nodal_values_of_a_uniform_strain_are_that_strain_however_many_elements_share_a_node():

@@ -13,10 +13,9 @@ from kratos_lite.assembly.patches import patches
 from kratos_lite.assembly.polynomial_fit import Lists, Samples, fit, lists
 from kratos_lite.assembly.recovery import Recovery, sampling
 from kratos_lite.mesh.refinement import refine
-from kratos_lite.verification import fields, scenes
+from kratos_lite.verification import scenes
 from kratos_lite.verification.errors import errors
 from kratos_lite.verification.meshes import element, split, warped
-from kratos_lite.verification.pressure import cylinder
 
 KINDS = ("4N", "5N", "6N", "8N", "10N", "13N", "15N", "20N", "27N")
 STEEL = kl.Isotropic3D(E=210e9, nu=0.3)
@@ -77,14 +76,6 @@ def test_a_linear_displacement_has_constant_recovered_strain_and_stress(kind):
     assert np.abs(result.stress("node") - strain @ STEEL.C).max() < 1e-12 * 210e9
     assert result.error().relative < 1e-9
     assert not result.error().warnings
-
-
-def test_bending_is_recovered_exactly_by_quadratic_elements():
-    scene = scenes.bending("20N", 2)
-    result = scene.model.solve()
-    exact = np.zeros((result.mesh.n_nodes, 6))
-    exact[:, 0] = 0.01 * result.mesh.points[:, 1]
-    assert np.abs(result.stress("node") - exact).max() < 1e-10
 
 
 def test_meshes_of_several_shapes_recover_linear_fields():
@@ -155,14 +146,6 @@ def test_materials_are_recovered_apart_and_an_interface_has_their_mean():
     assert np.abs(averaged[np.abs(z - 1) < 1e-9] - (low + high) / 2).max() < 1e-9 * low.max()
 
 
-def test_stress_of_each_material_at_its_interface():
-    result = two_materials().solve()
-    found = Recovery(result.mesh, result.groups)
-    values = [nodal[:, 0] for _, nodal in found.by_region(result.u)]
-    assert [v.max() - v.min() < 1e-6 * v.max() for v in values] == [True, True]
-    assert values[0][0] > 2 * values[1][0]
-
-
 def test_prestress_is_in_recovered_stress_and_not_in_the_error():
     model = kl.Model(kl.box(cells=(3, 3, 3)), STEEL)
     model.add_prestress(np.random.default_rng(3).uniform(-1e6, 1e6, (27, 6)))
@@ -209,21 +192,6 @@ def test_recovered_hoop_stress_of_a_sphere_is_closer_than_averaged(kind, n, most
         error[place] = np.array([off.mean(), off.max()])
     assert (error["node"] < (most, worst)).all()
     assert (error["averaged"] > error["node"] * (1.5, 1.2)).all()
-
-
-@pytest.mark.parametrize("kind", ["8N", "EnhancedStrain3D8N", "20N", "27N"])
-def test_recovered_stress_is_closer_than_averaged_at_nodes_of_a_cylinder_of_one_layer(kind):
-    """Lame's cylinder: σ_rr + σ_φφ = 2 / 3 everywhere, σ_rr = -1 on the inner surface."""
-    result = cylinder(kind).solve()
-    x, y, _ = result.mesh.points.T
-    inner = np.abs(np.hypot(x, y) - 1) < 1e-9
-    error = {}
-    for place in ("node", "averaged"):
-        xx, yy, _, xy, *_ = result.stress(place).T
-        radial = (xx * x**2 + yy * y**2 + 2 * xy * x * y) / (x**2 + y**2)
-        off = np.abs(xx + yy - 2 / 3), np.abs(radial + 1)[inner]
-        error[place] = np.array([part.mean() for part in off])
-    assert (error["node"] < error["averaged"])[: 2 if kind in ("8N", "EnhancedStrain3D8N") else 1].all()
 
 
 # ---- patches ------------------------------------------------------------------------------------------
@@ -282,7 +250,7 @@ def test_linear_fields_are_recovered_beside_hanging_nodes(kind):
 def compared(scene):
     result = scene.model.solve()
     found = Recovery(result.mesh, result.groups)
-    return [found.nodal(result.u), *found.squared_errors(result.u, result.mesh.n_elements)]
+    return [found.nodal(result.u), *found.products(result.u, result.u, result.mesh.n_elements)]
 
 
 @pytest.mark.parametrize(
@@ -296,23 +264,11 @@ def test_kernels_agree_with_numpy(kind, n, request):
         assert np.abs(one - other).max() < 1e-10 * np.abs(other).max()
 
 
-@pytest.mark.parametrize("kind", ["4N", "8N", "20N"])
-def test_patches_of_kernels_are_those_of_numpy(kind, request):
-    compiled = region_of(warped(kind, 4)).patches
-    request.getfixturevalue("numpy_alone")
-    reference = region_of(warped(kind, 4)).patches
-    assert compiled.wide.tolist() == reference.wide.tolist()
-    for one, other in ((compiled.elements, reference.elements), (compiled.of, reference.of)):
-        assert one.start.tolist() == other.start.tolist()
-        assert one.entries.tolist() == other.entries.tolist()
-    assert np.abs(compiled.weights - reference.weights).max() < 1e-14
-
-
 @pytest.mark.parametrize("kind", ["8N", "10N"])
 def test_error_of_a_product_is_the_square_where_both_are_one(kind):
     result = scenes.manufactured(kind, 2).model.solve()
     found, m = Recovery(result.mesh, result.groups), result.mesh.n_elements
-    both = zip(found.squared_errors(result.u, m), found.products(result.u, 2 * result.u, m), strict=True)
+    both = zip(found.products(result.u, result.u, m), found.products(result.u, 2 * result.u, m), strict=True)
     for squares, products in both:
         assert np.abs(products - 2 * squares).max() < 1e-12 * squares.max()
 
@@ -346,9 +302,9 @@ def test_results_do_not_depend_on_the_number_of_threads():
         scenes.manufactured("20N", 4, 0.1),
         scenes.manufactured("10N", 4),
         scenes.manufactured("EnhancedStrain3D8N", 6),
-        *(scenes.sphere(kind, 4) for kind in ("8N", "20N", "15N")),
-        *(scenes.cavity(*case) for case in (("8N", 6), ("10N", 4))),
-        *(scenes.l_domain(*case) for case in (("8N", 8), ("20N", 6), ("27N", 6))),
+        *(scenes.sphere(kind, 4) for kind in ("8N", "15N")),
+        scenes.cavity("10N", 4),
+        *(scenes.l_domain(*case) for case in (("8N", 8), ("27N", 6))),
     ],
     ids=lambda scene: f"{scene.name}-{scene.kind}",
 )
@@ -359,10 +315,12 @@ def test_the_reported_error_is_between_the_true_one_and_twice_that(scene):
 
 
 def test_parts_of_the_elements_add_up_to_the_whole():
-    error = scenes.sphere("8N", 3).model.solve().error()
+    result = scenes.sphere("8N", 3).model.solve()
+    error = result.error()
     assert np.linalg.norm(error.per_element) == pytest.approx(error.absolute)
     assert error.per_element.shape == (81,)
     assert "in the energy norm" in str(error)
+    assert "energy norm" in dict(result.table())["estimated error"]
 
 
 @pytest.mark.parametrize(
@@ -375,15 +333,6 @@ def test_parts_of_the_elements_add_up_to_the_whole():
 )
 def test_warnings_name_what_speaks_against_the_estimate(scene, words):
     assert any(words in text for text in scene().model.solve().error().warnings)
-
-
-def test_no_warning_where_the_estimate_is_good():
-    assert scenes.manufactured("8N", 5).model.solve().error().warnings == []
-
-
-def test_the_table_shows_the_error():
-    rows = dict(scenes.sphere("20N", 2).model.solve().table())
-    assert "energy norm" in rows["estimated error"]
 
 
 def test_a_model_without_load_has_no_error():
@@ -401,11 +350,3 @@ def test_nodes_without_elements_have_no_stress():
     model.fix(lambda X: X[:, 2] < 0.1)
     model.add(kl.PointLoad(lambda X: (X[:, 2] > 0.9) & (X[:, 0] < 2), (0, 0, 1.0)))
     assert (model.solve().stress("node")[-1] == 0).all()
-
-
-def test_exact_stresses_of_the_sphere():
-    """The field of the scene has the hoop stress that a test above compares with."""
-    C = scenes.UNIT.C
-    X = np.array([[1.0, 0.0, 0.0]])
-    stress = voigt.symmetric_gradient(fields.gradient(fields.hollow_sphere(1.0, 0.3, 1.0, 2.0, 1.0), X)) @ C
-    assert stress[0, 1] == pytest.approx(5 / 7, rel=1e-6)

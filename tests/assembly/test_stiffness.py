@@ -88,15 +88,6 @@ def test_nodes_that_are_not_there_are_refused(wrong):
         MODULE.pattern(10, [np.array([[0, 1, 2, wrong]], np.int32)])
 
 
-def test_positions_are_where_the_pairs_are():
-    points, groups = scene("KinematicLinear3D10N")
-    pattern = pattern_of(points, groups)
-    rows = np.repeat(np.arange(len(points)), np.diff(pattern.indptr))
-    (places,), nodes = pattern.positions, groups[0].nodes
-    np.testing.assert_array_equal(rows[places], np.broadcast_to(nodes[:, :, None], places.shape))
-    np.testing.assert_array_equal(pattern.indices[places], np.broadcast_to(nodes[:, None, :], places.shape))
-
-
 # ---- stiffness -------------------------------------------------------------------------------
 
 
@@ -136,33 +127,6 @@ def test_an_element_of_a_user_with_seven_nodes(path):
         group = ElementGroup(element, element.rule, STEEL, tens.nodes[:, :7], tens.rows)
         assert not element.custom
         assert_sum(points, [group])
-
-
-def test_an_element_class_with_a_local_system_of_its_own(path):
-    with ELEMENTS.temporary():
-
-        class Doubled(ELEMENTS["KinematicLinear3D8N"]):
-            def local_system(self, C, u):
-                K, r = super().local_system(C, u)
-                return 2 * K, 2 * r
-
-        points, (group,) = scene("KinematicLinear3D8N", distortion=0.02)
-        plain, doubled = (
-            ElementGroup(element, group.rule, STEEL, group.nodes[rows], group.rows[rows])
-            for element, rows in ((group.element, slice(0, 5)), (Doubled, slice(5, None)))
-        )
-        K = assert_sum(points, [plain, doubled])
-        once = assemble_stiffness(points, [group], pattern_of(points, [group]))
-        assert np.abs(K.data).max() > 1.5 * np.abs(once.data).max()
-
-
-def test_progress_ends_at_one(path):
-    points, groups = scene("KinematicLinear3D8N")
-    seen = []
-    assemble_stiffness(
-        points, groups, pattern_of(points, groups), lambda name, share: seen.append((name, share))
-    )
-    assert seen[-1] == ("assemble", 1.0)
 
 
 @compiled

@@ -130,7 +130,7 @@ WRONG = [
     (lambda b: setattr(b, "tolerance", float("nan")), "a tolerance must be finite"),
     (lambda b: setattr(b, "tolerance", -1.0), "a tolerance must be one number"),
     (lambda b: type(b)(b.mesh, b.material, integrator=""), "the integrators of a"),
-    (lambda b: type(b)("box.msh", b.material), "a Mesh is needed"),
+    (lambda b: type(b)("box.msh", b.material), "a mesh must be a Mesh, such as"),
     (lambda b: b.angular_momentum((1, 2)), r"three components|shape"),
 ]
 
@@ -163,7 +163,7 @@ def test_a_form_is_named():
 
 
 def test_a_fixed_body_has_a_mesh_and_stays_one():
-    with pytest.raises(InputError, match="a Mesh is needed"):
+    with pytest.raises(InputError, match="a mesh must be a Mesh, such as"):
         kl.FixedBody(None)
     with pytest.raises(ModelError, match="a fixed body has no mass"):
         kl.convert(kl.FixedBody(kl.box(), RUBBER), kl.RigidBody)

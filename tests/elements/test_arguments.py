@@ -11,7 +11,6 @@ MESH = kl.box((1, 1, 1), (2, 2, 1))
 MANY = kl.KinematicLinear3D8N(
     MESH.points[MESH.blocks[0].nodes] + 0.01 * np.sin(np.arange(96.0)).reshape(4, 8, 3)
 )
-ONE = kl.KinematicLinear3D8N(MANY.X[0])
 
 
 @pytest.mark.parametrize("name", ["N", "dN", "J", "detJ", "dNdX", "B", "position"])
@@ -29,11 +28,6 @@ def test_a_method_takes_one_point_or_many(kind, name):
             single = getattr(cells, name)(xi[at], *C)
             assert found.shape == (*lead, 2, 5, *single.shape[len(lead) :])
             np.testing.assert_allclose(found[(*(slice(None),) * len(lead), *at)], single, rtol=0, atol=1e-13)
-
-
-def test_B_at_all_gauss_points_is_that_of_the_points_of_the_rule():
-    np.testing.assert_allclose(MANY.B(MANY.rule.points + 0), MANY.B(MANY.rule.points), rtol=0, atol=1e-13)
-    np.testing.assert_allclose(MANY.detJ(MANY.rule.points) * MANY.rule.weights, MANY.dV, rtol=0, atol=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -80,9 +74,3 @@ def test_nodes_that_are_not_places_are_refused(X):
 def test_a_family_without_shape_is_no_element():
     with pytest.raises(kl.InputError, match="KinematicLinear states no shape and rule"):
         kl.KinematicLinear(np.zeros((8, 3)))
-
-
-def test_a_rule_gives_its_points_by_number():
-    for g, (xi, weight) in enumerate(ONE.rule):
-        assert ONE.rule[g][0].tolist() == xi.tolist()
-        assert ONE.rule[g][1] == weight

@@ -5,7 +5,6 @@ import pickle
 
 import numpy as np
 import pytest
-from meshes import joined
 
 import kratos_lite as kl
 
@@ -66,15 +65,6 @@ def test_boundary_of_a_box_has_its_area_outward(element):
     for block, vectors in zip(mesh.boundary, area, strict=True):
         outward = mesh.points[block.nodes].mean(axis=1) - [0.5, 1.0, 1.5]
         assert ((vectors.sum(axis=1) * outward).sum(axis=1) > 0).all()
-
-
-def test_faces_between_different_cells_are_inside():
-    wedges, bricks = kl.box(element="KinematicLinear3D6N"), kl.box(origin=(1, 0, 0))
-    mesh = joined(wedges, bricks, welded=True)
-    assert sorted((block.name, len(block)) for block in mesh.boundary) == [
-        ("Quadrilateral4", 8),
-        ("Triangle3", 4),
-    ]
 
 
 def test_parts_are_given_by_places_and_written_by_their_names(tmp_path):

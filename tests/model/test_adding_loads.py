@@ -34,22 +34,8 @@ def test_a_load_on_a_misspelt_part_is_refused_where_it_is_added_with_a_suggestio
     assert not len(model.loads)
 
 
-def test_sides_are_suggested_too():
-    with pytest.raises(kl.MeshError, match=r"no part .*Did you mean x\+"):
-        kl.Model(kl.Mesh(kl.box().points, kl.box().blocks), STEEL).add(kl.Traction("X+", UP))
-
-
 def test_rows_that_do_not_exist_are_refused_where_they_are_added():
     model = a_model()
     for load in (kl.PointLoad([3, 99], UP), kl.Traction(np.array([1, 99]), UP), kl.Gravity(UP, [7])):
         with pytest.raises(kl.MeshError, match="must lie in 0"):
             model.add(load)
-
-
-def test_a_load_of_ones_own_is_added_as_it_is():
-    class Own(kl.NodalForces):
-        where = None
-
-    model = a_model()
-    model.add(Own(np.ones((12, 3))))
-    assert len(model.loads) == 1

@@ -35,7 +35,14 @@ def hold(model, corner):
     model.fix(lambda X: ((X >= lower - 0.1) & (X <= lower + 1.1)).all(axis=1), "xyz")
 
 
-@pytest.mark.parametrize("n", [30, 400, 1000])
+def test_a_chain_on_corners_can_turn_about_all_axes():
+    model = staircase(500, (1, 1, 1))
+    hold(model, (0, 0, 0))
+    with pytest.raises(kl.ModelError, match=r"can still move: rotation about x, y, z \(it hangs"):
+        model.check()
+
+
+@pytest.mark.parametrize("n", [30, 400])
 def test_a_chain_on_edges_can_turn_about_them(n):
     model = staircase(n)
     hold(model, (0, 0, 0))
@@ -45,21 +52,6 @@ def test_a_chain_on_edges_can_turn_about_them(n):
     first, second, *_ = str(error.value).split("; the part")
     assert "can still move: rotation about y (it hangs on a node or an edge only)" in first
     assert "can still move: translation (-1 0 1); rotation about y (it hangs" in second
-
-
-@pytest.mark.parametrize("n", [30, 500])
-def test_a_chain_on_corners_can_turn_about_all_axes(n):
-    model = staircase(n, (1, 1, 1))
-    hold(model, (0, 0, 0))
-    with pytest.raises(kl.ModelError, match=r"can still move: rotation about x, y, z \(it hangs"):
-        model.check()
-
-
-def test_a_chain_that_nothing_holds_can_move_as_a_whole():
-    model = staircase(400)
-    model.fix(0, "xyz")
-    with pytest.raises(kl.ModelError, match=r"the part of node 1 \(8 nodes\) can still move: rotation"):
-        model.check()
 
 
 @pytest.mark.parametrize("step", [(1, 0, 1), (1, 1, 1)])

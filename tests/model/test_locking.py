@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from meshes import joined
 
 import kratos_lite as kl
 
@@ -86,18 +85,3 @@ def test_plain_elements_near_incompressibility_are_pointed_to_better_ones(elemen
     text = warnings((1, 1, 1), (2, 2, 2), element, RUBBER)[0]
     assert f"{element} may lock" in text
     assert text.endswith(f"take {better}")
-
-
-def test_bodies_far_apart_are_looked_at_one_by_one():
-    model = kl.Model(joined(kl.box(element=PLAIN), kl.box(element=PLAIN, origin=(20, 0, 0))), STEEL)
-    model.fix("z-")
-    assert model.check() == []
-
-
-def test_the_forecast_stands_in_the_report_and_in_the_table():
-    model = kl.Model(kl.box((10, 1, 0.1), (10, 1, 1), PLAIN), STEEL)
-    model.fix("x-")
-    model.add(kl.Traction("x+", (0, 0, 1.0)))
-    result = model.solve()
-    assert any("too stiff in bending" in text for text in result.report.warnings)
-    assert any(label == "warning" and "EnhancedStrain3D8N" in text for label, text in result.table())

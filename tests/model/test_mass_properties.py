@@ -8,16 +8,12 @@ from meshes import four_cells
 
 import kratos_lite as kl
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.bodies.rotations import exp
 from kratos_lite.elements import ELEMENTS
-from kratos_lite.elements.exact_rules import exact_rule
 from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.model.mass_properties import MassProperties
-from kratos_lite.quadrature import rule_for
 from kratos_lite.shapes.faces import FACE_SHAPES
 
 NAMES = [f"KinematicLinear3D{n}N" for n in (4, 5, 6, 8, 10, 13, 15, 20, 27)]
-TURN = exp([0.3, -0.8, 0.5])
 
 each_element = pytest.mark.parametrize("name", NAMES)
 
@@ -71,17 +67,6 @@ def assert_same(one, other, rtol=1e-12, atol=0.0):
         np.testing.assert_allclose(a, b, rtol=rtol, atol=atol + rtol * np.abs(b).max(), err_msg=name)
 
 
-def moved(body, A, shift):
-    """Return what a body of uniform density becomes under X -> A X + shift."""
-    det = np.linalg.det(A)
-    return MassProperties(
-        mass=body.mass * det,
-        volume=body.volume * det,
-        center=A @ body.center + shift,
-        euler=det * A @ body.euler @ A.T,
-    )
-
-
 # ---- closed forms ----------------------------------------------------------------------------------
 
 
@@ -91,26 +76,6 @@ def test_a_box_of_any_element_has_the_moments_of_a_box(name):
     body = of_mesh(mesh, density=1000.0)
     assert_same(body, MassProperties.box((0.4, 0.6, 1.0), 1000.0), atol=1e-14)
     np.testing.assert_allclose(body.euler, np.diag([3.2, 7.2, 20.0]), rtol=1e-13, atol=1e-13)
-
-
-@each_element
-def test_a_sheared_and_turned_box(name):
-    A = TURN @ [[1, 0.3, -0.2], [0, 1, 0.4], [0, 0, 1]]
-    shift = np.array([3.0, -1.0, 2.0])
-    mesh = kl.box((1.0, 2.0, 3.0), element=name, origin=(-0.5, -1.0, -1.5))
-    mesh = mesh.replace(points=mesh.points @ A.T + shift)
-    assert_same(of_mesh(mesh), moved(MassProperties.box((1.0, 2.0, 3.0), 7.0), A, shift))
-
-
-def test_a_tetrahedron_by_its_corners():
-    X = np.random.default_rng(3).uniform(-1, 1, (4, 3))
-    X = X if np.linalg.det(X[1:] - X[0]) > 0 else X[[0, 2, 1, 3]]
-    volume = np.linalg.det(X[1:] - X[0]) / 6
-    A = X - X.mean(axis=0)
-    expected = MassProperties(
-        7 * volume, volume=volume, center=X.mean(axis=0), euler=7 * volume / 20 * A.T @ A
-    )
-    assert_same(of_cell("KinematicLinear3D4N", X), expected)
 
 
 @each_element
@@ -126,24 +91,6 @@ def test_distorted_cells_as_by_the_divergence_theorem(name):
             euler=7 * (second - volume * np.outer(center, center)),
         )
         assert_same(of_cell(name, X), expected)
-
-
-@pytest.mark.parametrize("name", [name for name in NAMES if not name.endswith("3D5N")])
-def test_the_rule_has_no_degree_to_spare(name):
-    """One point less per direction is not exact, but for five nodes, where terms of det J cancel."""
-    shape, X = ELEMENTS[name].shape, distorted(name, size=0.2)
-    X = X - X.mean(axis=0)
-
-    def second(rule):
-        total = np.zeros((3, 3))
-        for xi, weight in rule:
-            x = shape.N(xi) @ X
-            total += weight * np.linalg.det(X.T @ shape.dN(xi)) * np.outer(x, x)
-        return total
-
-    degree, exact = exact_rule(shape, 2).degree, second(rule_for(shape.cell, 14))
-    np.testing.assert_allclose(second(exact_rule(shape, 2)), exact, rtol=0, atol=1e-13 * np.abs(exact).max())
-    assert np.abs(second(rule_for(shape.cell, degree - 2)) - exact).max() > 1e-10 * np.abs(exact).max()
 
 
 def test_a_ball_of_curved_elements_converges_with_the_fourth_power():
@@ -168,7 +115,9 @@ def test_a_mixed_mesh_with_a_density_per_block_is_the_sum_of_its_cells():
     mesh = four_cells()
     points, cells = mesh.points, {block.name: block.nodes[0] for block in mesh.blocks}
     densities = dict(zip(cells, (1.0, 20.0, 3.0, 400.0), strict=True))
-    body = MassProperties.of(points, [group(name, nodes, densities[name]) for name, nodes in cells.items()])
+    groups = [group(name, nodes, densities[name]) for name, nodes in cells.items()]
+    empty = replace(groups[0], nodes=groups[0].nodes[:0], rows=groups[0].rows[:0])
+    body = MassProperties.of(points, [empty, *groups])
     alone = [of_cell(name, points[nodes], densities[name]) for name, nodes in cells.items()]
     mass = sum(part.mass for part in alone)
     center = sum(part.mass * part.center for part in alone) / mass
@@ -179,37 +128,12 @@ def test_a_mixed_mesh_with_a_density_per_block_is_the_sum_of_its_cells():
     assert_same(body, MassProperties(mass, volume=volume, center=center, euler=euler))
 
 
-def test_the_center_is_that_of_the_mass_not_of_the_volume():
-    mesh = kl.box((2.0, 1.0, 1.0), cells=(2, 1, 1))
-    nodes = mesh.blocks[0].nodes
-    name = "KinematicLinear3D8N"
-    body = MassProperties.of(mesh.points, [group(name, nodes[:1], 1.0), group(name, nodes[1:], 3.0)])
-    assert (float(body.mass), float(body.volume)) == pytest.approx((4.0, 2.0), rel=1e-14)
-    np.testing.assert_allclose(body.center, [1.25, 0.5, 0.5], rtol=1e-14)
-    np.testing.assert_allclose(body.euler[0, 0], 4 / 12 + 1 * 0.75**2 + 3 * 0.25**2, rtol=1e-14)
-
-
-def test_a_batch_without_elements_does_not_count():
-    points, full = four_cells().points, group("KinematicLinear3D8N", range(8))
-    empty = replace(full, nodes=full.nodes[:0], rows=full.rows[:0])
-    assert_same(MassProperties.of(points, [empty, full]), MassProperties.of(points, [full]))
-
-
 @each_element
 def test_a_body_far_away_loses_only_what_its_coordinates_lose(name):
     X = np.round(distorted(name) * 2**20) / 2**20  # 20 bits: the same at 1e6 m, where 2^-33 is the last
     near, far = of_cell(name, X), of_cell(name, X + 1e6)
     assert_same(far.with_(center=near.center), near, rtol=1e-14)
     np.testing.assert_allclose(far.center - 1e6, near.center, rtol=0, atol=2e-9)
-
-
-@pytest.mark.parametrize("scale", [1e-9, 1e9])
-def test_units_do_not_matter(scale):
-    X = distorted("KinematicLinear3D20N")
-    near = of_cell("KinematicLinear3D20N", X)
-    scaled = of_cell("KinematicLinear3D20N", scale * X)
-    np.testing.assert_allclose(scaled.euler, near.euler * scale**5, rtol=1e-12)
-    np.testing.assert_allclose(scaled.center, near.center * scale, rtol=1e-12)
 
 
 def test_the_order_of_magnitude_of_a_thin_plate_survives():
@@ -231,12 +155,6 @@ def test_a_top_without_a_mesh():
     with pytest.raises(ModelError, match=r"smallest eigenvalue is -2 kg m².*triangle inequality"):
         top.with_(volume=1.0).check_deformable()
     MassProperties.box((1.0, 2.0, 3.0), 1.0).check_deformable()
-
-
-def test_given_numbers_come_back_bit_by_bit():
-    J = np.diag([0.1, 0.2, 0.3]) + 0.01 * (np.ones((3, 3)) - np.eye(3))
-    assert MassProperties(0.7, inertia=J).inertia.tolist() == J.tolist()
-    assert MassProperties(0.7, euler=J).euler.tolist() == J.tolist()
 
 
 def test_values_are_read_only():
@@ -275,12 +193,8 @@ def test_many_bodies_at_once():
     assert MassProperties.ball([[1.0], [2.0]], [5.0, 6.0, 7.0]).mass.shape == (2, 3)
     assert MassProperties.stack([boxes, boxes]).mass.shape == (2, 2)
     boxes.check_deformable()
-
-
-def test_a_ball_in_closed_form():
     ball = MassProperties.ball(0.5, 3.0)
-    assert float(ball.mass) == pytest.approx(np.pi / 2, rel=1e-15)
-    np.testing.assert_allclose(ball.inertia, 0.4 * ball.mass * 0.25 * np.eye(3), rtol=1e-15)
+    np.testing.assert_allclose(ball.inertia, 0.4 * np.pi / 2 * 0.25 * np.eye(3), rtol=1e-15)
 
 
 # ---- what is refused -------------------------------------------------------------------------------

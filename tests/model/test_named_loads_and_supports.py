@@ -70,19 +70,11 @@ def test_equal_loads_of_two_names_are_meant():
     assert "3 equal loads" in str(model.solve().report.warnings)
 
 
-def test_an_equal_load_of_the_same_name_is_added_once():
-    model = a_model()
-    for _ in range(3):
-        model.add(kl.Traction("x+", PUSH), name="wind")
-        model.add(kl.Traction("y+", PUSH), name="sun", amplitude=kl.TimeSeries([0.0, 1.0], [0.0, 2.0]))
-    assert list(model.named_loads) == ["wind", "sun"]
-    assert len(model.loads) == 2
-
-
-def test_a_name_is_replaced_only_if_asked_for():
+def test_a_name_is_given_once_and_replaced_only_if_asked_for():
     model = a_model()
     model.add(kl.Gravity(UP))
-    model.add(kl.Traction("x+", PUSH), name="wind")
+    for _ in range(3):
+        model.add(kl.Traction("x+", PUSH), name="wind")
     model.add(kl.Gravity(PUSH))
     with pytest.raises(
         kl.ModelError, match=r"another load 'wind' .*where='x\+'.*override=True.*remove\('wind'\)"
@@ -185,13 +177,8 @@ def test_nodes_are_released_along_axes_and_the_equations_follow():
     model.fix((0.0, 0.0, 0.0), "xy")
     model.fix((1.0, 0.0, 0.0), "y")
     loose = analysis.solve()
-    fresh = kl.Model(model.mesh, STEEL)
-    fresh.fix("z-", "z")
-    fresh.fix((0.0, 0.0, 0.0), "xy")
-    fresh.fix((1.0, 0.0, 0.0), "y")
-    fresh.add(kl.Traction("z+", UP))
-    np.testing.assert_allclose(loose.u, fresh.solve().u, rtol=0, atol=1e-12 * np.abs(loose.u).max())
     assert np.abs(loose.u - held.u).max() > 1e-3 * np.abs(held.u).max()
+    np.testing.assert_allclose(loose.stress("element")[:, 2], 1e3, rtol=1e-9)
 
 
 def test_motion_is_released_and_comes_back_with_what_it_had_hidden():

@@ -35,13 +35,6 @@ def test_a_force_between_nodes_has_its_resultant_and_moment_and_the_work_of_the_
         assert (f * u).sum() == pytest.approx(FORCE @ [x[0] ** 2, x[1] * x[2], x[2]], rel=1e-12)
 
 
-def test_reactions_carry_a_force_on_a_point():
-    model = kl.Model(kl.box(cells=(2, 2, 2)), STEEL)
-    model.fix("z-")
-    model.add(kl.PointLoad((0.4, 0.55, 1.0), FORCE))
-    np.testing.assert_allclose(model.solve().report.total_reaction, -FORCE, rtol=1e-9)
-
-
 def test_a_node_that_no_element_uses_does_not_take_the_force():
     box = kl.box()
     mesh = kl.Mesh(np.vstack([[[1.0, 1.0, 1.0]], box.points]), {"Element3D8N": box.blocks[0].nodes + 1})
@@ -63,13 +56,6 @@ def test_a_force_on_a_point_stays_on_a_finer_mesh():
     load = kl.PointLoad((0.25, 0.5, 0.5), FORCE)
     f = load.refined(finer).forces(finer.mesh, [])
     assert f[finer.mesh.nodes((0.25, 0.5, 0.5))].tolist() == [FORCE.tolist()]
-
-
-def test_a_force_on_a_point_moves_a_body():
-    body = kl.FiniteElementBody(kl.box(), kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0))
-    body.add(kl.PointLoad((0.5, 0.5, 0.5), FORCE))
-    (state,) = kl.integrate(body, dt=1e-3, steps=1)
-    assert state is not None
 
 
 def test_a_force_within_a_thin_plate_acts_where_it_is():

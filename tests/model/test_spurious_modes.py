@@ -125,10 +125,3 @@ def test_a_neighbor_with_full_integration_holds_a_reduced_one():
     values = np.linalg.eigvalsh(stiffness(model))
     assert (values < 1e-9 * values.max()).sum() == 6
     check_spurious_modes(model.mesh, model.element_groups())
-
-
-def test_another_rule_takes_the_modes_away():
-    model = kl.Model(kl.box((3, 1, 1), (3, 1, 1), "Reduced3D20N"), STEEL)
-    model.fix("x-")
-    model.use_rule(kl.KinematicLinear3D20N.rule)
-    assert model.check() == []

@@ -595,10 +595,9 @@ MUTATIONS = [
     Mutation("analysis/quantities.py", "self.axis)] = -1.0", "self.axis)] = 1.0", QUANTITIES),
     Mutation("analysis/quantities.py", "(off * volume).sum()", "2 * (off * volume).sum()", QUANTITIES),
     # ---- principal stresses, lines, comparisons
-    Mutation("voigt.py", "np.sqrt(2 / 3) * radius", "np.sqrt(1 / 3) * radius", VOIGT),
-    Mutation("voigt.py", "np.sin(angle + np.pi / 3)", "np.sin(angle + np.pi / 6)", VOIGT),
-    Mutation("voigt.py", "r * (yz * zx - dz * xy)", "r * (yz * zx + dz * xy)", VOIGT),
-    Mutation("voigt.py", "dy * dy + xy * xy + yz * yz", "dy * dy + xy * xy + zx * zx", VOIGT),
+    Mutation("voigt.py", "tensors[finite])[..., ::-1]", "tensors[finite])", VOIGT),
+    Mutation("voigt.py", "values[..., 0] - values[..., 2]", "values[..., 0] - values[..., 1]", VOIGT),
+    Mutation("voigt.py", "(y - x) / 3", "(y - z) / 3", VOIGT),
     Mutation(
         "analysis/fields.py", "(strain * stress).sum(axis=-1) / 2", "(strain * stress).sum(axis=-1)", FIELDS
     ),

@@ -23,11 +23,14 @@ def solved_with(load):
 
 
 WRONG = {
-    "mesh": (lambda: kl.Model(None), "a Mesh is needed"),
-    "material number": (lambda: kl.Model(kl.box(), 5), "a material such as Isotropic3D is needed; got int"),
+    "mesh": (lambda: kl.Model(None), "a mesh must be a Mesh, such as"),
+    "material number": (
+        lambda: kl.Model(kl.box(), 5),
+        "a material must be a LinearMaterial, .*; got 5",
+    ),
     "material word": (
         lambda: kl.Model(kl.box(), "steel"),
-        "a material such as Isotropic3D is needed; got str",
+        "a material must be a LinearMaterial, such as .*; got '",
     ),
     "material part": (lambda: kl.Model(kl.box(), {"zz": STEEL}), "there is no part 'zz'"),
     "material property": (lambda: kl.Model(kl.box(), {99: STEEL}), "no element has property 99"),
@@ -46,7 +49,7 @@ WRONG = {
     "where row": (lambda: model().fix([99]), "node indices must lie in 0 … 26"),
     "where negative": (lambda: model().fix([-1]), "node indices must lie in 0 … 26"),
     "where slip": (lambda: model().fix("Z++"), r"Did you mean z\+\?"),
-    "where mask": (lambda: model().fix(np.ones(5, bool)), r"a node mask must have shape \(27,\)"),
+    "where mask": (lambda: model().fix(np.ones(5, bool)), r"a mask of nodes must have shape \(27,\)"),
     "where nothing": (lambda: model().fix(np.zeros(27, bool)), "cannot fix xyz: no node is chosen"),
     "where unknown": (lambda: model().fix("top"), "there is no part 'top'"),
     "link negative": (lambda: model().constrain((-1, "x"), {TOP: 1.0}), "a degree of freedom is"),

@@ -167,12 +167,12 @@ class TimeDependentLoad(Load):
         InputError
             The function returns anything else.
         """
-        found = self.function(time)
-        if found is not None and (not isinstance(found, Load) or isinstance(found, TimeDependentLoad)):
+        load = self.function(time)
+        if load is not None and (not isinstance(load, Load) or isinstance(load, TimeDependentLoad)):
             raise InputError(
-                f"the load at t = {time:g} s must be a PointLoad or another, or None; got {found!r}"
+                f"the load at t = {time:g} s must be a PointLoad or another, or None; got {load!r}"
             )
-        return found
+        return load
 
     def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
         """Return the nodal forces (n, 3) in N at the time 0."""
@@ -206,9 +206,9 @@ class TimeDependentLoad(Load):
                     return known
             load = self.at(time)
             same = [known for _, one, known in kept if one is load]
-            found = same[0] if same else 0.0 if load is None else forces_of(load)
-            kept[:] = [*kept[-1:], (time, load, found)]
-            return found
+            nodal = same[0] if same else 0.0 if load is None else forces_of(load)
+            kept[:] = [*kept[-1:], (time, load, nodal)]
+            return nodal
 
         return forces
 
@@ -259,8 +259,8 @@ def vectors(values: ArrayLike, what: str, shapes: str, dimensions: tuple[int, ..
     """Return vectors of the right shape."""
     array = finite(values, what)
     if array.ndim not in dimensions or array.shape[-1] != 3:
-        found = f"shape {array.shape}" if array.ndim else f"the number {array}"
-        raise InputError(f"{what} must be {shapes}; got {found}")
+        got = f"shape {array.shape}" if array.ndim else f"the number {array}"
+        raise InputError(f"{what} must be {shapes}; got {got}")
     return array
 
 
@@ -280,11 +280,7 @@ def at_places(function: OfPlace, what: str, width: tuple[int, ...]) -> Callable[
 
 
 def key_of(value: Any, depth: int = 0) -> Hashable:
-    """Return a key that equal things share: loads by class and all values, functions by their code.
-
-    >>> key_of({"a": [1, 2.0]}) == key_of({"a": [1, 2.0]}), key_of(lambda x: x) == key_of(lambda x: 2 * x)
-    (True, False)
-    """
+    """Return a key that equal things share: loads by class and all values, functions by their code."""
     deeper = depth + 1
     if isinstance(value, np.ndarray):
         return "array", value.shape, value.dtype.kind, hash(value.tobytes())

@@ -99,9 +99,9 @@ def _around(mesh: Mesh, point: Array) -> tuple[Ints, Array]:
     size = float(np.linalg.norm(mesh.extent[1] - mesh.extent[0]))
     if len(nodes) and np.linalg.norm(mesh.points[nodes[0]] - point) <= ONE_PLACE * size:
         return nodes, np.ones(1)
-    found = mesh.locate(point)
-    if found.inside:
-        return found.nodes_and_weights()
+    located = mesh.locate(point)
+    if located.inside:
+        return located.nodes_and_weights()
     if mesh.whole and not len(nodes):
         raise MeshError(f"a point load at {point.tolist()} m acts outside the mesh; {nearby}")
     return nodes, np.ones(len(nodes))
