@@ -16,6 +16,7 @@ from kratos_lite.cli.option_texts import (
     number,
     rates_of,
     rayleigh_of,
+    scale_of,
     split_part,
     steps_of,
     vector,
@@ -64,6 +65,7 @@ def case_of(options: Namespace, part: int | None = None) -> Case:
         materials=not everywhere,
         strict=not options.lenient,
         linear=options.linear,
+        scale=scale_of(options.scale or "1"),
         initial_displacement=not options.ignore_initial_displacement,
         part=part,
     )

@@ -54,6 +54,19 @@ def fraction_of(text: str, what: str) -> float:
     return fraction
 
 
+LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254, "ft": 0.3048}
+"""Units of length in m."""
+
+
+def scale_of(text: str) -> float:
+    """Return the factor from coordinates to m, of a number or a unit.
+
+    >>> scale_of("mm"), scale_of("2.5")
+    (0.001, 2.5)
+    """
+    return LENGTHS[text] if text in LENGTHS else number(text, f"--scale (or one of {', '.join(LENGTHS)})")
+
+
 def numbers_of(text: str, option: str) -> list[float]:
     """Return numbers with commas between them; none of an empty text."""
     return [number(word, option) for word in text.split(",")] if text else []

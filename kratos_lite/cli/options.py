@@ -220,6 +220,7 @@ def _add_model(command: argparse.ArgumentParser) -> None:
     _add_options(
         model,
         ("--formulation", "WORD", FORMULATION),
+        ("--scale", "FACTOR", "on the coordinates of a mesh file: a number, or mm, cm, in, ft (1)"),
         ("--linear", None, "small deformations, also where a run file asks for large ones"),
         (
             "--ignore-initial-displacement",

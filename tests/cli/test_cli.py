@@ -787,6 +787,15 @@ def test_a_conversion_counts_what_is_in_the_file(run, box):
         assert "left out: " in done.out
 
 
+def test_a_mesh_in_mm_is_scaled(run, box):
+    extent = "extent   [0, 0.001] × [0, 0.001] × [0, 0.001] m"
+    assert extent in run("check", "box.vtu", *HELD, "--gravity", "0,0,-9.81", "--scale", "mm").out
+    assert run("solve", "box.vtu", *HELD, "--scale", "mil").refuses(
+        "--scale (or one of m, cm, mm, in, ft)", "'mil'"
+    )
+    assert run("solve", "box.vtu", *HELD, "--scale", "0").refuses("scale must be", "> 0")
+
+
 def test_forces_that_cancel_are_shown_as_zero(run, box):
     done = run("solve", "box.vtu", *HELD, "--traction", "x-:1e9,1,3e8", "--traction", "x+:-1e9,1,-3e8")
     assert rows_of(done.out)["total load"] == "(0, 2, 0) N"
