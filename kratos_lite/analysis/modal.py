@@ -17,7 +17,7 @@ from kratos_lite.solvers.eigen import modes
 from kratos_lite.solvers.plan import DENSE_MODES
 from kratos_lite.solvers.quadratic_eigen import Pencil, neutral_motions
 from kratos_lite.typing import Array, Complexes, Progress
-from kratos_lite.validation import whole_number
+from kratos_lite.validation import instance, whole_number
 
 FEW = 40
 """Up to this many unknowns there is nothing to iterate for."""
@@ -84,6 +84,7 @@ def critical_rate(model: Structure, count: int = 1) -> Array:
         The supports leave rigid-body modes free.
     """
     count = whole_number(count, "count")
+    instance(model, "a model", Structure, "kl.Model(mesh, material)")
     e = EquationsOfMotion(model, free=False)
     if e.terms is None:
         raise InputError("a critical rate belongs to a motion; add kratos_lite.ale.Rotation or Translation")

@@ -90,6 +90,8 @@ WRONG = {
     "stress component": (lambda: kl.StressAt((0, 0, 0), np.ones(3)), "component must be one of xx"),
     "picture path": (lambda: kl.plot(model().mesh, 3), "a path to a file must be text"),
     "film path": (lambda: kl.animate(3, model()), "a path to a file must be text"),
+    "critical rate": (lambda: kl.critical_rate("x"), "a model"),
+    "series path": (lambda: kl.SeriesWriter(3, model()), "a path to a file must be text"),
     "long path": (lambda: kl.read("x" * 300), "File name too long"),
     "array beyond memory": (
         lambda: kl.Traction("z+", np.broadcast_to(0.0, (2**40, 3))),

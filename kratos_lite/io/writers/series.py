@@ -15,6 +15,7 @@ from kratos_lite.io.formats.vtu import check_mode, write_pvd, write_vtu
 from kratos_lite.io.writers.endings import check_series
 from kratos_lite.io.writers.recorded import Recorded, arrays_of, recorded
 from kratos_lite.typing import Array
+from kratos_lite.validation import path_of
 
 
 class Writer(ABC):
@@ -153,10 +154,11 @@ class SeriesWriter:
     """
 
     def __init__(self, path: str | Path, owner: Body | TransientAnalysis, *, mode: str = "binary") -> None:
+        path = path_of(path)
         check_series(path)
         self.count = 0
         self._subject = recorded(owner, path)
-        self._writer = KINDS[Path(path).suffix.lower()](Path(path), self._subject, mode)
+        self._writer = KINDS[path.suffix.lower()](path, self._subject, mode)
 
     def add(self, state: Any = None) -> None:
         """Take one more state.
