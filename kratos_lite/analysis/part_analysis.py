@@ -12,6 +12,7 @@ from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.distributed.part_system import PartSystem
 from kratos_lite.distributed.partition import Partition
 from kratos_lite.errors import ModelError
+from kratos_lite.model import checks
 from kratos_lite.model.loads import Load, ScaledLoad
 from kratos_lite.model.loads.nodal import NodalForces, PointLoad
 from kratos_lite.model.structure import Structure
@@ -118,6 +119,8 @@ def solve_part(
         size = partition.sum(float(np.abs(own[:, None] * np.stack([external, reactions])).sum()))
         off = partition.sum(float(np.abs(total).sum())) / size if size else 0.0
         judge(solution, u, (off, 0.0))
+        work = partition.sum(checks.work_of(u[own], inner[own], external[own], reactions[own]))
+        system.warnings += [] if initial is not None else checks.check_energy(work)
     found = [text for some in partition.gather(warnings) for text in some]
     report = Report(
         unknowns=system.unknowns,

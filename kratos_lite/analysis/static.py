@@ -244,8 +244,11 @@ class StaticAnalysis:
                 judge(solution, u, balance)
             initial = case.external - case.forces
             if tolerance is None and not initial.any():
-                works = case.external, reactions, noise, model.supports
-                warnings += checks.check_energy(u, inner, *works)
+                work = checks.work_of(u, inner, case.external, reactions)
+                prescribed = float(
+                    np.abs(model.supports.values).sum()
+                )  # whose work has the rounding of forces
+                warnings += checks.check_energy(work, 100 * noise * prescribed)
             warnings += checks.check_rounding(noise, case.external, initial, reactions, model.supports)
             warnings += check_deformation(model, state.groups, u)
         report = self._report(case, solution, reactions, balance, warnings)

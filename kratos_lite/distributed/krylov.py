@@ -62,8 +62,8 @@ NUMBERS = count()
 EPSILON = float(np.finfo(float).eps)
 MAXIMUM = 3
 """PETSc's number of the maximum norm."""
-NO_DIGITS = 1e-2
-"""Rounding of A x, as a fraction of b, from which a factorization has solved nothing."""
+NO_DIGITS = 0.3
+"""Rounding of A x, as a fraction of b, from which nothing is solved; slender bodies have 0.01."""
 REFINEMENTS = 2
 """Solutions for the residual where the true one is too large."""
 

@@ -225,26 +225,26 @@ def check_rounding(
     return [text]
 
 
-def check_energy(
-    u: Array, inner: Array, loads: Array, reactions: Array, roundoff: float, supports: Supports
-) -> list[str]:
-    """Warn where loads and reactions do another work than twice the strain energy by `inner` forces, (n, 3).
+def work_of(u: Array, inner: Array, loads: Array, reactions: Array) -> Array:
+    """Return the work (2,) in J of `inner` forces, and what loads and reactions miss to it."""
+    return np.array([(u * inner).sum(), (u * (inner - loads - reactions)).sum()])
+
+
+def check_energy(work: Array, rounding: float = 0.0) -> list[str]:
+    """Warn where loads and reactions do another work than twice the strain energy, `work` as of `work_of`.
 
     Raises SolveError where 5 % are missing.  In thin bodies rounding of K, which no residual shows, makes the
     body stiffer or softer; strains, and what stresses do, are as exact as the displacements.
     """
-    twice, missing = float((u * inner).sum()), abs(float((u * (inner - loads - reactions)).sum()))
-    moved = (
-        100 * roundoff * float(np.abs(supports.values).sum())
-    )  # rounding of the work of what is prescribed
-    if missing <= max(1e-3 * abs(twice), moved):
+    twice, missing = np.abs(work).tolist()
+    if missing <= max(1e-3 * twice, rounding):
         return []
     text = (
-        f"the work of the loads is {100 * missing / abs(twice):.2g} % off twice the strain energy: the "
+        f"the work of the loads is {100 * missing / twice:.2g} % off twice the strain energy: the "
         "stiffness has lost its digits, as in very thin bodies; displacements are as wrong or more.  Take "
         "cells less flat (smaller in the plane, fewer layers), or a shell program for bodies this thin"
     )
-    if missing > 0.05 * abs(twice):
+    if missing > 0.05 * twice:
         raise SolveError(text)
     return [text]
 
