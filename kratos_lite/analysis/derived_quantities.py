@@ -11,7 +11,7 @@ from kratos_lite.ale.checks import critical_rate_estimate
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.report import Report
 from kratos_lite.analysis.result import Result
-from kratos_lite.analysis.small_deformations import check_deformation
+from kratos_lite.analysis.solution_checks import check_deformation
 from kratos_lite.analysis.state import State
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Where

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kratos_lite.analysis.fields import FIELDS
-from kratos_lite.analysis.integration_point_values import QUANTITIES, GaussPoints
+from kratos_lite.analysis.fields import FIELDS, QUANTITIES, GaussPoints
 from kratos_lite.assembly.element_groups import ElementGroup, group_of_element
 from kratos_lite.assembly.gauss_point_fields import at_gauss, in_order, totals
 from kratos_lite.errors import InputError

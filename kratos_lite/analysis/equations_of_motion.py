@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from kratos_lite.ale import Motion, MotionMatrices
 from kratos_lite.ale.checks import check_materials
-from kratos_lite.analysis.time_dependent_loads import AppliedLoads, PrescribedDisplacement
+from kratos_lite.analysis.nodal_loads import AppliedLoads
+from kratos_lite.analysis.prescribed_motion import PrescribedMotion
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model.free_motions import FreeMotions
@@ -48,7 +49,7 @@ class EquationsOfMotion:
     mass : M.
     terms : the matrices of the motion, or None.
     applied : function of the time that gives the nodal forces (3a,) of all loads but those of the motion.
-    prescribed : function of the time that gives the displacements (3a,) where the free ones are 0.
+    prescribed : what supports prescribe; called with the time, displacements (3a,) where free ones are 0.
     step : s, over which an acceleration is taken from the rate; 0 for its slope.
     warnings : what the checks of the model and of its motion at the time 0 found.
 
@@ -87,7 +88,7 @@ class EquationsOfMotion:
             progress=progress,
         )
         self.applied = AppliedLoads(model, self.system, self.groups)
-        self.prescribed = PrescribedDisplacement(model, self.system)
+        self.prescribed = PrescribedMotion(model.supports, self.system)
         placed = self.system.points, self.system.groups, self.system.pattern
         self.mass = Mass(*placed, lumped)
         self.terms: MotionMatrices | None = None
@@ -277,7 +278,12 @@ class EquationsOfMotion:
         constraints = self.system.constraint_map
         plan = repeated("auto", len(constraints.free), symmetric)
         equations = LinearSolver(A, constraints, self.system.points, plan, symmetric=symmetric)
-        return lambda f, prescribed: equations.solve(f, 1e-13, self.system.progress, prescribed).x
+        return partial(_solved, equations, self.system.progress)
+
+
+def _solved(equations: LinearSolver, progress: Progress | None, f: Array, prescribed: Array) -> Array:
+    """Return displacements (3a,); no lambda, as an analysis can be pickled."""
+    return equations.solve(f, 1e-13, progress, prescribed).x
 
 
 def _checked_rayleigh(rayleigh: tuple[float, float]) -> tuple[float, float]:

@@ -7,24 +7,24 @@ from dataclasses import replace
 
 import numpy as np
 
-from kratos_lite.analysis.backends import backend_of, system_of
 from kratos_lite.analysis.nodal_loads import stress_load
-from kratos_lite.analysis.origin import Origin
 from kratos_lite.analysis.prepared import (
     Equations,
     LoadSet,
     any_axis,
+    backend_of,
     dirichlet_conditions,
     load_set,
     prepared,
+    system_of,
 )
 from kratos_lite.analysis.report import Report
 from kratos_lite.analysis.result import Result
-from kratos_lite.analysis.small_deformations import check_deformation
 from kratos_lite.analysis.solution_checks import (
     Phases,
     balance_of,
     check_arguments,
+    check_deformation,
     initial_noise,
     judge,
     quality,
@@ -250,8 +250,7 @@ class StaticAnalysis:
             warnings += check_deformation(model, state.groups, u)
         report = self._report(case, solution, reactions, balance, warnings)
         u0 = model.initial_displacement
-        origin = Origin(self, model.version)
-        return Result(model.mesh, state.groups, u, reactions, case.external, report, u0, origin)
+        return Result(model.mesh, state.groups, u, reactions, case.external, report, u0, self)
 
     def release(self) -> None:
         """Release the matrix and what is made of it; another solution makes them anew."""

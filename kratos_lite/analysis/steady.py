@@ -9,8 +9,7 @@ from kratos_lite.analysis.modal import critical_rates, critical_rates_beside
 from kratos_lite.analysis.nodal_loads import initial_loads, stress_load
 from kratos_lite.analysis.report import Report
 from kratos_lite.analysis.result import Result
-from kratos_lite.analysis.small_deformations import check_deformation
-from kratos_lite.analysis.solution_checks import Phases, check_arguments, judge, quality
+from kratos_lite.analysis.solution_checks import Phases, check_arguments, check_deformation, judge, quality
 from kratos_lite.model.checks import check_loads, equilibrium
 from kratos_lite.model.loads.base import equal_loads
 from kratos_lite.model.structure import Structure

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
+import logging
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kratos_lite.ale.checks import critical_rate_estimate, near_critical
 from kratos_lite.analysis.derived_quantities import result_of
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.integrators.base import INTEGRATORS, ModelIntegrator, check_stable
 from kratos_lite.analysis.integrators.generalized_alpha import Newmark
 from kratos_lite.analysis.material_derivatives import acceleration_of_material, velocity_of_material
-from kratos_lite.analysis.prescribed_motion import at_start, prescribed_part, with_prescribed
-from kratos_lite.analysis.rate_watch import RateWatch
+from kratos_lite.analysis.modal import critical_rates
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.state import MODEL_FIELDS, State, check_state
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model.loads.base import equal_loads
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.direct import one_thread
+from kratos_lite.solvers.plan import REPEATED_LIMIT
 from kratos_lite.typing import Array, Progress
 from kratos_lite.validation import finite, flag, function_or_none
 
@@ -107,25 +109,25 @@ class TransientAnalysis:
         self.v = self._nodal(rest if velocity is None else velocity, "the initial velocity")
         self._restored: State | None = None  # which has not gone on yet
         self._limit = DIVERGED * float(np.ptp(e.system.points, axis=0).max())
-        held = at_start(e)
+        start = e.prescribed.at_start()
         if displacement is not None:
-            self._check_supports(self.u, held[0], "the initial displacement")
-        elif jump := float(np.abs(prescribed_part(e, held[0])).max(initial=0.0)):
+            self._check_supports(self.u, start[0], "the initial displacement")
+        elif jump := float(np.abs(e.prescribed.part(start[0])).max(initial=0.0)):
             e.warnings.append(
                 f"supports are displaced by {jump:g} m at the start of a model at rest, which is struck: "
                 "give the displacement of model.solve(), or let them move from 0"
             )
-        self._start(*held)
+        self._start(*start)
 
     def _start(self, u: Array, v: Array, a: Array) -> None:
         """Take over what is prescribed at the start, and find the first acceleration."""
         e = self.equations
-        self.u, self.v = with_prescribed(e, self.u, u), with_prescribed(e, self.v, v)
+        self.u, self.v = e.prescribed.replace(self.u, u), e.prescribed.replace(self.v, v)
         self.a = self._balanced(a)
 
     def _check_supports(self, u: Array, prescribed: Array, what: str) -> None:
         """Raise InputError if displacements (3a,) are not where the supports hold the model."""
-        off = np.abs(prescribed_part(self.equations, u) - prescribed).reshape(-1, 3)
+        off = np.abs(self.equations.prescribed.part(u) - prescribed).reshape(-1, 3)
         node, axis = np.unravel_index(int(off.argmax()), off.shape)
         if off[node, axis] > OFF_SUPPORT * np.abs(u).max(initial=0.0):
             name = self.equations.model.supports.name(3 * int(self.equations.system.nodes[node]) + int(axis))
@@ -177,7 +179,7 @@ class TransientAnalysis:
         check_stable(str(self.integrator), h / parts, self.critical_step(), "Newmark()")
         e.step, self.parts = h / parts, parts
         if not self.step and e.model.supports.motions:
-            self._start(*at_start(e, e.step))
+            self._start(*e.prescribed.at_start(e.step))
         elif self._restored is not None:
             self._settle(self._restored)
         self._restored = None
@@ -282,7 +284,7 @@ class TransientAnalysis:
         left, largest = self._imbalance(self.u, self.v, self.a, self.time)
         other = abs(left - float(state.values.get("imbalance", np.nan))) > OFF_BALANCE * largest
         if other or state.integrator != str(self.integrator):
-            self.a = self._balanced(prescribed_part(self.equations, self.a))
+            self.a = self._balanced(self.equations.prescribed.part(self.a))
 
     def _terms(self, u: Array, v: Array, a: Array, time: float) -> list[Array]:
         """Return M a, C v, K u and -f, (3a,) in N."""
@@ -385,3 +387,43 @@ class TransientAnalysis:
     def _whole(self, x: Array) -> Array:
         """Return vectors (3a,) as (n, 3) of all nodes."""
         return np.asarray(self.equations.system.scatter(x))
+
+
+_log = logging.getLogger("kratos_lite")
+
+
+class RateWatch:
+    """Looks at the rate of a motion, and warns once when it comes near the critical one.
+
+    Parameters
+    ----------
+    e : the equations, which take the warnings; without a motion there is nothing to see.
+
+    Attributes
+    ----------
+    critical : the lowest critical rate, infinite without a motion.
+    of_mesh : that of the mesh itself; None where it is but an estimate.
+    """
+
+    def __init__(self, e: EquationsOfMotion) -> None:
+        self.equations, self.critical = e, np.inf
+        self.of_mesh: float | None = None
+        free = len(e.system.constraint_map.free)
+        self._done = e.terms is None or not free or (e.terms.motion.steady and not e.rates(0.0)[0])
+        if e.terms is None or self._done:
+            return
+        if free <= REPEATED_LIMIT and not e.free_motions.any:
+            self.critical = self.of_mesh = float(critical_rates(e, 1)[0])
+        else:
+            self.critical = critical_rate_estimate(e.terms)
+
+    def look(self, time: float) -> None:
+        """Warn if the rate of a time in s is near the critical one, and no warning came before."""
+        e = self.equations
+        if self._done or e.terms is None:
+            return
+        for text in near_critical(e.terms.motion, time, self.critical, self.of_mesh is not None):
+            self._done = True
+            e.warnings.append(f"at t = {time:g} s {text}" if time else text)
+            if time:
+                _log.warning("%s", e.warnings[-1])

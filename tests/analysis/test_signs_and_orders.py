@@ -5,7 +5,6 @@ import pytest
 
 import kratos_lite as kl
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
-from kratos_lite.analysis.prescribed_motion import at_start
 from kratos_lite.analysis.solution_checks import judge
 from kratos_lite.assembly.nodal_values import extrapolation
 from kratos_lite.errors import SolveError
@@ -108,7 +107,7 @@ def test_moving_supports_start_with_the_velocity_of_their_function():
     """Differences of order 2 are exact for a parabola, whose slope those of order 1 miss."""
     subject = kl.Model(kl.box(), SOIL)
     subject.fix("z-", "z", lambda t: 0.5 * t + 1e3 * t * t)
-    u, v, a = at_start(EquationsOfMotion(subject), 1e-3)
+    u, v, a = EquationsOfMotion(subject).prescribed.at_start(1e-3)
     bottom = 3 * subject.mesh.nodes("z-") + 2
     np.testing.assert_allclose(u[bottom], 0.0, atol=0)
     np.testing.assert_allclose(v[bottom], 0.5, rtol=1e-8)

@@ -481,8 +481,8 @@ MUTATIONS = [
     # ---- what was found by chance before
     Mutation(
         "analysis/prescribed_motion.py",
-        "velocity = (-3 * g + 4 * e.prescribed(short) - e.prescribed(2 * short)) / (2 * short)",
-        "velocity = (e.prescribed(short) - g) / short",
+        "velocity = (-3 * g + 4 * self(short) - self(2 * short)) / (2 * short)",
+        "velocity = (self(short) - g) / short",
         SIGNS,
     ),
     Mutation(
@@ -602,10 +602,10 @@ MUTATIONS = [
     Mutation(
         "analysis/fields.py", "(strain * stress).sum(axis=-1) / 2", "(strain * stress).sum(axis=-1)", FIELDS
     ),
-    Mutation("analysis/integration_point_values.py", "volume.sum(axis=1, keepdims=True)", "volume", FIELDS),
+    Mutation("analysis/fields.py", "volume.sum(axis=1, keepdims=True)", "volume", FIELDS),
     Mutation("analysis/element_fields.py", "self.without_prestress.stress", "self.stress", FIELDS),
-    Mutation("analysis/line_values.py", "6 * (0.5 - t)", "3 * (0.5 - t)", LINES),
-    Mutation("analysis/line_values.py", "half * weights", "weights / len(half) / 2", LINES),
+    Mutation("analysis/point_values.py", "6 * (0.5 - t)", "3 * (0.5 - t)", LINES),
+    Mutation("analysis/point_values.py", "half * weights", "weights / len(half) / 2", LINES),
     Mutation("mesh/crossings.py", "np.diff(t) > SHORT", "np.diff(t) > 1e-3", "tests/mesh/test_crossings.py"),
     Mutation("analysis/comparison.py", "share = volumes", "share = 2 + 0 * volumes", COMPARED),
     Mutation("analysis/comparison.py", "voigt.tensor(values).reshape(len(values), 9)", "values", COMPARED),
@@ -627,7 +627,7 @@ MUTATIONS = [
     ),
     Mutation("analysis/quantities.py", "nodes[:, : group.element.shape.corners]", "nodes[:, :2]", QUANTITIES),
     Mutation(
-        "analysis/adjoint.py",
+        "analysis/error_estimate.py",
         "held[block.nodes, axis].all(axis=1)",
         "(held[block.nodes, axis].sum(axis=1) >= 2)",
         QUANTITIES,
