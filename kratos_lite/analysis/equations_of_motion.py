@@ -150,29 +150,25 @@ class EquationsOfMotion:
         """Return what the motion adds to K, data (nnz,) on the pattern, or None."""
         if self.terms is None:
             return None
-        motion, terms = self.terms.motion, self.terms
         rate, acceleration = self.rates(time)
-        out: Array | None = None
+        parts = []
         if rate:
-            out = -(rate**2) * terms.H
+            parts.append(-(rate**2) * self.terms.H)
             if self.stiffened:
-                out = out + rate**2 * self.stiffening
-        carried = acceleration + motion.damping * rate
-        if carried:
-            flow = carried * terms.circulatory
-            out = flow if out is None else out + flow
-        return out
+                parts.append(rate**2 * self.stiffening)
+        if carried := acceleration + self.terms.motion.damping * rate:
+            parts.append(carried * self.terms.circulatory)
+        return np.asarray(sum(parts)) if parts else None
 
     def damping_terms(self, time: float) -> Array | None:
         """Return what motion and mass-proportional damping add to C, data (nnz,), or None."""
-        out: Array | None = self.rayleigh[0] * self.mass.data if self.rayleigh[0] else None
-        if self.terms is not None and (alpha := self.terms.motion.damping):
-            own = alpha * self.terms.of_moving(self.mass.data)
-            out = own if out is None else out + own
-        if self.terms is not None and (rate := self.terms.motion.rate(time)):
-            gyroscopic = 2 * rate * self.terms.gyroscopic
-            out = gyroscopic if out is None else out + gyroscopic
-        return out
+        parts = [self.rayleigh[0] * self.mass.data] if self.rayleigh[0] else []
+        if self.terms is not None:
+            if alpha := self.terms.motion.damping:
+                parts.append(alpha * self.terms.of_moving(self.mass.data))
+            if rate := self.terms.motion.rate(time):
+                parts.append(2 * rate * self.terms.gyroscopic)
+        return np.asarray(sum(parts)) if parts else None
 
     @property
     def stiffened(self) -> bool:
@@ -195,10 +191,6 @@ class EquationsOfMotion:
     def dashpots(self) -> BlockMatrix | None:
         """Damping of absorbing boundaries, (3a, 3a) in N s/m, or None."""
         return self.terms.motion.boundary_damping(self.model.mesh, self.system) if self.terms else None
-
-    def times_mass(self, v: Array) -> Array:
-        """Return M v."""
-        return self.mass.times(v)
 
     def times_damping(self, v: Array, time: float) -> Array:
         """Return C v at a time."""

@@ -1,4 +1,4 @@
-"""What every solution without time has in common: its arguments, phases, quality and verdict."""
+"""What every solution without time has in common: its arguments, phases, quality and checks."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def check_arguments(solver: str, tolerance: float) -> None:
     choice(solver, "solver", METHODS)
 
 
-def quality(solution: Solution, balance: tuple[float, float]) -> dict[str, Any]:
+def metrics(solution: Solution, balance: tuple[float, float]) -> dict[str, Any]:
     """Return how a solution was found and how good it is, by the names of a `Report`."""
     return {
         "solver": solution.method,
@@ -63,7 +63,7 @@ def quality(solution: Solution, balance: tuple[float, float]) -> dict[str, Any]:
     }
 
 
-def initial_noise(model: Structure, norm: float, tolerance: float, forces: Array) -> float:
+def initial_roundoff(model: Structure, norm: float, tolerance: float, forces: Array) -> float:
     """Return what rounding and the solver leave of the forces (n, 3) of an initial state, in N."""
     u0 = model.initial_displacement
     largest = 0.0 if u0 is None else float(np.abs(u0).max(initial=0.0))
@@ -82,7 +82,7 @@ def balance_of(
     return equilibrium(mesh.points, external, reactions, inner, rounding)
 
 
-def judge(solution: Solution, u: Array, balance: tuple[float, float]) -> None:
+def check_solution(solution: Solution, u: Array, balance: tuple[float, float]) -> None:
     """Raise SolveError for a solution that does not solve its equations or is not in equilibrium."""
     if not np.isfinite(u).all() or solution.backward_error > 1e-8:
         raise SolveError(

@@ -25,9 +25,9 @@ from kratos_lite.analysis.solution_checks import (
     balance_of,
     check_arguments,
     check_deformation,
-    initial_noise,
-    judge,
-    quality,
+    check_solution,
+    initial_roundoff,
+    metrics,
 )
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model import checks
@@ -235,13 +235,13 @@ class StaticAnalysis:
             reactions = model.supports.supported(reactions)
             inner = model.supports.on_independents(stress_load(model, state.groups, u))
             if state.initial is not None and self.system is not None:
-                rounding = initial_noise(model, self.system.norm, self.tolerance, case.forces)
+                rounding = initial_roundoff(model, self.system.norm, self.tolerance, case.forces)
             else:
                 rounding = 0.0
             forces = case.external, case.forces, reactions, inner
             balance = balance_of(model.mesh, *forces, max(noise, rounding), 3 * int(state.used.sum()))
             if tolerance is None:
-                judge(solution, u, balance)
+                check_solution(solution, u, balance)
             initial = case.external - case.forces
             if tolerance is None and not initial.any():
                 works = case.external, reactions, noise, model.supports
@@ -301,7 +301,7 @@ class StaticAnalysis:
             unknowns=n_equations - len(model.supports.dependents()),
             total_load=case.external.sum(axis=0),
             total_reaction=reactions.sum(axis=0),
-            **quality(solution, balance),
+            **metrics(solution, balance),
             seconds=case.phase.seconds,
             warnings=warnings,
             notes=[*model.remarks(), *state.free.notes(case.moving)],

@@ -8,13 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kratos_lite.ale.checks import critical_rate_estimate, near_critical
-from kratos_lite.analysis.derived_quantities import result_of
+from kratos_lite.analysis.derived_quantities import motion_summary
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.integrators.base import INTEGRATORS, ModelIntegrator, check_stable
 from kratos_lite.analysis.integrators.generalized_alpha import Newmark
 from kratos_lite.analysis.material_derivatives import acceleration_of_material, velocity_of_material
 from kratos_lite.analysis.modal import critical_rates
+from kratos_lite.analysis.report import Report
 from kratos_lite.analysis.result import Result
+from kratos_lite.analysis.solution_checks import check_deformation
 from kratos_lite.analysis.state import MODEL_FIELDS, State, check_state
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model.loads.base import equal_loads
@@ -101,8 +103,8 @@ class TransientAnalysis:
         e.warnings += equal_loads(model.loads, model.named_loads)
         self.integrator.check(e)
         self._version = _version(model)
-        self._rate = RateWatch(e)
-        self._rate.look(0.0)
+        self._monitor = CriticalRateMonitor(e)
+        self._monitor.check(0.0)
         self.time, self.step, self.parts = 0.0, 0, 1
         rest = np.zeros((e.system.n_nodes, 3))
         self.u = self._nodal(rest if displacement is None else displacement, "the initial displacement")
@@ -204,7 +206,7 @@ class TransientAnalysis:
             with one_thread(), np.errstate(over="ignore", invalid="ignore"):
                 for k in range(self.parts):
                     now = self.integrator.step(self.equations, now, self.time + k * part, part)
-            self._rate.look(self.time + h)
+            self._monitor.check(self.time + h)
             self.u, self.v, self.a = now
             self.time += h  # one after the other, so that a restart comes to the same times
             self.step += 1
@@ -234,10 +236,10 @@ class TransientAnalysis:
         -------
         State
         """
-        left = self._left()
+        residual = self._residual()
         values = {name: self._whole(getattr(self, name)).copy() for name in "uva"}
-        values["reactions"] = self.equations.model.supports.supported(self._whole(left))
-        values["imbalance"] = np.array(self._free_part(left))
+        values["reactions"] = self.equations.model.supports.supported(self._whole(residual))
+        values["imbalance"] = np.array(self._free_part(residual))
         return State("model", str(self.integrator), self.time, self.step, values, self.parts)
 
     def restore(self, state: State) -> None:
@@ -281,17 +283,17 @@ class TransientAnalysis:
 
     def _settle(self, state: State) -> None:
         """Balance the acceleration of a state of another integrator, or of another load."""
-        left, largest = self._imbalance(self.u, self.v, self.a, self.time)
-        other = abs(left - float(state.values.get("imbalance", np.nan))) > OFF_BALANCE * largest
+        residual, largest = self._imbalance(self.u, self.v, self.a, self.time)
+        other = abs(residual - float(state.values.get("imbalance", np.nan))) > OFF_BALANCE * largest
         if other or state.integrator != str(self.integrator):
             self.a = self._balanced(self.equations.prescribed.part(self.a))
 
     def _terms(self, u: Array, v: Array, a: Array, time: float) -> list[Array]:
         """Return M a, C v, K u and -f, (3a,) in N."""
         e = self.equations
-        return [e.times_mass(a), e.times_damping(v, time), e.times_stiffness(u, time), -e.load(time)]
+        return [e.mass.times(a), e.times_damping(v, time), e.times_stiffness(u, time), -e.load(time)]
 
-    def _left(self) -> Array:
+    def _residual(self) -> Array:
         """Return M a + C v + K u - f, (3a,) in N."""
         return np.asarray(np.sum(self._terms(self.u, self.v, self.a, self.time), axis=0))
 
@@ -320,11 +322,31 @@ class TransientAnalysis:
             With the loads of that time.  The backward error of its report is what M a + C v + K u - f leaves
             on free nodes, relative; None for integrators that do not take the balance at the end of a step.
         """
-        at, left = self.state() if state is None else self.check_state(state), None
+        e, at, residual = self.equations, self.state() if state is None else self.check_state(state), None
+        model, loads = e.model, e.system.scatter(e.load(at.time)).copy()
         if self.integrator.balanced:
             free, largest = self._imbalance(*self._at(at))
-            left = free / largest if largest else 0.0
-        return result_of(self.equations, at, str(self.integrator), left, self._rate.of_mesh)
+            residual = free / largest if largest else 0.0
+        report = Report(
+            unknowns=len(e.system.constraint_map.free),
+            total_load=loads.sum(axis=0),
+            total_reaction=at.reactions.sum(axis=0),
+            solver=str(self.integrator),
+            reason=f"step {at.step}, t = {at.time:g} s",
+            iterations=0,
+            backward_error=residual,
+            force_error=None,
+            moment_error=None,
+            seconds={},
+            warnings=[*e.warnings, *check_deformation(model, e.groups, at.u)],
+            notes=model.remarks(),
+            formulation=model.chosen(e.groups),
+        )
+        u0 = model.initial_displacement
+        result = Result(model.mesh, e.groups, at.u.copy(), at.reactions.copy(), loads, report, u0)
+        if e.terms is not None:
+            report.motion = motion_summary(e, result, self._monitor.of_mesh, at.time)
+        return result
 
     def reactions(self) -> Array:
         """Return the forces of supports and constraints on the model, M a + C v + K u - f.
@@ -333,7 +355,7 @@ class TransientAnalysis:
         -------
         (n, 3) float, N; 0 where nothing acts.
         """
-        return self.equations.model.supports.supported(self._whole(self._left()))
+        return self.equations.model.supports.supported(self._whole(self._residual()))
 
     def energy(self, state: State | None = None) -> float:
         """Return ½ v·M v + ½ u·K u, K with what the motion adds: constant without loads and damping.
@@ -347,7 +369,7 @@ class TransientAnalysis:
         float, J.
         """
         e, (u, v, _, time) = self.equations, self._at(state)
-        return float(v @ e.times_mass(v) + u @ e.times_stiffness(u, time)) / 2
+        return float(v @ e.mass.times(v) + u @ e.times_stiffness(u, time)) / 2
 
     def material_velocity(self, state: State | None = None) -> Array:
         """Return the velocity of the material in space; see `kratos_lite.material_velocity`.
@@ -392,8 +414,8 @@ class TransientAnalysis:
 _log = logging.getLogger("kratos_lite")
 
 
-class RateWatch:
-    """Looks at the rate of a motion, and warns once when it comes near the critical one.
+class CriticalRateMonitor:
+    """Checks the rate of a motion, and warns once when it comes near the critical one.
 
     Parameters
     ----------
@@ -417,7 +439,7 @@ class RateWatch:
         else:
             self.critical = critical_rate_estimate(e.terms)
 
-    def look(self, time: float) -> None:
+    def check(self, time: float) -> None:
         """Warn if the rate of a time in s is near the critical one, and no warning came before."""
         e = self.equations
         if self._done or e.terms is None:

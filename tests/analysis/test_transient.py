@@ -292,7 +292,7 @@ def test_first_acceleration():
     start = model.transient()
     held = model.supports.fixed.ravel()[: len(start.a)]
     assert not start.a[held].any()
-    residual = start.equations.times_mass(start.a) - start.equations.load(0.0)
+    residual = start.equations.mass.times(start.a) - start.equations.load(0.0)
     assert np.abs(residual[~held]).max() < 1e-9
 
 

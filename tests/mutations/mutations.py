@@ -252,14 +252,14 @@ MUTATIONS = [
     ),
     Mutation(
         "analysis/equations_of_motion.py",
-        "gyroscopic = 2 * rate * self.terms.gyroscopic",
-        "gyroscopic = rate * self.terms.gyroscopic",
+        "parts.append(2 * rate * self.terms.gyroscopic)",
+        "parts.append(rate * self.terms.gyroscopic)",
         "tests/ale/test_frequencies.py tests/ale/test_steady.py",
     ),
     Mutation(
         "analysis/equations_of_motion.py",
-        "out = -(rate**2) * terms.H",
-        "out = rate**2 * terms.H",
+        "parts.append(-(rate**2) * self.terms.H)",
+        "parts.append(rate**2 * self.terms.H)",
         "tests/ale/test_steady.py",
     ),
     Mutation(
@@ -270,8 +270,8 @@ MUTATIONS = [
     ),
     Mutation(
         "analysis/transient.py",
-        "return float(v @ e.times_mass(v) + u @ e.times_stiffness(u, time)) / 2",
-        "return float(v @ e.times_mass(v) - u @ e.times_stiffness(u, time)) / 2",
+        "return float(v @ e.mass.times(v) + u @ e.times_stiffness(u, time)) / 2",
+        "return float(v @ e.mass.times(v) - u @ e.times_stiffness(u, time)) / 2",
         TRANSIENT,
     ),
     # ---- material that moves through the mesh

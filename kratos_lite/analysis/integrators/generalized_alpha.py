@@ -64,10 +64,10 @@ class _Implicit(ModelIntegrator):
         force = e.load(middle) - e.times_stiffness(u, middle)
         force -= e.times_damping(f * v_new + s.alpha_f * v, middle)
         if self.balanced:  # M a is known from the balance at the start, so no rounding is handed on
-            force += e.times_mass(4 / h * v - more_a) + e.load(start)
+            force += e.mass.times(4 / h * v - more_a) + e.load(start)
             force -= e.times_stiffness(u, start) + e.times_damping(v, start)
         else:
-            force += e.times_mass((1 - s.alpha_m) * a_old - s.alpha_m * a)
+            force += e.mass.times((1 - s.alpha_m) * a_old - s.alpha_m * a)
         solve = e.solver(middle, (1 - s.alpha_m) / (s.beta * h * h), f * s.gamma / (s.beta * h), f)
         du = solve(force, e.prescribed(end) - at_start)
         return u + du, s.gamma / (s.beta * h) * du + v_new, du / (s.beta * h * h) - a_old
