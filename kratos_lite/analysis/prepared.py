@@ -28,21 +28,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A structure that has passed its checks.
+    """A structure that has passed its checks."""
 
-    Attributes
-    ----------
-    version : of the structure.
-    groups, warnings : its elements, and what the checks found.
-    free : the rigid motions that supports leave to its components.
-    initial : (n, 3) N, nodal forces of the initial state, or None.
-    """
-
-    version: tuple[int, int]
+    version: tuple[int, int]  # of the structure
     groups: list[ElementGroup]
-    warnings: list[str]
-    free: FreeMotions
-    initial: Array | None
+    warnings: list[str]  # of the checks
+    free: FreeMotions  # the rigid motions that supports leave to its components
+    initial: Array | None  # (n, 3) N, nodal forces of the initial state
 
     @cached_property
     def component(self) -> Ints:

@@ -284,10 +284,7 @@ class Result(ElementFields, Tabular):
     def columns(self) -> dict[str, Numbers]:
         """Return ids, places, displacements, reactions and recovered stresses of the nodes.
 
-        Returns
-        -------
-        dict of str to (n,) array
-            By headers with units; ``kl.write("nodes.csv", result)`` writes them.
+        They are (n,) by headers with units; ``kl.write("nodes.csv", result)`` writes them.
         """
         from kratos_lite.analysis.fields import nodal_columns  # a quick start for results
 
@@ -349,34 +346,19 @@ class Result(ElementFields, Tabular):
     # ---- out -----------------------------------------------------------------------------------
 
     def largest_displacement(self) -> tuple[float, int, Array]:
-        """Return the largest displacement of a node.
-
-        Returns
-        -------
-        Its size in m, the id of the node, and the displacement (3,) in m.
-        """
+        """Return the largest displacement of a node: its size in m, the id of the node, and u (3,) in m."""
         length = np.linalg.norm(self.u, axis=1)
         node = int(length.argmax())
         return float(length[node]), int(self.mesh.node_ids[node]), self.u[node]
 
     def largest_von_mises(self) -> tuple[float, int, Array]:
-        """Return the largest von Mises stress at a Gauss point.
-
-        Returns
-        -------
-        In Pa, the id of its element, and the center (3,) of that in m.
-        """
+        """Return the largest von Mises stress of Gauss points in Pa, id and center (3,) of its element."""
         mesh, (_, mises, row) = self.mesh, self._totals
         (nodes,) = (group.nodes[group.rows == row] for group in self.groups if row in group.rows)
         return mises, int(mesh.element_ids[row]), mesh.points[nodes[0]].mean(axis=0)
 
     def table(self) -> list[tuple[str, str]]:
-        """Return the rows of the summary.
-
-        Returns
-        -------
-        Labels and values.
-        """
+        """Return the rows of the summary, labels and values."""
         mesh, report = self.mesh, self.report
         length, node, u = self.largest_displacement()
         mises, element, center = self.largest_von_mises()

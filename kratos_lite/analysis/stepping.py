@@ -169,12 +169,7 @@ CHECKED = 100
 
 
 class BodyStepper:
-    """One body, or many of one kind as one, with a clock of its own.
-
-    Parameters
-    ----------
-    body : a body, or bodies that advance together.
-    """
+    """A body, or many of one class as one, with a clock of its own."""
 
     def __init__(self, body: Body | Sequence[Body]) -> None:
         if isinstance(body, Body):

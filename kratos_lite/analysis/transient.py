@@ -153,12 +153,7 @@ class TransientAnalysis:
     # ---- steps -----------------------------------------------------------------------------------
 
     def critical_step(self) -> float:
-        """Return the longest stable step.
-
-        Returns
-        -------
-        float, s; infinite for implicit integrators.
-        """
+        """Return the longest stable step in s; infinite for implicit integrators."""
         return self.integrator.critical_step(self.equations)
 
     def prepare(self, h: float, parts: int) -> None:
@@ -219,23 +214,13 @@ class TransientAnalysis:
             )
 
     def diverged(self) -> bool:
-        """Return whether the motion has lost its stability.
-
-        Returns
-        -------
-        bool : displacements are beyond the divergence limit, or no numbers.
-        """
+        """Return whether displacements are beyond the divergence limit, or NaN."""
         return not np.abs(self.u).max(initial=0.0) < self._limit
 
     # ---- what is known at the time ---------------------------------------------------------------
 
     def state(self) -> State:
-        """Return the model as it is now.
-
-        Returns
-        -------
-        State
-        """
+        """Return the model as it is now."""
         residual = self._residual()
         values = {name: self._whole(getattr(self, name)).copy() for name in "uva"}
         values["reactions"] = self.equations.model.supports.supported(self._whole(residual))
@@ -349,12 +334,7 @@ class TransientAnalysis:
         return result
 
     def reactions(self) -> Array:
-        """Return the forces of supports and constraints on the model, M a + C v + K u - f.
-
-        Returns
-        -------
-        (n, 3) float, N; 0 where nothing acts.
-        """
+        """Return M a + C v + K u - f (n, 3) in N: forces of supports and constraints, 0 where none act."""
         return self.equations.model.supports.supported(self._whole(self._residual()))
 
     def energy(self, state: State | None = None) -> float:
@@ -417,14 +397,7 @@ _log = logging.getLogger("kratos_lite")
 class CriticalRateMonitor:
     """Checks the rate of a motion, and warns once when it comes near the critical one.
 
-    Parameters
-    ----------
-    e : the equations, which take the warnings; without a motion there is nothing to see.
-
-    Attributes
-    ----------
-    critical : the lowest critical rate, infinite without a motion.
-    of_mesh : that of the mesh itself; None where it is but an estimate.
+    `of_mesh` is the lowest critical rate of the mesh itself; None without a motion, or if it is estimated.
     """
 
     def __init__(self, e: EquationsOfMotion) -> None:
