@@ -11,7 +11,6 @@ from kratos_lite.analysis.integrators import Bossak as Bossak
 from kratos_lite.analysis.integrators import CentralDifference as CentralDifference
 from kratos_lite.analysis.integrators import GeneralizedAlpha as GeneralizedAlpha
 from kratos_lite.analysis.integrators import Newmark as Newmark
-from kratos_lite.analysis.line_values import LineValues as LineValues
 from kratos_lite.analysis.material_derivatives import material_acceleration as material_acceleration
 from kratos_lite.analysis.material_derivatives import material_derivative as material_derivative
 from kratos_lite.analysis.material_derivatives import material_velocity as material_velocity
@@ -22,6 +21,7 @@ from kratos_lite.analysis.model import Model as Model
 from kratos_lite.analysis.part_analysis import solve_part as solve_part
 from kratos_lite.analysis.plot import animate as animate
 from kratos_lite.analysis.plot import plot as plot
+from kratos_lite.analysis.point_values import LineValues as LineValues
 from kratos_lite.analysis.point_values import PointValues as PointValues
 from kratos_lite.analysis.quantities import DisplacementAt as DisplacementAt
 from kratos_lite.analysis.quantities import MeanDisplacement as MeanDisplacement

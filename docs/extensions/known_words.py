@@ -8,7 +8,7 @@ from typing import Any
 from sphinx.util.docutils import SphinxDirective
 
 from kratos_lite.analysis.fields import FIELDS
-from kratos_lite.analysis.named_values import NAMES
+from kratos_lite.analysis.subjects import NAMES
 from kratos_lite.io.formats.mdpa.scan import LISTS, TOP
 from kratos_lite.io.kratos import (
     expected_values,

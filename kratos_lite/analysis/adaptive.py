@@ -18,8 +18,7 @@ from typing import TypeAlias, TypeVar
 
 import numpy as np
 
-from kratos_lite.analysis.adaptive_levels import Level, QuantityLevel
-from kratos_lite.analysis.layers import layer_direction
+from kratos_lite.analysis.adaptive_levels import Level, QuantityLevel, layer_direction
 from kratos_lite.analysis.peak import peak
 from kratos_lite.analysis.quantities import Quantity
 from kratos_lite.analysis.report import RefinementStep

@@ -74,12 +74,7 @@ class Comparison(Tabular):
     same_mesh: bool
 
     def table(self) -> list[tuple[str, str]]:
-        """Return the rows of the summary.
-
-        Returns
-        -------
-        Labels and values.
-        """
+        """Return the rows of the summary, labels and values."""
         first, second = self.energies
         change = f", {second / first - 1:+.3e} of the first" if first else ""
         how = "the same nodes" if self.same_mesh else "the second interpolated at the nodes of the first"

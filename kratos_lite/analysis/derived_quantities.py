@@ -9,10 +9,6 @@ import numpy as np
 from kratos_lite.ale import Motion
 from kratos_lite.ale.checks import critical_rate_estimate
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
-from kratos_lite.analysis.report import Report
-from kratos_lite.analysis.result import Result
-from kratos_lite.analysis.small_deformations import check_deformation
-from kratos_lite.analysis.state import State
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Where
 from kratos_lite.model.structure import Structure
@@ -113,30 +109,3 @@ def _center(e: EquationsOfMotion, time: float) -> dict[str, list[float]]:
         return {}
     velocity, acceleration = e.center_rates(time)
     return {"center_velocity": velocity.tolist(), "center_acceleration": acceleration.tolist()}
-
-
-def result_of(
-    e: EquationsOfMotion, at: State, integrator: str, left: float | None, critical: float | None
-) -> Result:
-    """Return a state as a result; `left` is what its balance misses, where that is known."""
-    model, loads = e.model, e.system.scatter(e.load(at.time)).copy()
-    report = Report(
-        unknowns=len(e.system.constraint_map.free),
-        total_load=loads.sum(axis=0),
-        total_reaction=at.reactions.sum(axis=0),
-        solver=integrator,
-        reason=f"step {at.step}, t = {at.time:g} s",
-        iterations=0,
-        backward_error=left,
-        force_error=None,
-        moment_error=None,
-        seconds={},
-        warnings=[*e.warnings, *check_deformation(model, e.groups, at.u)],
-        notes=model.remarks(),
-        formulation=model.chosen(e.groups),
-    )
-    u0 = model.initial_displacement
-    result = Result(model.mesh, e.groups, at.u.copy(), at.reactions.copy(), loads, report, u0)
-    if e.terms is not None:
-        report.motion = motion_summary(e, result, critical, at.time)
-    return result

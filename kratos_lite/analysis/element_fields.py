@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kratos_lite.analysis.fields import FIELDS
-from kratos_lite.analysis.integration_point_values import QUANTITIES, GaussPoints
+from kratos_lite.analysis.fields import FIELDS, QUANTITIES, GaussPoints
 from kratos_lite.assembly.element_groups import ElementGroup, group_of_element
 from kratos_lite.assembly.gauss_point_fields import at_gauss, in_order, totals
 from kratos_lite.errors import InputError
@@ -139,11 +138,6 @@ class ElementFields:
         -------
         In Pa, shaped as by `strain`.
 
-        Raises
-        ------
-        InputError
-            There is no such place.
-
         Examples
         --------
         >>> import kratos_lite as kl
@@ -253,11 +247,6 @@ class ElementFields:
         Returns
         -------
         (m, g), (m,), (n,) or (m, k) in Pa.
-
-        Raises
-        ------
-        InputError
-            There is no such place.
         """
         return self.field("von_mises", at)
 
@@ -271,11 +260,6 @@ class ElementFields:
         Returns
         -------
         (m, g), (m,), (n,) or (m, k) in Pa.
-
-        Raises
-        ------
-        InputError
-            There is no such place.
         """
         return self.field("tresca", at)
 
@@ -289,11 +273,6 @@ class ElementFields:
         Returns
         -------
         (m, g, 3), (m, 3), (n, 3) or (m, k, 3) in Pa.
-
-        Raises
-        ------
-        InputError
-            There is no such place.
 
         Examples
         --------
@@ -318,11 +297,6 @@ class ElementFields:
         Returns
         -------
         (..., 3, 3), rows in the order σ1 ≥ σ2 ≥ σ3.
-
-        Raises
-        ------
-        InputError
-            There is no such place.
         """
         return self.field("principal_directions", at)
 
@@ -389,19 +363,9 @@ class ElementFields:
         return totals(self.mesh.points, self.groups, self._strained)
 
     def totals(self) -> tuple[float, float, int]:
-        """Return what one pass over the elements gives.
-
-        Returns
-        -------
-        Strain energy in J, largest von Mises stress at a Gauss point in Pa, and the row of its element.
-        """
+        """Return strain energy in J, largest von Mises stress of Gauss points in Pa, index of its element."""
         return self._totals
 
     def energy(self) -> float:
-        """Return the strain energy ½ ∫ ε:C:ε dV.
-
-        Returns
-        -------
-        In J.
-        """
+        """Return the strain energy ½ ∫ ε:C:ε dV in J."""
         return self._totals[0]

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from kratos_lite.ale import Motion, MotionMatrices
 from kratos_lite.ale.checks import check_materials
-from kratos_lite.analysis.time_dependent_loads import AppliedLoads, PrescribedDisplacement
+from kratos_lite.analysis.nodal_loads import AppliedLoads
+from kratos_lite.analysis.prescribed_motion import PrescribedMotion
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model.free_motions import FreeMotions
@@ -48,7 +49,7 @@ class EquationsOfMotion:
     mass : M.
     terms : the matrices of the motion, or None.
     applied : function of the time that gives the nodal forces (3a,) of all loads but those of the motion.
-    prescribed : function of the time that gives the displacements (3a,) where the free ones are 0.
+    prescribed : what supports prescribe; called with the time, displacements (3a,) where free ones are 0.
     step : s, over which an acceleration is taken from the rate; 0 for its slope.
     warnings : what the checks of the model and of its motion at the time 0 found.
 
@@ -87,7 +88,7 @@ class EquationsOfMotion:
             progress=progress,
         )
         self.applied = AppliedLoads(model, self.system, self.groups)
-        self.prescribed = PrescribedDisplacement(model, self.system)
+        self.prescribed = PrescribedMotion(model.supports, self.system)
         placed = self.system.points, self.system.groups, self.system.pattern
         self.mass = Mass(*placed, lumped)
         self.terms: MotionMatrices | None = None
@@ -149,29 +150,25 @@ class EquationsOfMotion:
         """Return what the motion adds to K, data (nnz,) on the pattern, or None."""
         if self.terms is None:
             return None
-        motion, terms = self.terms.motion, self.terms
         rate, acceleration = self.rates(time)
-        out: Array | None = None
+        parts = []
         if rate:
-            out = -(rate**2) * terms.H
+            parts.append(-(rate**2) * self.terms.H)
             if self.stiffened:
-                out = out + rate**2 * self.stiffening
-        carried = acceleration + motion.damping * rate
-        if carried:
-            flow = carried * terms.circulatory
-            out = flow if out is None else out + flow
-        return out
+                parts.append(rate**2 * self.stiffening)
+        if carried := acceleration + self.terms.motion.damping * rate:
+            parts.append(carried * self.terms.circulatory)
+        return np.asarray(sum(parts)) if parts else None
 
     def damping_terms(self, time: float) -> Array | None:
         """Return what motion and mass-proportional damping add to C, data (nnz,), or None."""
-        out: Array | None = self.rayleigh[0] * self.mass.data if self.rayleigh[0] else None
-        if self.terms is not None and (alpha := self.terms.motion.damping):
-            own = alpha * self.terms.of_moving(self.mass.data)
-            out = own if out is None else out + own
-        if self.terms is not None and (rate := self.terms.motion.rate(time)):
-            gyroscopic = 2 * rate * self.terms.gyroscopic
-            out = gyroscopic if out is None else out + gyroscopic
-        return out
+        parts = [self.rayleigh[0] * self.mass.data] if self.rayleigh[0] else []
+        if self.terms is not None:
+            if alpha := self.terms.motion.damping:
+                parts.append(alpha * self.terms.of_moving(self.mass.data))
+            if rate := self.terms.motion.rate(time):
+                parts.append(2 * rate * self.terms.gyroscopic)
+        return np.asarray(sum(parts)) if parts else None
 
     @property
     def stiffened(self) -> bool:
@@ -194,10 +191,6 @@ class EquationsOfMotion:
     def dashpots(self) -> BlockMatrix | None:
         """Damping of absorbing boundaries, (3a, 3a) in N s/m, or None."""
         return self.terms.motion.boundary_damping(self.model.mesh, self.system) if self.terms else None
-
-    def times_mass(self, v: Array) -> Array:
-        """Return M v."""
-        return self.mass.times(v)
 
     def times_damping(self, v: Array, time: float) -> Array:
         """Return C v at a time."""
@@ -277,7 +270,12 @@ class EquationsOfMotion:
         constraints = self.system.constraint_map
         plan = repeated("auto", len(constraints.free), symmetric)
         equations = LinearSolver(A, constraints, self.system.points, plan, symmetric=symmetric)
-        return lambda f, prescribed: equations.solve(f, 1e-13, self.system.progress, prescribed).x
+        return partial(_solved, equations, self.system.progress)
+
+
+def _solved(equations: LinearSolver, progress: Progress | None, f: Array, prescribed: Array) -> Array:
+    """Return displacements (3a,); no lambda, as an analysis can be pickled."""
+    return equations.solve(f, 1e-13, progress, prescribed).x
 
 
 def _checked_rayleigh(rayleigh: tuple[float, float]) -> tuple[float, float]:

@@ -1,16 +1,19 @@
-"""Nodal forces of a structure: of its loads, its initial stress and the stresses of a result."""
+"""Nodal forces of a structure: of its loads, of its initial stress and of the stresses of a result."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import cached_property
 
 import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.gauss_point_fields import internal_load
 from kratos_lite.mesh import Mesh
-from kratos_lite.model.loads import Load
+from kratos_lite.model.checks import check_carried
+from kratos_lite.model.loads import Load, TimeDependentLoad
 from kratos_lite.model.structure import Structure
+from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.typing import Array
 
 
@@ -24,14 +27,49 @@ def external_loads(mesh: Mesh, groups: Sequence[ElementGroup], loads: Sequence[L
 
 def initial_loads(model: Structure, groups: Sequence[ElementGroup]) -> Array | None:
     """Return ∫ B^T (σ0 - C ε0) dV: what prestress and stress-free displacement put on the nodes."""
-    u0 = model.initial_displacement
-    if u0 is None and model.prestress is None:
+    if model.initial_displacement is None and model.prestress is None:
         return None
-    start = np.zeros_like(model.mesh.points) if u0 is None else -u0
-    return internal_load(model.mesh.points, groups, start)
+    return stress_load(model, groups, np.zeros_like(model.mesh.points))
 
 
 def stress_load(model: Structure, groups: Sequence[ElementGroup], u: Array) -> Array:
     """Return ∫ B^T σ dV (n, 3) in N of the stresses that a result of u shows, with those of prestress."""
     u0 = model.initial_displacement
     return internal_load(model.mesh.points, groups, u if u0 is None else u - u0)
+
+
+class AppliedLoads:
+    """The nodal forces of the loads of a structure at a time; what does not change is made once."""
+
+    def __init__(self, model: Structure, system: ConstrainedSystem, groups: list[ElementGroup]) -> None:
+        self.model, self.system, self._groups = model, system, groups
+
+    def __call__(self, time: float) -> Array:
+        """Return the nodal forces (3a,) in N at a time in s."""
+        total = self._constant.copy()
+        for history in self._histories:
+            total += history(time)
+        return total
+
+    def _forces_of(self, load: Load) -> Array:
+        used = np.zeros(self.system.n_nodes, dtype=bool)
+        used[self.system.nodes] = True
+        forces = load.forces(self.model.mesh, self._groups)
+        check_carried(self.model.mesh, forces, used)
+        return self.system.gather(forces)
+
+    @cached_property
+    def _constant(self) -> Array:
+        total = np.zeros(3 * len(self.system.nodes))
+        initial = initial_loads(self.model, self._groups)
+        if initial is not None:
+            total -= self.system.gather(initial)
+        for load in self.model.loads:
+            if not isinstance(load, TimeDependentLoad):
+                total += self._forces_of(load)
+        return total
+
+    @cached_property
+    def _histories(self) -> list[Callable[[float], Array | float]]:
+        loads = [load for load in self.model.loads if isinstance(load, TimeDependentLoad)]
+        return [load.history(self._forces_of) for load in loads]

@@ -7,7 +7,7 @@ import numpy as np
 from kratos_lite.analysis.nodal_loads import initial_loads, stress_load
 from kratos_lite.analysis.report import Report, element_counts, vector
 from kratos_lite.analysis.result import Result
-from kratos_lite.analysis.solution_checks import Phases, check_arguments, judge, quality
+from kratos_lite.analysis.solution_checks import Phases, check_arguments, check_solution, metrics
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.distributed.part_system import PartSystem
 from kratos_lite.distributed.partition import Partition
@@ -118,7 +118,7 @@ def solve_part(
         total = own[:, None] * (external + reactions - inner)
         size = partition.sum(float(np.abs(own[:, None] * np.stack([external, reactions])).sum()))
         off = partition.sum(float(np.abs(total).sum())) / size if size else 0.0
-        judge(solution, u, (off, 0.0))
+        check_solution(solution, u, (off, 0.0))
         work = partition.sum(checks.work_of(u[own], inner[own], external[own], reactions[own]))
         system.warnings += [] if initial is not None else checks.check_energy(work)
     found = [text for some in partition.gather(warnings) for text in some]
@@ -126,7 +126,7 @@ def solve_part(
         unknowns=system.unknowns,
         total_load=partition.sum(external[own].sum(axis=0)),
         total_reaction=partition.sum(reactions[own].sum(axis=0)),
-        **quality(solution, (off, 0.0)),
+        **metrics(solution, (off, 0.0)),
         seconds=phase.seconds,
         warnings=[*dict.fromkeys(found), *system.warnings],
         notes=list(dict.fromkeys(text for some in partition.gather(model.remarks()) for text in some)),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -15,6 +15,7 @@ ACTS = 1e-6
 """Reaction, of the largest one, that is more than rounding."""
 
 
+@runtime_checkable
 class Solved(Protocol):
     """What is read of a result."""
 

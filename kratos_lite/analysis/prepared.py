@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,26 +19,22 @@ from kratos_lite.model.loads import Load
 from kratos_lite.model.structure import Structure
 from kratos_lite.model.supports import Supports
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
-from kratos_lite.typing import Array, Ints, Mask
+from kratos_lite.typing import Array, Ints, Mask, Progress
+from kratos_lite.validation import choice
+
+if TYPE_CHECKING:
+    from kratos_lite.solvers.constraint_map import ConstraintMap
 
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A structure that has passed its checks.
+    """A structure that has passed its checks."""
 
-    Attributes
-    ----------
-    version : of the structure.
-    groups, warnings : its elements, and what the checks found.
-    free : the rigid motions that supports leave to its components.
-    initial : (n, 3) N, nodal forces of the initial state, or None.
-    """
-
-    version: tuple[int, int]
+    version: tuple[int, int]  # of the structure
     groups: list[ElementGroup]
-    warnings: list[str]
-    free: FreeMotions
-    initial: Array | None
+    warnings: list[str]  # of the checks
+    free: FreeMotions  # the rigid motions that supports leave to its components
+    initial: Array | None  # (n, 3) N, nodal forces of the initial state
 
     @cached_property
     def component(self) -> Ints:
@@ -135,3 +132,73 @@ def load_set(
 def any_axis(mask: Mask) -> Mask:
     """Return mask.any(axis=1) of a mask (n, 3), faster."""
     return mask[:, 0] | mask[:, 1] | mask[:, 2]
+
+
+BACKENDS = ("own", "petsc")
+
+
+def backend_of(backend: str | None, petsc: str | None) -> str:
+    """Return the backend: ``own`` if none is named and no PETSc options are given."""
+    chosen = ("own" if petsc is None else "petsc") if backend is None else backend
+    if choice(chosen, "backend", BACKENDS) == "own":
+        if petsc is not None:
+            raise InputError("PETSc options are for backend='petsc'; leave them out, or take that backend")
+        return chosen
+    from kratos_lite.distributed.communicator import started
+    from kratos_lite.distributed.petsc import parsed
+    from kratos_lite.distributed.petsc import petsc as load
+
+    parsed(petsc)
+    load()
+    started()
+    return chosen
+
+
+def check_own(backend: str | None, petsc: str | None, what: str) -> None:
+    """Raise InputError where another backend is asked for than the own one, which something needs."""
+    if backend_of(backend, petsc) != "own":
+        raise InputError(f"{what} is solved by the own backend alone; leave backend and PETSc options out")
+
+
+def system_of(
+    model: Structure,
+    groups: Sequence[ElementGroup],
+    held: Mask,
+    solver: str,
+    tolerance: float,
+    progress: Progress | None,
+    backend: str,
+    petsc: str | None,
+) -> ConstrainedSystem:
+    """Return the constrained system of some elements of a model, for an backend.
+
+    Components `held` (n, 3) of what supports leave free are 0, too.
+    """
+
+    def constraints(nodes: Ints) -> ConstraintMap:
+        return model.supports.constraint_map(nodes).holding(held[nodes])
+
+    if backend == "own":
+        return ConstrainedSystem(
+            model.mesh.points,
+            groups,
+            constraints,
+            solver=solver,
+            tolerance=tolerance,
+            patterns=model.patterns,
+            progress=progress,
+            hanging=model.mesh.hanging,
+        )
+    from kratos_lite.distributed.communicator import started
+    from kratos_lite.distributed.petsc_system import PetscSystem
+
+    return PetscSystem(
+        model.mesh.points,
+        groups,
+        constraints,
+        started(),
+        petsc,
+        solver=solver,
+        tolerance=tolerance,
+        progress=progress,
+    )

@@ -7,41 +7,69 @@ of a table's kinks.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
 
-from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
+from kratos_lite.model.supports import Supports
+from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.typing import Array
 
 Kinematics: TypeAlias = tuple[Array, Array, Array]
 """Displacement, velocity and acceleration (3a,)."""
 
 
-def prescribed_part(e: EquationsOfMotion, x: Array) -> Array:
-    """Return what vectors (3a,) have beyond their free components and what constraints make of those."""
-    constraints = e.system.constraint_map
-    return np.asarray(x - constraints.transform(x[constraints.free]))
+class PrescribedMotion:
+    """What supports and constraints prescribe at a time; it is linear in the prescribed motion."""
 
+    def __init__(self, supports: Supports, system: ConstrainedSystem) -> None:
+        self.supports, self.system = supports, system
 
-def with_prescribed(e: EquationsOfMotion, x: Array, prescribed: Array) -> Array:
-    """Return vectors (3a,) with the free components of x; the others follow from supports and constraints."""
-    constraints = e.system.constraint_map
-    return np.asarray(constraints.transform(x[constraints.free]) + prescribed)
+    def __call__(self, time: float) -> Array:
+        """Return the displacements (3a,) in m at a time in s where the free ones are 0."""
+        resting, moving = self._fields
+        return resting + sum(function(time) * field for function, field in moving)
 
+    @cached_property
+    def _fields(self) -> tuple[Array, list[tuple[Callable[[float], float], Array]]]:
+        """What is prescribed while all that moves is at 0, and the field (3a,) of each motion, at 1."""
+        values = self.supports.values.copy()
+        motions = self.supports.motions
+        for _, moved in motions:
+            values[moved] = 0.0
+        resting = self._at(values)
+        moving = [(function, self._at(np.where(moved, 1.0, values)) - resting) for function, moved in motions]
+        return resting, moving
 
-def at_start(e: EquationsOfMotion, h: float = np.inf) -> Kinematics:
-    """Return what is prescribed at the time 0, by one-sided differences of order 2 over steps up to h."""
-    g, zero = e.prescribed(0.0), np.zeros(e.size)
-    if not e.model.supports.motions:
-        return g, zero, zero
-    short, long = min(h, 1e-6), min(h, 1e-5)
-    velocity = (-3 * g + 4 * e.prescribed(short) - e.prescribed(2 * short)) / (2 * short)
-    later = [e.prescribed(i * long) for i in (1, 2, 3)]
-    return g, velocity, (2 * g - 5 * later[0] + 4 * later[1] - later[2]) / long**2
+    def _at(self, values: Array) -> Array:
+        """Return the displacements (3a,) for prescribed values (n, 3), 0 where they are free."""
+        constraints = self.supports.constraint_map(self.system.nodes, values)
+        constraints.c[constraints.free] = 0.0
+        return constraints.c
 
+    def part(self, x: Array) -> Array:
+        """Return what vectors (3a,) have beyond their free components and what constraints make of those."""
+        constraints = self.system.constraint_map
+        return np.asarray(x - constraints.transform(x[constraints.free]))
 
-def at_end(e: EquationsOfMotion, time: float, h: float) -> Kinematics:
-    """Return what is prescribed at the end of a step, time ≥ h, by central differences over steps h."""
-    before, now, after = (e.prescribed(time + k * h) for k in (-1, 0, 1))
-    return now, (after - before) / (2 * h), (after - 2 * now + before) / h**2
+    def replace(self, x: Array, prescribed: Array) -> Array:
+        """Return vectors (3a,) with the free components of x; the others follow from supports."""
+        constraints = self.system.constraint_map
+        return np.asarray(constraints.transform(x[constraints.free]) + prescribed)
+
+    def at_start(self, h: float = np.inf) -> Kinematics:
+        """Return what is prescribed at the time 0, by one-sided differences of order 2 over steps up to h."""
+        g = self(0.0)
+        if not self.supports.motions:
+            return g, np.zeros_like(g), np.zeros_like(g)
+        short, long = min(h, 1e-6), min(h, 1e-5)
+        velocity = (-3 * g + 4 * self(short) - self(2 * short)) / (2 * short)
+        later = [self(i * long) for i in (1, 2, 3)]
+        return g, velocity, (2 * g - 5 * later[0] + 4 * later[1] - later[2]) / long**2
+
+    def at_end(self, time: float, h: float) -> Kinematics:
+        """Return what is prescribed at the end of a step, time ≥ h, by central differences over steps h."""
+        before, now, after = (self(time + k * h) for k in (-1, 0, 1))
+        return now, (after - before) / (2 * h), (after - 2 * now + before) / h**2

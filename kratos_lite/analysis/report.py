@@ -97,12 +97,7 @@ class Report(Tabular):
     history: list[RefinementStep] = field(default_factory=list)
 
     def table(self) -> list[tuple[str, str]]:
-        """Return the rows of the summary.
-
-        Returns
-        -------
-        Labels and values.
-        """
+        """Return the rows of the summary, labels and values."""
         return self.load_rows() + self.solution_rows()
 
     def load_rows(self, size: float = 0.0) -> list[tuple[str, str]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, Protocol, overload
 
 import numpy as np
 
@@ -12,8 +12,9 @@ from kratos_lite.analysis.element_fields import ElementFields
 from kratos_lite.analysis.peak import peak
 from kratos_lite.analysis.report import Report, element_counts, vector
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.errors import InputError
+from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh, Where
+from kratos_lite.model.structure import Structure
 from kratos_lite.tabular import Tabular
 from kratos_lite.typing import Array, Numbers
 from kratos_lite.validation import finite, flag, instance, whole_number
@@ -24,11 +25,18 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from kratos_lite.analysis.error_estimate import ErrorEstimate, QuantityError
-    from kratos_lite.analysis.line_values import LineValues
-    from kratos_lite.analysis.origin import Origin
-    from kratos_lite.analysis.point_values import PointValues
+    from kratos_lite.analysis.point_values import LineValues, PointValues
     from kratos_lite.analysis.quantities import Quantity
     from kratos_lite.mesh.locate import Located
+
+
+class Analysis(Protocol):
+    """What has solved a structure, and solves it for other loads."""
+
+    model: Structure
+
+    def adjoint(self, load: Array, motion: Array) -> Array:
+        """Return the displacement (n, 3) under a load alone, with supports displaced by a motion alone."""
 
 
 class Result(ElementFields, Tabular):
@@ -44,7 +52,7 @@ class Result(ElementFields, Tabular):
     reactions, loads : (n, 3) nodal forces in N.
     report : what was solved, how, and how well.
     u0 : (n, 3) displacements in m without stress; none if not given.
-    origin : what was solved, for bounds of the error and the errors of quantities.
+    analysis : what solved it, for the errors of quantities.
     """
 
     def __init__(
@@ -56,7 +64,7 @@ class Result(ElementFields, Tabular):
         loads: Array,
         report: Report,
         u0: Array | None = None,
-        origin: Origin | None = None,
+        analysis: Analysis | None = None,
     ) -> None:
         super().__init__(mesh, groups, u, u0)
         self.reactions = reactions
@@ -64,7 +72,8 @@ class Result(ElementFields, Tabular):
         for array in (reactions, loads):
             array.setflags(write=False)  # others are made of them later
         self.report = report
-        self._origin = origin
+        self._analysis = analysis
+        self._version = analysis.model.version if analysis else None
 
     # ---- nodal values --------------------------------------------------------------------------
 
@@ -170,7 +179,7 @@ class Result(ElementFields, Tabular):
         >>> line.membrane[0].round(6).tolist(), line.bending[0].round(6).tolist()
         (250.0, -500.0)
         """
-        from kratos_lite.analysis.line_values import LineValues  # a quick start for results
+        from kratos_lite.analysis.point_values import LineValues  # a quick start for results
 
         ends = np.array(
             [finite(end, f"the {name} of a line", (3,)) for end, name in ((a, "beginning"), (b, "end"))]
@@ -241,16 +250,20 @@ class Result(ElementFields, Tabular):
         """
         if of is None:
             return self._error
-        if self._origin is None:
+        analysis = self._analysis
+        if analysis is None:
             raise InputError(
                 "the error of a quantity needs the model and the matrix of a static analysis; this result "
                 "has none"
             )
-        from kratos_lite.analysis.adjoint import error_of
+        if self._version != analysis.model.version:
+            raise ModelError("the model has changed since this solution; solve it again")
+        from kratos_lite.analysis.error_estimate import error_of
         from kratos_lite.analysis.quantities import Quantity
 
         quantity = instance(of, "of", Quantity, "kl.DisplacementAt((1, 0, 0), 'z')")
-        return error_of(self, self._origin, quantity, self._strained, self._recovery)
+        fixed = analysis.model.supports.fixed
+        return error_of(self, quantity, analysis.adjoint, fixed, self._strained, self._recovery)
 
     @cached_property
     def _error(self) -> ErrorEstimate:
@@ -271,10 +284,7 @@ class Result(ElementFields, Tabular):
     def columns(self) -> dict[str, Numbers]:
         """Return ids, places, displacements, reactions and recovered stresses of the nodes.
 
-        Returns
-        -------
-        dict of str to (n,) array
-            By headers with units; ``kl.write("nodes.csv", result)`` writes them.
+        They are (n,) by headers with units; ``kl.write("nodes.csv", result)`` writes them.
         """
         from kratos_lite.analysis.fields import nodal_columns  # a quick start for results
 
@@ -336,34 +346,19 @@ class Result(ElementFields, Tabular):
     # ---- out -----------------------------------------------------------------------------------
 
     def largest_displacement(self) -> tuple[float, int, Array]:
-        """Return the largest displacement of a node.
-
-        Returns
-        -------
-        Its size in m, the id of the node, and the displacement (3,) in m.
-        """
+        """Return the largest displacement of a node: its size in m, the id of the node, and u (3,) in m."""
         length = np.linalg.norm(self.u, axis=1)
         node = int(length.argmax())
         return float(length[node]), int(self.mesh.node_ids[node]), self.u[node]
 
     def largest_von_mises(self) -> tuple[float, int, Array]:
-        """Return the largest von Mises stress at a Gauss point.
-
-        Returns
-        -------
-        In Pa, the id of its element, and the center (3,) of that in m.
-        """
+        """Return the largest von Mises stress of Gauss points in Pa, id and center (3,) of its element."""
         mesh, (_, mises, row) = self.mesh, self._totals
         (nodes,) = (group.nodes[group.rows == row] for group in self.groups if row in group.rows)
         return mises, int(mesh.element_ids[row]), mesh.points[nodes[0]].mean(axis=0)
 
     def table(self) -> list[tuple[str, str]]:
-        """Return the rows of the summary.
-
-        Returns
-        -------
-        Labels and values.
-        """
+        """Return the rows of the summary, labels and values."""
         mesh, report = self.mesh, self.report
         length, node, u = self.largest_displacement()
         mises, element, center = self.largest_von_mises()

@@ -1,21 +1,24 @@
-"""What every solution without time has in common: its arguments, phases, quality and verdict."""
+"""What every solution without time has in common: its arguments, phases, quality and checks."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from itertools import combinations
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
+from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError, SolveError
 from kratos_lite.mesh import Mesh
-from kratos_lite.model.checks import equilibrium
+from kratos_lite.model.checks import equilibrium, young_moduli
 from kratos_lite.model.structure import Structure
+from kratos_lite.registry import remembered
 from kratos_lite.solvers.linear_solver import Solution
 from kratos_lite.solvers.plan import METHODS
-from kratos_lite.typing import Array, Progress
+from kratos_lite.typing import Array, Ints, Progress
 from kratos_lite.validation import choice, function_or_none
 
 
@@ -48,7 +51,7 @@ def check_arguments(solver: str, tolerance: float) -> None:
     choice(solver, "solver", METHODS)
 
 
-def quality(solution: Solution, balance: tuple[float, float]) -> dict[str, Any]:
+def metrics(solution: Solution, balance: tuple[float, float]) -> dict[str, Any]:
     """Return how a solution was found and how good it is, by the names of a `Report`."""
     return {
         "solver": solution.method,
@@ -60,7 +63,7 @@ def quality(solution: Solution, balance: tuple[float, float]) -> dict[str, Any]:
     }
 
 
-def initial_noise(model: Structure, norm: float, tolerance: float, forces: Array) -> float:
+def initial_roundoff(model: Structure, norm: float, tolerance: float, forces: Array) -> float:
     """Return what rounding and the solver leave of the forces (n, 3) of an initial state, in N."""
     u0 = model.initial_displacement
     largest = 0.0 if u0 is None else float(np.abs(u0).max(initial=0.0))
@@ -79,7 +82,7 @@ def balance_of(
     return equilibrium(mesh.points, external, reactions, inner, rounding)
 
 
-def judge(solution: Solution, u: Array, balance: tuple[float, float]) -> None:
+def check_solution(solution: Solution, u: Array, balance: tuple[float, float]) -> None:
     """Raise SolveError for a solution that does not solve its equations or is not in equilibrium."""
     if not np.isfinite(u).all() or solution.backward_error > 1e-8:
         raise SolveError(
@@ -94,3 +97,86 @@ def judge(solution: Solution, u: Array, balance: tuple[float, float]) -> None:
             "nearly free parts or an element class whose stiffness is not that of its stresses, and please "
             "report a model that has none"
         )
+
+
+LARGE = 0.1
+"""Displacement, as share of the diagonal of the body, from which it is not small."""
+TINY = 1e-11
+"""Displacement, as share of the diagonal, below which a load does nothing: 0.2 Pa on steel do more."""
+STRAINED = 0.05
+"""Strain from which it is not small."""
+SAMPLE = 500
+"""Elements whose strain is looked at, spread over the mesh."""
+UNITLESS = 10.0
+"""Young's modulus in Pa below all materials, gels included, so that models with it are without units."""
+GOLDEN = (5**0.5 - 1) / 2
+UNITS = "is E in Pa (steel: 210e9), are lengths in m, forces in N and pressures in Pa?"
+IN_MM = "are lengths in mm (read with scale=1e-3, or --scale mm) and pressures in MPa?"
+
+
+def check_deformation(model: Structure, groups: Sequence[ElementGroup], u: Array) -> list[str]:
+    """Warn of displacements u (n, 3) in m, or their strains, too large for linear theory, or next to nothing.
+
+    Those of a model without units, softer than everything there is, are whatever they are.
+    """
+    mesh, start, prescribed = model.mesh, model.initial_displacement, model.supports.values
+    moved = u if start is None else u - start
+    if not moved.any():
+        return []
+    strain, size, largest = largest_elongation(mesh, moved), _diagonal(mesh.points), _diagonal(moved)
+    if largest > LARGE * size:  # nodes without elements stay, whatever the body does
+        largest = _diagonal(moved[mesh.used_nodes()])
+    found = []
+    if largest > LARGE * size:
+        share = largest / size
+        times = f"{share:.0%} of" if share < 2 else f"{share:.3g} times"
+        found.append(f"displacements differ by {largest:.3g} m, {times} the size of the body")
+    elif largest < TINY * size:
+        return [
+            f"displacements differ by {largest:.3g} m only, {largest / size:.1e} of the size of the body "
+            f"({size:.3g} m); {IN_MM}"
+        ]
+    if strain > STRAINED:
+        found.append(f"strains reach at least {strain:.0%}")
+    if not found or all(young_moduli(group.material)[1] < UNITLESS for group in groups):
+        return []
+    meant = prescribed.any() and _diagonal(prescribed) > 0.5 * largest
+    limits = f"linear theory holds up to about {LARGE:.0%} of the size and strains of {STRAINED:.0%}"
+    return ["; ".join([", ".join(found), *([] if meant else [UNITS]), limits])]
+
+
+def largest_elongation(mesh: Mesh, u: Array) -> float:
+    """Return the largest change of length of the lines between corners of elements, relative.
+
+    It is a lower bound of the largest principal strain; of a large mesh, of `SAMPLE` elements.
+    """
+    found = 0.0
+    for block in mesh.blocks:
+        if block.shape is None or not len(block):
+            continue
+        cells = _spread(len(block), -(-SAMPLE * len(block) // mesh.n_elements))
+        corners = block.nodes[cells, : block.shape.corners]
+        one, other = _pairs(block.shape.corners)
+        X, D = mesh.points[corners], u[corners]
+        X, D = X[:, one] - X[:, other], D[:, one] - D[:, other]
+        length = np.maximum(np.einsum("epi,epi->ep", X, X), np.finfo(float).tiny)
+        found = max(found, float(np.abs(np.einsum("epi,epi->ep", X, D) / length).max()))
+    return found
+
+
+@remembered
+def _pairs(corners: int) -> tuple[Ints, Ints]:
+    one, other = np.array(list(combinations(range(corners), 2))).T
+    return one, other
+
+
+def _spread(count: int, wanted: int) -> Ints:
+    """Return rows of some of `count` elements, spread so that no regular order of them hides any."""
+    if wanted >= count:
+        return np.arange(count)
+    return (np.arange(wanted) * GOLDEN % 1 * count).astype(np.int64)
+
+
+def _diagonal(values: Array) -> float:
+    """Return the diagonal of the smallest box around vectors (n, 3)."""
+    return float(np.linalg.norm(np.ptp(values, axis=0))) if len(values) else 0.0

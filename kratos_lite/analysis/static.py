@@ -7,27 +7,27 @@ from dataclasses import replace
 
 import numpy as np
 
-from kratos_lite.analysis.backends import backend_of, system_of
 from kratos_lite.analysis.nodal_loads import stress_load
-from kratos_lite.analysis.origin import Origin
 from kratos_lite.analysis.prepared import (
     Equations,
     LoadSet,
     any_axis,
+    backend_of,
     dirichlet_conditions,
     load_set,
     prepared,
+    system_of,
 )
 from kratos_lite.analysis.report import Report
 from kratos_lite.analysis.result import Result
-from kratos_lite.analysis.small_deformations import check_deformation
 from kratos_lite.analysis.solution_checks import (
     Phases,
     balance_of,
     check_arguments,
-    initial_noise,
-    judge,
-    quality,
+    check_deformation,
+    check_solution,
+    initial_roundoff,
+    metrics,
 )
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model import checks
@@ -235,13 +235,13 @@ class StaticAnalysis:
             reactions = model.supports.supported(reactions)
             inner = model.supports.on_independents(stress_load(model, state.groups, u))
             if state.initial is not None and self.system is not None:
-                rounding = initial_noise(model, self.system.norm, self.tolerance, case.forces)
+                rounding = initial_roundoff(model, self.system.norm, self.tolerance, case.forces)
             else:
                 rounding = 0.0
             forces = case.external, case.forces, reactions, inner
             balance = balance_of(model.mesh, *forces, max(noise, rounding), 3 * int(state.used.sum()))
             if tolerance is None:
-                judge(solution, u, balance)
+                check_solution(solution, u, balance)
             initial = case.external - case.forces
             if tolerance is None and not initial.any():
                 work = checks.work_of(u, inner, case.external, reactions)
@@ -253,8 +253,7 @@ class StaticAnalysis:
             warnings += check_deformation(model, state.groups, u)
         report = self._report(case, solution, reactions, balance, warnings)
         u0 = model.initial_displacement
-        origin = Origin(self, model.version)
-        return Result(model.mesh, state.groups, u, reactions, case.external, report, u0, origin)
+        return Result(model.mesh, state.groups, u, reactions, case.external, report, u0, self)
 
     def release(self) -> None:
         """Release the matrix and what is made of it; another solution makes them anew."""
@@ -305,7 +304,7 @@ class StaticAnalysis:
             unknowns=n_equations - len(model.supports.dependents()),
             total_load=case.external.sum(axis=0),
             total_reaction=reactions.sum(axis=0),
-            **quality(solution, balance),
+            **metrics(solution, balance),
             seconds=case.phase.seconds,
             warnings=warnings,
             notes=[*model.remarks(), *state.free.notes(case.moving)],

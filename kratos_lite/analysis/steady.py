@@ -9,8 +9,13 @@ from kratos_lite.analysis.modal import critical_rates, critical_rates_beside
 from kratos_lite.analysis.nodal_loads import initial_loads, stress_load
 from kratos_lite.analysis.report import Report
 from kratos_lite.analysis.result import Result
-from kratos_lite.analysis.small_deformations import check_deformation
-from kratos_lite.analysis.solution_checks import Phases, check_arguments, judge, quality
+from kratos_lite.analysis.solution_checks import (
+    Phases,
+    check_arguments,
+    check_deformation,
+    check_solution,
+    metrics,
+)
 from kratos_lite.model.checks import check_loads, equilibrium
 from kratos_lite.model.loads.base import equal_loads
 from kratos_lite.model.structure import Structure
@@ -56,7 +61,7 @@ def solve_steady(
         initial = initial_loads(model, e.groups)
         stresses = stresses if initial is None else stresses - initial  # as in the load
         balance = equilibrium(model.mesh.points, nodal - inner, reactions, stresses)
-        judge(solution, u, balance)
+        check_solution(solution, u, balance)
         critical = None
         if e.terms is not None and e.rates(0.0)[0]:
             if solution.method == "direct":
@@ -67,7 +72,7 @@ def solve_steady(
         unknowns=len(e.system.constraint_map.free),
         total_load=nodal.sum(axis=0),
         total_reaction=reactions.sum(axis=0),
-        **quality(solution, balance),
+        **metrics(solution, balance),
         seconds=phase.seconds,
         warnings=warnings,
         notes=[*model.remarks(), *changing],

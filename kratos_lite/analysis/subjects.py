@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from kratos_lite.analysis.fields import Fields
-from kratos_lite.analysis.named_values import MOTIONS, named_values, nodal_values
-from kratos_lite.analysis.peak import peak
+from kratos_lite.analysis.fields import FIELDS, PARTS, Fields
+from kratos_lite.analysis.peak import Solved, peak
 from kratos_lite.analysis.state import State
-from kratos_lite.errors import InputError
+from kratos_lite.errors import InputError, nearest
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array, Numbers
@@ -169,7 +168,7 @@ def _values(result: Fields | None, mesh: Mesh, u: Array | None, given: dict[str,
                 f"unit: the field {name!r} is shown in {named.unit or 'no unit'}, with a prefix; for another "
                 f"give an array in {short(unit)}, and its unit"
             )
-        if name == DEFAULT and hasattr(result, "reactions") and (top := peak(result)):
+        if name == DEFAULT and isinstance(result, Solved) and (top := peak(result)):
             return replace(named, title=f"{named.title}, largest {top.place}")
         return named
     if values is None:
@@ -256,3 +255,37 @@ def _zoom(zoom: Any) -> Any:
         return number(zoom, "zoom, a factor, a part or a box,", above=0)
     low, high = finite(zoom, "zoom, a factor, a part or a box ((x, y, z), (x, y, z)) in m,", (2, 3))
     return np.minimum(low, high), np.maximum(low, high)
+
+
+def _names() -> Iterator[tuple[str, tuple[str, int | None]]]:
+    for key, field in FIELDS.items():
+        if field.kind in ("scalar", "vector") and "state" not in field.where:
+            yield key, (key, None)
+        for i, part in enumerate(PARTS[field.kind]):
+            if field.symbol:
+                yield field.symbol + part, (key, i)
+
+
+NAMES = dict(_names())
+"""Field and number of its part by each name; a vector itself is shown by its length."""
+MOTIONS = tuple(name for name, (field, _) in NAMES.items() if field == "displacement")
+"""Those that need nothing but displacements."""
+
+
+def nodal_values(result: Fields, name: str) -> Values:
+    """Return the values of nodes, or else of elements, by a name of `NAMES`; InputError for another."""
+    if name not in NAMES:
+        raise InputError(f"unknown field {name!r}; there are {', '.join(NAMES)}.{nearest(name, NAMES, 1)}")
+    return named_values(name, lambda field: result.field(field, FIELDS[field].nodal_place))
+
+
+def named_values(name: str, values: Callable[[str], Array]) -> Values:
+    """Return what a name of `NAMES` shows of the values of its field."""
+    key, part = NAMES[name]
+    field, numbers = FIELDS[key], values(key)
+    if part is not None:
+        numbers = numbers[:, part]
+    elif field.kind == "vector":
+        numbers = np.linalg.norm(numbers, axis=1)
+    title = field.name if part is None else f"{field.name} {PARTS[field.kind][part]}"
+    return Values(numbers, title, field.unit, field.log)

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+import logging
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kratos_lite.analysis.derived_quantities import result_of
+from kratos_lite.ale.checks import critical_rate_estimate, near_critical
+from kratos_lite.analysis.derived_quantities import motion_summary
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.integrators.base import INTEGRATORS, ModelIntegrator, check_stable
 from kratos_lite.analysis.integrators.generalized_alpha import Newmark
 from kratos_lite.analysis.material_derivatives import acceleration_of_material, velocity_of_material
-from kratos_lite.analysis.prescribed_motion import at_start, prescribed_part, with_prescribed
-from kratos_lite.analysis.rate_watch import RateWatch
+from kratos_lite.analysis.modal import critical_rates
+from kratos_lite.analysis.report import Report
 from kratos_lite.analysis.result import Result
+from kratos_lite.analysis.solution_checks import check_deformation
 from kratos_lite.analysis.state import MODEL_FIELDS, State, check_state
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model.loads.base import equal_loads
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.direct import one_thread
+from kratos_lite.solvers.plan import REPEATED_LIMIT
 from kratos_lite.typing import Array, Progress
 from kratos_lite.validation import finite, flag, function_or_none
 
@@ -99,33 +103,33 @@ class TransientAnalysis:
         e.warnings += equal_loads(model.loads, model.named_loads)
         self.integrator.check(e)
         self._version = _version(model)
-        self._rate = RateWatch(e)
-        self._rate.look(0.0)
+        self._monitor = CriticalRateMonitor(e)
+        self._monitor.check(0.0)
         self.time, self.step, self.parts = 0.0, 0, 1
         rest = np.zeros((e.system.n_nodes, 3))
         self.u = self._nodal(rest if displacement is None else displacement, "the initial displacement")
         self.v = self._nodal(rest if velocity is None else velocity, "the initial velocity")
         self._restored: State | None = None  # which has not gone on yet
         self._limit = DIVERGED * float(np.ptp(e.system.points, axis=0).max())
-        held = at_start(e)
+        start = e.prescribed.at_start()
         if displacement is not None:
-            self._check_supports(self.u, held[0], "the initial displacement")
-        elif jump := float(np.abs(prescribed_part(e, held[0])).max(initial=0.0)):
+            self._check_supports(self.u, start[0], "the initial displacement")
+        elif jump := float(np.abs(e.prescribed.part(start[0])).max(initial=0.0)):
             e.warnings.append(
                 f"supports are displaced by {jump:g} m at the start of a model at rest, which is struck: "
                 "give the displacement of model.solve(), or let them move from 0"
             )
-        self._start(*held)
+        self._start(*start)
 
     def _start(self, u: Array, v: Array, a: Array) -> None:
         """Take over what is prescribed at the start, and find the first acceleration."""
         e = self.equations
-        self.u, self.v = with_prescribed(e, self.u, u), with_prescribed(e, self.v, v)
+        self.u, self.v = e.prescribed.replace(self.u, u), e.prescribed.replace(self.v, v)
         self.a = self._balanced(a)
 
     def _check_supports(self, u: Array, prescribed: Array, what: str) -> None:
         """Raise InputError if displacements (3a,) are not where the supports hold the model."""
-        off = np.abs(prescribed_part(self.equations, u) - prescribed).reshape(-1, 3)
+        off = np.abs(self.equations.prescribed.part(u) - prescribed).reshape(-1, 3)
         node, axis = np.unravel_index(int(off.argmax()), off.shape)
         if off[node, axis] > OFF_SUPPORT * np.abs(u).max(initial=0.0):
             name = self.equations.model.supports.name(3 * int(self.equations.system.nodes[node]) + int(axis))
@@ -149,12 +153,7 @@ class TransientAnalysis:
     # ---- steps -----------------------------------------------------------------------------------
 
     def critical_step(self) -> float:
-        """Return the longest stable step.
-
-        Returns
-        -------
-        float, s; infinite for implicit integrators.
-        """
+        """Return the longest stable step in s; infinite for implicit integrators."""
         return self.integrator.critical_step(self.equations)
 
     def prepare(self, h: float, parts: int) -> None:
@@ -177,7 +176,7 @@ class TransientAnalysis:
         check_stable(str(self.integrator), h / parts, self.critical_step(), "Newmark()")
         e.step, self.parts = h / parts, parts
         if not self.step and e.model.supports.motions:
-            self._start(*at_start(e, e.step))
+            self._start(*e.prescribed.at_start(e.step))
         elif self._restored is not None:
             self._settle(self._restored)
         self._restored = None
@@ -202,7 +201,7 @@ class TransientAnalysis:
             with one_thread(), np.errstate(over="ignore", invalid="ignore"):
                 for k in range(self.parts):
                     now = self.integrator.step(self.equations, now, self.time + k * part, part)
-            self._rate.look(self.time + h)
+            self._monitor.check(self.time + h)
             self.u, self.v, self.a = now
             self.time += h  # one after the other, so that a restart comes to the same times
             self.step += 1
@@ -215,27 +214,17 @@ class TransientAnalysis:
             )
 
     def diverged(self) -> bool:
-        """Return whether the motion has lost its stability.
-
-        Returns
-        -------
-        bool : displacements are beyond the divergence limit, or no numbers.
-        """
+        """Return whether displacements are beyond the divergence limit, or NaN."""
         return not np.abs(self.u).max(initial=0.0) < self._limit
 
     # ---- what is known at the time ---------------------------------------------------------------
 
     def state(self) -> State:
-        """Return the model as it is now.
-
-        Returns
-        -------
-        State
-        """
-        left = self._left()
+        """Return the model as it is now."""
+        residual = self._residual()
         values = {name: self._whole(getattr(self, name)).copy() for name in "uva"}
-        values["reactions"] = self.equations.model.supports.supported(self._whole(left))
-        values["imbalance"] = np.array(self._free_part(left))
+        values["reactions"] = self.equations.model.supports.supported(self._whole(residual))
+        values["imbalance"] = np.array(self._free_part(residual))
         return State("model", str(self.integrator), self.time, self.step, values, self.parts)
 
     def restore(self, state: State) -> None:
@@ -279,17 +268,17 @@ class TransientAnalysis:
 
     def _settle(self, state: State) -> None:
         """Balance the acceleration of a state of another integrator, or of another load."""
-        left, largest = self._imbalance(self.u, self.v, self.a, self.time)
-        other = abs(left - float(state.values.get("imbalance", np.nan))) > OFF_BALANCE * largest
+        residual, largest = self._imbalance(self.u, self.v, self.a, self.time)
+        other = abs(residual - float(state.values.get("imbalance", np.nan))) > OFF_BALANCE * largest
         if other or state.integrator != str(self.integrator):
-            self.a = self._balanced(prescribed_part(self.equations, self.a))
+            self.a = self._balanced(self.equations.prescribed.part(self.a))
 
     def _terms(self, u: Array, v: Array, a: Array, time: float) -> list[Array]:
         """Return M a, C v, K u and -f, (3a,) in N."""
         e = self.equations
-        return [e.times_mass(a), e.times_damping(v, time), e.times_stiffness(u, time), -e.load(time)]
+        return [e.mass.times(a), e.times_damping(v, time), e.times_stiffness(u, time), -e.load(time)]
 
-    def _left(self) -> Array:
+    def _residual(self) -> Array:
         """Return M a + C v + K u - f, (3a,) in N."""
         return np.asarray(np.sum(self._terms(self.u, self.v, self.a, self.time), axis=0))
 
@@ -318,20 +307,35 @@ class TransientAnalysis:
             With the loads of that time.  The backward error of its report is what M a + C v + K u - f leaves
             on free nodes, relative; None for integrators that do not take the balance at the end of a step.
         """
-        at, left = self.state() if state is None else self.check_state(state), None
+        e, at, residual = self.equations, self.state() if state is None else self.check_state(state), None
+        model, loads = e.model, e.system.scatter(e.load(at.time)).copy()
         if self.integrator.balanced:
             free, largest = self._imbalance(*self._at(at))
-            left = free / largest if largest else 0.0
-        return result_of(self.equations, at, str(self.integrator), left, self._rate.of_mesh)
+            residual = free / largest if largest else 0.0
+        report = Report(
+            unknowns=len(e.system.constraint_map.free),
+            total_load=loads.sum(axis=0),
+            total_reaction=at.reactions.sum(axis=0),
+            solver=str(self.integrator),
+            reason=f"step {at.step}, t = {at.time:g} s",
+            iterations=0,
+            backward_error=residual,
+            force_error=None,
+            moment_error=None,
+            seconds={},
+            warnings=[*e.warnings, *check_deformation(model, e.groups, at.u)],
+            notes=model.remarks(),
+            formulation=model.chosen(e.groups),
+        )
+        u0 = model.initial_displacement
+        result = Result(model.mesh, e.groups, at.u.copy(), at.reactions.copy(), loads, report, u0)
+        if e.terms is not None:
+            report.motion = motion_summary(e, result, self._monitor.of_mesh, at.time)
+        return result
 
     def reactions(self) -> Array:
-        """Return the forces of supports and constraints on the model, M a + C v + K u - f.
-
-        Returns
-        -------
-        (n, 3) float, N; 0 where nothing acts.
-        """
-        return self.equations.model.supports.supported(self._whole(self._left()))
+        """Return M a + C v + K u - f (n, 3) in N: forces of supports and constraints, 0 where none act."""
+        return self.equations.model.supports.supported(self._whole(self._residual()))
 
     def energy(self, state: State | None = None) -> float:
         """Return ½ v·M v + ½ u·K u, K with what the motion adds: constant without loads and damping.
@@ -345,7 +349,7 @@ class TransientAnalysis:
         float, J.
         """
         e, (u, v, _, time) = self.equations, self._at(state)
-        return float(v @ e.times_mass(v) + u @ e.times_stiffness(u, time)) / 2
+        return float(v @ e.mass.times(v) + u @ e.times_stiffness(u, time)) / 2
 
     def material_velocity(self, state: State | None = None) -> Array:
         """Return the velocity of the material in space; see `kratos_lite.material_velocity`.
@@ -385,3 +389,36 @@ class TransientAnalysis:
     def _whole(self, x: Array) -> Array:
         """Return vectors (3a,) as (n, 3) of all nodes."""
         return np.asarray(self.equations.system.scatter(x))
+
+
+_log = logging.getLogger("kratos_lite")
+
+
+class CriticalRateMonitor:
+    """Checks the rate of a motion, and warns once when it comes near the critical one.
+
+    `of_mesh` is the lowest critical rate of the mesh itself; None without a motion, or if it is estimated.
+    """
+
+    def __init__(self, e: EquationsOfMotion) -> None:
+        self.equations, self.critical = e, np.inf
+        self.of_mesh: float | None = None
+        free = len(e.system.constraint_map.free)
+        self._done = e.terms is None or not free or (e.terms.motion.steady and not e.rates(0.0)[0])
+        if e.terms is None or self._done:
+            return
+        if free <= REPEATED_LIMIT and not e.free_motions.any:
+            self.critical = self.of_mesh = float(critical_rates(e, 1)[0])
+        else:
+            self.critical = critical_rate_estimate(e.terms)
+
+    def check(self, time: float) -> None:
+        """Warn if the rate of a time in s is near the critical one, and no warning came before."""
+        e = self.equations
+        if self._done or e.terms is None:
+            return
+        for text in near_critical(e.terms.motion, time, self.critical, self.of_mesh is not None):
+            self._done = True
+            e.warnings.append(f"at t = {time:g} s {text}" if time else text)
+            if time:
+                _log.warning("%s", e.warnings[-1])

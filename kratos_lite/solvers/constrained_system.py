@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.assembly.gauss_point_fields import internal_load
 from kratos_lite.assembly.matrix_free import MatrixFree
 from kratos_lite.assembly.sparsity_pattern import Pattern, PatternCache
 from kratos_lite.assembly.stiffness import assemble_dense, assemble_stiffness
@@ -145,10 +144,6 @@ class ConstrainedSystem:
         solution = self._equations.solve(self.gather(forces), tolerance, self.progress, prescribed, near)
         return self.scatter(solution.x), solution
 
-    def internal_load(self, u: Array) -> Array:
-        """Return ∫ B^T σ dV of displacements (n, 3) as nodal forces (n, 3) in N."""
-        return self.scatter(internal_load(self.points, self.groups, u[self.nodes]).ravel())
-
     def residual(self, u: Array, forces: Array) -> Array:
         """Return K u - f as nodal forces (n, 3) in N: reactions where something is prescribed."""
         out = 0.0 - forces
@@ -157,14 +152,6 @@ class ConstrainedSystem:
 
     def destroy(self) -> None:
         """Release what is kept outside of Python."""
-
-    def reduce(self, forces: Array) -> Array:
-        """Return what nodal forces (n, 3) do on the free degrees of freedom, (q,)."""
-        return self.constraint_map.reduce(self.gather(forces))
-
-    def expand(self, q: Array) -> Array:
-        """Return the displacements (n, 3) of the free degrees of freedom (q,)."""
-        return self.scatter(self.constraint_map.expand(q))
 
     def gather(self, values: Array) -> Array:
         """Return nodal values (n, 3) as those of the equations, (3a,)."""

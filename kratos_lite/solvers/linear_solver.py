@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -46,6 +46,10 @@ class LinearSolver:
     plan: Plan  # how it is solved
     p_coarse_level: Callable[[], PCoarseLevel | None] | None = None
     symmetric: bool = True  # positive definite, too; otherwise the plan is ``dense`` or ``direct``
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what is pickled: what a method has prepared lives outside of Python, and is made anew."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     def solve(
         self,

@@ -36,6 +36,10 @@ class Mass:
         self._points, self._groups = points, groups
         self.lumped, self.pattern = lumped, pattern
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what is pickled: factors live outside of Python, and are made anew."""
+        return {name: value for name, value in vars(self).items() if name != "_factors"}
+
     @cached_property
     def scalar(self) -> csr_array[Any, Any]:
         """Mass for each pair of nodes, (n, n) sparse in kg; a diagonal for lumped mass."""

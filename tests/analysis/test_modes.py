@@ -79,9 +79,9 @@ def test_shapes_belong_to_their_frequencies():
     e = model.transient().equations
     for i in range(10):
         phi = shapes[i].ravel()
-        left = (e.K @ phi - omega[i] ** 2 * e.times_mass(phi))[e.system.constraint_map.free]
+        left = (e.K @ phi - omega[i] ** 2 * e.mass.times(phi))[e.system.constraint_map.free]
         assert np.abs(left).max() < 1e-12
-        assert [round(float(s.ravel() @ e.times_mass(phi)), 9) for s in shapes] == [
+        assert [round(float(s.ravel() @ e.mass.times(phi)), 9) for s in shapes] == [
             float(i == j) for j in range(10)
         ]
     assert not shapes[:, model.mesh.nodes("z-")].any()
@@ -121,7 +121,7 @@ def test_complex_modes_of_what_stands_still():
     e = model.transient().equations
     for value, shape in zip(values, shapes, strict=True):
         phi = shape.ravel()
-        left = value**2 * (e.times_mass(phi.real) + 1j * e.times_mass(phi.imag))
+        left = value**2 * (e.mass.times(phi.real) + 1j * e.mass.times(phi.imag))
         left = left + e.K @ phi.real + 1j * (e.K @ phi.imag)
         assert np.abs(left[e.system.constraint_map.free]).max() < 1e-9 * np.abs(phi).max()
 

@@ -10,6 +10,7 @@ from kratos_lite.bodies.rotations import exp, hat
 from kratos_lite.errors import SolveError
 from kratos_lite.native import kernels
 
+RIGID, PSEUDO = rigid.KERNEL, pseudo_rigid.KERNEL
 NONE3, NONE6, NONE12 = np.zeros(3), np.zeros(6), np.zeros(12)
 
 
@@ -81,7 +82,7 @@ def top(h, integrator, time=1.0):
     q[[0, 4, 8]] = 1
     J = np.diag([5.0, 10, 1])
     constant = (J, np.diag([0.2, 0.1, 1]), np.array(1.0))
-    rigid.steps(q, u, *constant, NONE3, NONE6, NONE6, h, round(time / h), integrator)
+    RIGID.steps(q, u, *constant, NONE3, NONE6, NONE6, h=h, count=round(time / h), method=integrator)
     return q, u, J
 
 
@@ -125,7 +126,7 @@ def test_spatial_momentum_is_that_of_the_impulse(backend, integrator):
         return (R @ J @ u[:, :3, None])[..., 0], mass[:, None] * u[:, 3:]
 
     (angular, linear), spatial = momentum(), np.concatenate([torque, force])
-    rigid.steps(q, u, J, inverse, mass, gravity, spatial, NONE6, 0.01, 100, integrator)
+    RIGID.steps(q, u, J, inverse, mass, gravity, spatial, NONE6, h=0.01, count=100, method=integrator)
     after = momentum()
     np.testing.assert_allclose(after[0], angular + torque, rtol=0, atol=1e-12 * np.abs(angular).max())
     np.testing.assert_allclose(after[1], linear + force + mass[:, None] * gravity, rtol=0, atol=1e-12)
@@ -145,7 +146,7 @@ def test_heavy_top_keeps_its_vertical_momentum_and_loses_as_little_energy_as_it_
         qh = rigid.half_step(q, u, h)
         load = np.zeros(6)
         load[:3] = qh[:9].reshape(3, 3) @ (-20 * np.cross(qh[6:9], [0, 0, 1.0]))
-        rigid.finish_step(q, u, qh, load, J, np.diag([0.2, 0.2, 1]), np.array(1.0), h, "implicit")
+        RIGID.finish(q, u, qh, load, J, np.diag([0.2, 0.2, 1]), np.array(1.0), h=h, method="implicit")
     assert energy() - start == pytest.approx(-1.53e-4, rel=0.05)
     assert (q[:9].reshape(3, 3).T @ J @ u[:3])[2] == pytest.approx(vertical, rel=1e-12)
 
@@ -153,11 +154,13 @@ def test_heavy_top_keeps_its_vertical_momentum_and_loses_as_little_energy_as_it_
 def test_work_of_a_constant_force_is_force_times_way(backend):
     q, u, constant = rigid_bodies(5)
     start, work, force = q[:, 9:].copy(), np.ones(5), np.array([0, 0, 0, 1.0, -2, 3])
-    rigid.steps(q, u, *constant, NONE3, force, NONE6, 0.01, 50, "momentum_conserving", work=work)
+    RIGID.steps(
+        q, u, *constant, NONE3, force, NONE6, h=0.01, count=50, method="momentum_conserving", work=work
+    )
     np.testing.assert_allclose(work, 1 + (q[:, 9:] - start) @ force[3:], rtol=1e-13)
     q, u, constant = pseudo_bodies(5)
     start, work, load = q.copy(), np.ones(5), np.arange(12.0)
-    pseudo_rigid.steps(q, u, *constant, NONE3, load, 0.01, 50, "linearly_implicit", work=work)
+    PSEUDO.steps(q, u, *constant, NONE3, load, h=0.01, count=50, method="linearly_implicit", work=work)
     np.testing.assert_allclose(work, 1 + (q - start) @ load, rtol=1e-13)
 
 
@@ -168,7 +171,7 @@ def test_follower_loads_turn_with_the_body(backend):
     J = np.diag([1.0, 2, 4])
     constant = (J, np.linalg.inv(J), np.array(2.0), NONE3, NONE6)
     follower = np.array([3.0, 0, 0, 4, 0, 0])
-    rigid.steps(q, u, *constant, follower, 0.01, 100, "momentum_conserving")
+    RIGID.steps(q, u, *constant, follower, h=0.01, count=100, method="momentum_conserving")
     axis = np.array([np.cos(1), np.sin(1), 0])
     np.testing.assert_allclose(u, [3, 0, 0, *(2 * axis)], atol=1e-13)
     np.testing.assert_allclose(q[9:], axis, atol=1e-13)
@@ -183,7 +186,7 @@ def test_energy_momentum_conserves_at_any_step(backend, young, h):
     q, u, constant = spinning_box(young)
     energy, L = energy_and_momentum(q, u, constant)
     for _ in range(5):
-        pseudo_rigid.steps(q, u, *constant, NONE3, NONE12, h, 20, "energy_momentum")
+        PSEUDO.steps(q, u, *constant, NONE3, NONE12, h=h, count=20, method="energy_momentum")
         now, momentum = energy_and_momentum(q, u, constant)
         assert now == pytest.approx(energy, rel=1e-13)
         np.testing.assert_allclose(momentum, L, rtol=0, atol=1e-13 * np.linalg.norm(L))
@@ -194,7 +197,7 @@ def test_energy_momentum_conserves_at_any_step(backend, young, h):
 def test_a_stiff_body_conserves_over_long_times(young, h):
     q, u, constant = spinning_box(young)
     energy, L = energy_and_momentum(q, u, constant)
-    pseudo_rigid.steps(q, u, *constant, NONE3, NONE12, h, 100_000, "energy_momentum")
+    PSEUDO.steps(q, u, *constant, NONE3, NONE12, h=h, count=100_000, method="energy_momentum")
     now, momentum = energy_and_momentum(q, u, constant)
     assert now == pytest.approx(energy, rel=1e-11)
     np.testing.assert_allclose(momentum, L, rtol=0, atol=1e-11 * np.linalg.norm(L))
@@ -205,7 +208,7 @@ def test_explicit_steps_keep_momentum_and_err_as_they_should(backend):
     energy, L = energy_and_momentum(q, u, constant)
     worst = 0
     for _ in range(200):
-        pseudo_rigid.steps(q, u, *constant, NONE3, NONE12, 1e-3, 5, "explicit")
+        PSEUDO.steps(q, u, *constant, NONE3, NONE12, h=1e-3, count=5, method="explicit")
         worst = max(worst, abs(energy_and_momentum(q, u, constant)[0] / energy - 1))
     assert worst == pytest.approx(4.8e-5, rel=0.1)
     np.testing.assert_allclose(
@@ -234,7 +237,7 @@ energy_momentum 2.5e-4  8.05e-5
 @pytest.mark.parametrize(("integrator", "h", "error"), [line.split() for line in SPINNING.split("\n")[1:-1]])
 def test_spinning_box_has_the_errors_of_its_integrator(integrator, h, error):
     q, u, constant = spinning_box(1e6)
-    pseudo_rigid.steps(q, u, *constant, NONE3, NONE12, float(h), round(1 / float(h)), integrator)
+    PSEUDO.steps(q, u, *constant, NONE3, NONE12, h=float(h), count=round(1 / float(h)), method=integrator)
     assert np.linalg.norm(q[:9].reshape(3, 3) - ROTATED) == pytest.approx(float(error), rel=0.05)
 
 
@@ -246,12 +249,12 @@ def test_small_vibration_has_the_frequency_of_the_midpoint_rule(backend, integra
     q[[0, 4, 8]] = 1 + amplitude
     mass, volume = np.array(125.0), np.array(0.125)
     constant = (mass / 12 * 0.25 * np.eye(3), mass, volume, isotropic(1e6), np.array(0.0))
-    pseudo_rigid.steps(q, u, *constant, NONE3, NONE12, h, 37, integrator)
+    PSEUDO.steps(q, u, *constant, NONE3, NONE12, h=h, count=37, method=integrator)
     phase = 2 * np.arctan(omega * h / 2) * 37
     np.testing.assert_allclose((q[[0, 4, 8]] - 1) / amplitude, np.cos(phase), atol=1e-5)
 
 
-@pytest.mark.parametrize("integrator", pseudo_rigid.METHODS)
+@pytest.mark.parametrize("integrator", PSEUDO.methods)
 def test_damping_stops_vibration_and_nothing_else(backend, integrator):
     q, u, constant = spinning_box(1e6)
     constant = (*constant[:4], np.array(1e-3))
@@ -260,7 +263,7 @@ def test_damping_stops_vibration_and_nothing_else(backend, integrator):
     u[9:] = 1, 2, 3
     seen = []
     for _ in range(10):
-        pseudo_rigid.steps(q, u, *constant, NONE3, NONE12, 1e-4, 50, integrator)
+        PSEUDO.steps(q, u, *constant, NONE3, NONE12, h=1e-4, count=50, method=integrator)
         seen.append(energy_and_momentum(q, u, constant)[0])
     assert seen[-1] < 0.98 * energy
     if integrator == "energy_momentum":
@@ -270,11 +273,11 @@ def test_damping_stops_vibration_and_nothing_else(backend, integrator):
     np.testing.assert_allclose(q[9:], [0.05, 0.1, 0.15], rtol=1e-12)
 
 
-@pytest.mark.parametrize("integrator", pseudo_rigid.METHODS)
+@pytest.mark.parametrize("integrator", PSEUDO.methods)
 def test_free_fall_of_a_deformable_body_is_exact(backend, integrator):
     q, u, constant = pseudo_bodies(3)
     x, v, g = q[:, 9:].copy(), u[:, 9:].copy(), np.array([0, 1.0, -9.81])
-    pseudo_rigid.steps(q, u, *constant, g, NONE12, 1e-3, 100, integrator)
+    PSEUDO.steps(q, u, *constant, g, NONE12, h=1e-3, count=100, method=integrator)
     np.testing.assert_allclose(q[:, 9:], x + 0.1 * v + 0.005 * g, rtol=0, atol=1e-13)
 
 
@@ -285,21 +288,29 @@ def run_rigid(integrator, n=37, count=20, h=0.01):
     q, u, constant = rigid_bodies(n)
     rng, work = np.random.default_rng(5), np.zeros(n)
     loads = rng.standard_normal((n, 3)), rng.standard_normal((n, 6)), rng.standard_normal((n, 6))
-    rigid.steps(q, u, *constant, *loads, h, count, integrator, work=work)
+    RIGID.steps(q, u, *constant, *loads, h=h, count=count, method=integrator, work=work)
     return np.column_stack([q, u, work])
 
 
 def run_pseudo(integrator, n=37, count=20, h=0.01):
     q, u, constant = pseudo_bodies(n)
     rng, work = np.random.default_rng(6), np.zeros(n)
-    pseudo_rigid.steps(
-        q, u, *constant, NONE3 + 1, rng.standard_normal((n, 12)), h, count, integrator, work=work
+    PSEUDO.steps(
+        q,
+        u,
+        *constant,
+        NONE3 + 1,
+        rng.standard_normal((n, 12)),
+        h=h,
+        count=count,
+        method=integrator,
+        work=work,
     )
     return np.column_stack([q, u, work])
 
 
-RUNS = [(run_rigid, integrator) for integrator in rigid.METHODS] + [
-    (run_pseudo, integrator) for integrator in pseudo_rigid.METHODS
+RUNS = [(run_rigid, integrator) for integrator in RIGID.methods] + [
+    (run_pseudo, integrator) for integrator in PSEUDO.methods
 ]
 
 
@@ -312,7 +323,7 @@ def test_compiled_steps_are_those_of_numpy(run, integrator, monkeypatch):
 
 
 @compiled
-@pytest.mark.parametrize("integrator", rigid.METHODS)
+@pytest.mark.parametrize("integrator", RIGID.methods)
 def test_compiled_steps_are_those_of_numpy_where_half_a_step_is_more_than_a_radian(integrator, monkeypatch):
     assert (np.linalg.norm(rigid_bodies(37)[1][:, :3], axis=1) * 0.25 / 2 > 1).any()
     found = run_rigid(integrator, count=1, h=0.25)
@@ -326,51 +337,43 @@ def test_steps_do_not_depend_on_the_number_of_threads(run, integrator):
     same_on_all_threads(lambda: run(integrator, n=1100, count=3))
 
 
+EITHER_KIND = [(RIGID, rigid_bodies, (NONE3, NONE6, NONE6), m) for m in RIGID.methods] + [
+    (PSEUDO, pseudo_bodies, (NONE3, NONE12), m) for m in PSEUDO.methods
+]
+
+
 @compiled
-@pytest.mark.parametrize("integrator", rigid.METHODS)
-def test_one_body_moves_as_in_a_crowd(integrator):
-    q, u, constant = rigid_bodies(1000)
+@pytest.mark.parametrize(("kernel", "bodies", "loads", "integrator"), EITHER_KIND)
+def test_one_body_moves_as_in_a_crowd(kernel, bodies, loads, integrator):
+    q, u, constant = bodies(1000)
     one, rate = q[437].copy(), u[437].copy()
-    own = tuple(value[437].copy() for value in constant)
-    rigid.steps(q, u, *constant, NONE3, NONE6, NONE6, 0.01, 7, integrator)
-    rigid.steps(one, rate, *own, NONE3, NONE6, NONE6, 0.01, 7, integrator)
+    kernel.steps(q, u, *constant, *loads, h=0.01, count=7, method=integrator)
+    kernel.steps(one, rate, *(c[437] for c in bodies(1000)[2]), *loads, h=0.01, count=7, method=integrator)
     np.testing.assert_array_equal(one, q[437])
     np.testing.assert_array_equal(rate, u[437])
 
 
-@compiled
-@pytest.mark.parametrize("integrator", pseudo_rigid.METHODS)
-def test_one_deformable_body_moves_as_in_a_crowd(integrator):
-    q, u, constant = pseudo_bodies(1000)
-    one, rate = q[437].copy(), u[437].copy()
-    own = tuple(np.array(value[437]) for value in constant)
-    pseudo_rigid.steps(q, u, *constant, NONE3, NONE12, 0.01, 7, integrator)
-    pseudo_rigid.steps(one, rate, *own, NONE3, NONE12, 0.01, 7, integrator)
-    np.testing.assert_array_equal(one, q[437])
-    np.testing.assert_array_equal(rate, u[437])
-
-
-@pytest.mark.parametrize("integrator", rigid.METHODS)
+@pytest.mark.parametrize("integrator", RIGID.methods)
 def test_two_halves_are_a_step(backend, integrator):
     q, u, constant = rigid_bodies(21)
     q2, u2 = q.copy(), u.copy()
     load = np.array([1.0, 2, 3, 4, 5, 6])
     spatial, follower = np.concatenate([NONE3, load[3:]]), np.concatenate([load[:3], NONE3])
     for _ in range(5):
-        rigid.steps(q, u, *constant, NONE3, spatial, follower, 0.02, 1, integrator)
+        RIGID.steps(q, u, *constant, NONE3, spatial, follower, h=0.02, count=1, method=integrator)
         qh = rigid.half_step(q2, u2, 0.02)
-        rigid.finish_step(q2, u2, qh, np.tile(load, (21, 1)), *constant, 0.02, integrator)
+        RIGID.finish(q2, u2, qh, np.tile(load, (21, 1)), *constant, h=0.02, method=integrator)
     np.testing.assert_array_equal(q, q2)
     np.testing.assert_array_equal(u, u2)
 
 
-@pytest.mark.parametrize("integrator", pseudo_rigid.METHODS)
+@pytest.mark.parametrize("integrator", PSEUDO.methods)
 def test_one_step_is_the_first_of_many(backend, integrator):
     q, u, constant = pseudo_bodies(21)
     q2, u2, load = q.copy(), u.copy(), np.arange(12.0)
-    pseudo_rigid.steps(q, u, *constant, NONE3, load, 0.01, 2, integrator)
+    PSEUDO.steps(q, u, *constant, NONE3, load, h=0.01, count=2, method=integrator)
     for _ in range(2):
-        pseudo_rigid.finish_step(q2, u2, np.tile(load, (21, 1)), *constant, 0.01, integrator)
+        PSEUDO.finish(q2, u2, np.tile(load, (21, 1)), *constant, h=0.01, method=integrator)
     np.testing.assert_array_equal(q, q2)
     np.testing.assert_array_equal(u, u2)
 
@@ -380,8 +383,8 @@ def test_what_bodies_share_is_given_once(backend):
     first = tuple(value[0].copy() for value in constant)
     every = tuple(np.repeat(value[:1], 9, axis=0) for value in constant)
     q2, u2 = q.copy(), u.copy()
-    rigid.steps(q, u, *first, NONE3, NONE6, NONE6, 0.01, 3)
-    rigid.steps(q2, u2, *every, NONE3, NONE6, NONE6, 0.01, 3)
+    RIGID.steps(q, u, *first, NONE3, NONE6, NONE6, h=0.01, count=3, method="momentum_conserving")
+    RIGID.steps(q2, u2, *every, NONE3, NONE6, NONE6, h=0.01, count=3, method="momentum_conserving")
     np.testing.assert_array_equal(np.column_stack([q, u]), np.column_stack([q2, u2]))
 
 
@@ -390,8 +393,8 @@ def test_arrays_that_the_kernel_does_not_take_are_computed_all_the_same():
     wide = np.zeros((9, 24))
     wide[:, ::2] = q
     strided, u2 = wide[:, ::2], u.copy()
-    rigid.steps(q, u, *constant, NONE3, NONE6, NONE6, 0.01, 3)
-    rigid.steps(strided, u2, *constant, NONE3, NONE6, NONE6, 0.01, 3)
+    RIGID.steps(q, u, *constant, NONE3, NONE6, NONE6, h=0.01, count=3, method="momentum_conserving")
+    RIGID.steps(strided, u2, *constant, NONE3, NONE6, NONE6, h=0.01, count=3, method="momentum_conserving")
     np.testing.assert_allclose(strided, q, rtol=0, atol=1e-13)
 
 
@@ -403,7 +406,9 @@ def test_wrong_shapes_are_refused():
     with pytest.raises(ValueError, match=r"q must be \(N, 12\)"):
         rigid.half_step(u, u, 0.01)
     with pytest.raises(ValueError, match="inertia must be"):
-        rigid.steps(q, u, J[:4], inverse, mass, NONE3, NONE6, NONE6, 0.01, 1)
+        RIGID.steps(
+            q, u, J[:4], inverse, mass, NONE3, NONE6, NONE6, h=0.01, count=1, method="momentum_conserving"
+        )
 
 
 # what cannot be computed
@@ -417,7 +422,7 @@ def test_a_body_without_a_velocity_is_named(backend):
     with pytest.raises(
         SolveError, match=r"energy_momentum: step number 10 of body 17, h = 1 s, failed: Newton"
     ):
-        pseudo_rigid.steps(q, u, *constant, NONE3, NONE12, 1.0, 20, "energy_momentum")
+        PSEUDO.steps(q, u, *constant, NONE3, NONE12, h=1.0, count=20, method="energy_momentum")
 
 
 def test_a_motion_without_bounds_is_named(backend):
@@ -425,11 +430,11 @@ def test_a_motion_without_bounds_is_named(backend):
     with pytest.raises(
         SolveError, match=r"explicit: step number \d+, h = 0.1 s, failed: its velocity grew .* shorter"
     ):
-        pseudo_rigid.steps(q, u, *constant, NONE3, NONE12, 0.1, 200, "explicit")
+        PSEUDO.steps(q, u, *constant, NONE3, NONE12, h=0.1, count=200, method="explicit")
 
 
 def test_an_implicit_rotation_without_a_velocity_is_named(backend):
     q, u, constant = rigid_bodies(12)
     u[5, :3] = np.nan
     with pytest.raises(SolveError, match=r"implicit: step of body 5, h = 0.1 s, failed: Newton's method"):
-        rigid.finish_step(q, u, rigid.half_step(q, u, 0.1), np.zeros((12, 6)), *constant, 0.1, "implicit")
+        RIGID.finish(q, u, rigid.half_step(q, u, 0.1), np.zeros((12, 6)), *constant, h=0.1, method="implicit")

@@ -5,8 +5,7 @@ import pytest
 
 import kratos_lite as kl
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
-from kratos_lite.analysis.prescribed_motion import at_start
-from kratos_lite.analysis.solution_checks import judge
+from kratos_lite.analysis.solution_checks import check_solution
 from kratos_lite.assembly.nodal_values import extrapolation
 from kratos_lite.errors import SolveError
 from kratos_lite.model.checks import equilibrium
@@ -108,7 +107,7 @@ def test_moving_supports_start_with_the_velocity_of_their_function():
     """Differences of order 2 are exact for a parabola, whose slope those of order 1 miss."""
     subject = kl.Model(kl.box(), SOIL)
     subject.fix("z-", "z", lambda t: 0.5 * t + 1e3 * t * t)
-    u, v, a = at_start(EquationsOfMotion(subject), 1e-3)
+    u, v, a = EquationsOfMotion(subject).prescribed.at_start(1e-3)
     bottom = 3 * subject.mesh.nodes("z-") + 2
     np.testing.assert_allclose(u[bottom], 0.0, atol=0)
     np.testing.assert_allclose(v[bottom], 0.5, rtol=1e-8)
@@ -158,16 +157,16 @@ def solution(backward_error=1e-16):
 
 @pytest.mark.parametrize("balance", [(0.0, 0.02), (0.02, 0.0)])
 def test_a_solution_out_of_balance_is_refused(balance):
-    judge(solution(), np.zeros(3), (1e-3, 1e-3))
+    check_solution(solution(), np.zeros(3), (1e-3, 1e-3))
     with pytest.raises(SolveError, match="miss equilibrium"):
-        judge(solution(), np.zeros(3), balance)
+        check_solution(solution(), np.zeros(3), balance)
 
 
 @pytest.mark.parametrize("backward_error", [2e-8, 1e-6, 9e-4, np.inf])
 def test_a_solution_with_a_backward_error_is_refused(backward_error):
-    judge(solution(0.9e-8), np.zeros(3), (0.0, 0.0))
+    check_solution(solution(0.9e-8), np.zeros(3), (0.0, 0.0))
     with pytest.raises(SolveError, match="reached a backward error of"):
-        judge(solution(backward_error), np.zeros(3), (0.0, 0.0))
+        check_solution(solution(backward_error), np.zeros(3), (0.0, 0.0))
 
 
 FACE = """Begin Properties 1

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.analysis.small_deformations import largest_elongation
+from kratos_lite.analysis.solution_checks import largest_elongation
 
 SHAPES = [f"KinematicLinear3D{n}N" for n in (4, 5, 6, 8, 10, 13, 15, 20, 27)]
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.analysis.integration_point_values import QUANTITIES
+from kratos_lite.analysis.fields import QUANTITIES
 
 E, NU = 3e5, 0.3
 LAM, MU = E * NU / (1 + NU) / (1 - 2 * NU), E / 2 / (1 + NU)

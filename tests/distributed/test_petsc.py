@@ -69,7 +69,7 @@ def test_backends():
 
 
 def test_what_the_own_backend_alone_solves(monkeypatch):
-    monkeypatch.setattr("kratos_lite.analysis.backends.backend_of", lambda backend, petsc: backend or "own")
+    monkeypatch.setattr("kratos_lite.analysis.prepared.backend_of", lambda backend, petsc: backend or "own")
     with pytest.raises(InputError, match="a requested error is solved by the own backend alone"):
         model().solve(backend="petsc", error=0.1)
     spinning = model()

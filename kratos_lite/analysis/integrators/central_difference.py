@@ -12,7 +12,7 @@ import numpy as np
 
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.integrators.base import ModelIntegrator
-from kratos_lite.analysis.prescribed_motion import Kinematics, at_end
+from kratos_lite.analysis.prescribed_motion import Kinematics
 from kratos_lite.assembly.finite_strain import highest_frequency
 from kratos_lite.errors import ModelError
 
@@ -51,11 +51,11 @@ class CentralDifference(ModelIntegrator):
         (u, v, a), held = now, e.held
         half = v + h / 2 * a
         u = u + h * half
-        given = at_end(e, start + h, h)
-        u[held] = given[0][held]
+        prescribed = e.prescribed.at_end(start + h, h)
+        u[held] = prescribed[0][held]
         force = e.load(start + h) - e.times_damping(half, start) - e.times_stiffness(u, start)
         a = e.mass.solve(force) / (1 + e.rayleigh[0] * h / 2)  # v = half + h/2 a
-        a[held] = given[2][held]
+        a[held] = prescribed[2][held]
         v = half + h / 2 * a
-        v[held] = given[1][held]
+        v[held] = prescribed[1][held]
         return u, v, a

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.integrators.base import ModelIntegrator
-from kratos_lite.analysis.prescribed_motion import Kinematics, at_end, prescribed_part
+from kratos_lite.analysis.prescribed_motion import Kinematics
 from kratos_lite.errors import InputError
 from kratos_lite.typing import Array
 from kratos_lite.validation import number
@@ -55,21 +55,21 @@ class _Implicit(ModelIntegrator):
         (u, v, a), end, f = now, start + h, 1 - s.alpha_f
         a_old = v / (s.beta * h) + (1 / (2 * s.beta) - 1) * a  # minus a⁺ for Δu = 0
         v_new = (1 - s.gamma / s.beta) * v + h * (1 - s.gamma / (2 * s.beta)) * a
-        held, more_a = prescribed_part(e, u), 0.0 * a
+        at_start, more_a = e.prescribed.part(u), 0.0 * a
         if e.model.supports.motions:
-            given = held, prescribed_part(e, v), prescribed_part(e, a)
-            more_v, more_a = _beyond_newmark(s, h, given, at_end(e, end, h))
+            before = at_start, e.prescribed.part(v), e.prescribed.part(a)
+            more_v, more_a = _beyond_newmark(s, h, before, e.prescribed.at_end(end, h))
             v_new, a_old = v_new + more_v, a_old - more_a
         middle = start + f * h
         force = e.load(middle) - e.times_stiffness(u, middle)
         force -= e.times_damping(f * v_new + s.alpha_f * v, middle)
         if self.balanced:  # M a is known from the balance at the start, so no rounding is handed on
-            force += e.times_mass(4 / h * v - more_a) + e.load(start)
+            force += e.mass.times(4 / h * v - more_a) + e.load(start)
             force -= e.times_stiffness(u, start) + e.times_damping(v, start)
         else:
-            force += e.times_mass((1 - s.alpha_m) * a_old - s.alpha_m * a)
+            force += e.mass.times((1 - s.alpha_m) * a_old - s.alpha_m * a)
         solve = e.solver(middle, (1 - s.alpha_m) / (s.beta * h * h), f * s.gamma / (s.beta * h), f)
-        du = solve(force, e.prescribed(end) - held)
+        du = solve(force, e.prescribed(end) - at_start)
         return u + du, s.gamma / (s.beta * h) * du + v_new, du / (s.beta * h * h) - a_old
 
 

@@ -27,7 +27,6 @@ from kratos_lite.typing import Array, Mask
 from kratos_lite.voigt import tensor
 
 METHODS = ("explicit", "linearly_implicit", "energy_momentum")
-KERNEL = StepKernel("pseudo", METHODS, newton="energy_momentum")
 TOLERANCE = 1e-12
 """Last change of the rate of F beside that rate in the energy-momentum method."""
 NEWTON_MAX = 50
@@ -44,7 +43,10 @@ class _PseudoRigid(BodyIntegrator[PseudoRigidBody]):
         """Take steps in the kernel."""
         acceleration, spatial, _ = body.constant_loads()
         constant = (*body.step_constants(), acceleration, spatial)
-        steps(body.q, body.u, *constant, h, count, self.name, body.tolerance, body.external_work)
+        work, tolerance = body.external_work, body.tolerance
+        KERNEL.steps(
+            body.q, body.u, *constant, h=h, count=count, method=self.name, tolerance=tolerance, work=work
+        )
         return True
 
     def step(self, body: PseudoRigidBody, h: float, v: Array) -> Array:
@@ -54,7 +56,8 @@ class _PseudoRigid(BodyIntegrator[PseudoRigidBody]):
 
         def advance(extra: Array) -> Step:
             q, u = body.q.copy(), body.u.copy()
-            finish_step(q, u, load + extra, *body.step_constants(), h, self.name, body.tolerance)
+            arrays = q, u, load + extra, *body.step_constants()
+            KERNEL.finish(*arrays, h=h, method=self.name, tolerance=body.tolerance)
             return Step(q, u, load)
 
         return constrained_step(body, h, qh, advance, lambda: body.solver(qh, self.stiffness_share(body, h)))
@@ -90,46 +93,6 @@ class PseudoRigidEnergyMomentum(_PseudoRigid):
     name = "energy_momentum"
 
 
-def finish_step(
-    q: Array,
-    u: Array,
-    load: Array,
-    euler: Array,
-    mass: float | Array,
-    volume: float | Array,
-    C: Array,
-    damping: float | Array,
-    h: float,
-    method: str = "explicit",
-    tolerance: float = TOLERANCE,
-) -> None:
-    """Take a step h of bodies q (..., 12), u (..., 12) in place, with the load (..., 12) at mid-step."""
-    constant = (euler, np.asarray(mass), np.asarray(volume), C, np.asarray(damping))
-    KERNEL.finish(_finish, (q, u, load, *constant), h, method, tolerance)
-
-
-def steps(
-    q: Array,
-    u: Array,
-    euler: Array,
-    mass: float | Array,
-    volume: float | Array,
-    C: Array,
-    damping: float | Array,
-    acceleration: Array,
-    spatial: Array,
-    h: float,
-    count: int,
-    method: str = "explicit",
-    tolerance: float = TOLERANCE,
-    work: Array | None = None,
-) -> None:
-    """Take steps h of bodies q (..., 12), u (..., 12) in place, under loads that stay constant."""
-    constant = (euler, np.asarray(mass), np.asarray(volume), C, np.asarray(damping))
-    arrays = (q, u, *constant, acceleration, spatial)
-    KERNEL.steps(_step, arrays, h, count, method, tolerance, work)
-
-
 def _step(
     q: Array,
     u: Array,
@@ -161,9 +124,9 @@ def _finish(
     method: str,
     tolerance: float,
 ) -> int:
-    """Return the first body whose step failed, or -1: `finish_step` in NumPy."""
+    """Take a step in place, with the load at mid-step; return the first body that failed, or -1."""
     F, U, f = q[..., :9], u[..., :9], load[..., :9]
-    V, eta = np.asarray(volume)[..., None, None], np.asarray(damping)[..., None, None]
+    V, eta = volume[..., None, None], damping[..., None, None]
     going = np.zeros(q.shape[:-1], dtype=bool)
     change = np.empty(u.shape)
     with np.errstate(all="ignore"):
@@ -171,7 +134,7 @@ def _finish(
             change[..., :9], going = _energy_momentum(F, U, f, euler, V, C, eta, h, tolerance)
         else:
             change[..., :9] = _linear_step(F, U, f, euler, V, C, eta, h, method == "linearly_implicit")
-        change[..., 9:] = h * load[..., 9:] / np.asarray(mass)[..., None]
+        change[..., 9:] = h * load[..., 9:] / mass[..., None]
         q += h * (u + change / 2)
         u += change
     return first(going | ~np.isfinite(u).all(axis=-1))
@@ -215,3 +178,6 @@ def _energy_momentum(
         if not going.any():
             break
     return change, going
+
+
+KERNEL = StepKernel("pseudo", METHODS, "energy_momentum", TOLERANCE, _finish, _step)

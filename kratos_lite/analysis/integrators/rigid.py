@@ -26,7 +26,6 @@ from kratos_lite.bodies.rotations import exp, hat, right_jacobian, rotation_of, 
 from kratos_lite.typing import Array, Mask
 
 METHODS = ("explicit", "momentum_conserving", "implicit")
-KERNEL = StepKernel("rigid", METHODS, newton="implicit")
 TOLERANCE = 1e-14
 """Residual of the implicit method beside the momentum."""
 NEWTON_MAX = 50
@@ -40,7 +39,10 @@ class _Rigid(BodyIntegrator[RigidBody]):
     def free_steps(self, body: RigidBody, h: float, count: int) -> bool:
         """Take steps in the kernel."""
         constant = (*body.step_constants(), *body.constant_loads())
-        steps(body.q, body.u, *constant, h, count, self.name, body.tolerance, body.external_work)
+        work, tolerance = body.external_work, body.tolerance
+        KERNEL.steps(
+            body.q, body.u, *constant, h=h, count=count, method=self.name, tolerance=tolerance, work=work
+        )
         return True
 
     def step(self, body: RigidBody, h: float, v: Array) -> Array:
@@ -50,7 +52,8 @@ class _Rigid(BodyIntegrator[RigidBody]):
 
         def advance(extra: Array) -> Step:
             q, u = body.q.copy(), body.u.copy()
-            finish_step(q, u, qh, load + extra, *body.step_constants(), h, self.name, body.tolerance)
+            arrays = q, u, qh, load + extra, *body.step_constants()
+            KERNEL.finish(*arrays, h=h, method=self.name, tolerance=body.tolerance)
             return Step(q, u, load)
 
         return constrained_step(body, h, qh, advance, body.mass_solver)
@@ -107,43 +110,6 @@ def half_step(q: Array, u: Array, h: float) -> Array:
     return out
 
 
-def finish_step(
-    q: Array,
-    u: Array,
-    qh: Array,
-    load: Array,
-    inertia: Array,
-    inverse: Array,
-    mass: float | Array,
-    h: float,
-    method: str = "momentum_conserving",
-    tolerance: float = TOLERANCE,
-) -> None:
-    """Complete a step h from q (..., 12), u (..., 6) in place, with the load (..., 6) at qh (..., 12)."""
-    constant = (inertia, inverse, np.asarray(mass))
-    KERNEL.finish(_finish, (q, u, qh, load, *constant), h, method, tolerance)
-
-
-def steps(
-    q: Array,
-    u: Array,
-    inertia: Array,
-    inverse: Array,
-    mass: float | Array,
-    acceleration: Array,
-    spatial: Array,
-    follower: Array,
-    h: float,
-    count: int,
-    method: str = "momentum_conserving",
-    tolerance: float = TOLERANCE,
-    work: Array | None = None,
-) -> None:
-    """Take steps h of bodies q (..., 12), u (..., 6) in place, under loads that stay constant."""
-    arrays = (q, u, inertia, inverse, np.asarray(mass), acceleration, spatial, follower)
-    KERNEL.steps(_step, arrays, h, count, method, tolerance, work)
-
-
 def _step(
     q: Array,
     u: Array,
@@ -176,14 +142,14 @@ def _finish(
     method: str,
     tolerance: float,
 ) -> int:
-    """Return the first body whose step failed, or -1: `finish_step` in NumPy."""
+    """Complete a step from q, u in place, with the load at qh; return the first body that failed, or -1."""
     W, T, J = u[..., :3], load[..., :3], inertia
     Rh = rotation_of(qh)
     with np.errstate(all="ignore"):
         p = transposed(exp(h / 2 * W), apply(J, W))
         Wh = apply(inverse, p + h / 2 * T)
         W1 = W + h * apply(inverse, T - np.cross(Wh, apply(J, Wh)))
-        v1 = u[..., 3:] + h * load[..., 3:] / np.asarray(mass)[..., None]
+        v1 = u[..., 3:] + h * load[..., 3:] / mass[..., None]
         A = p + h * T
         going = np.zeros(q.shape[:-1], dtype=bool)
         if method == "implicit":
@@ -211,3 +177,6 @@ def _implicit_velocity(J: Array, A: Array, W: Array, h: float, tolerance: float)
         W = np.where(going[..., None], W + d, W)
         going = going & ~(length(d) <= ROUND_OFF * length(W))
     return W, going
+
+
+KERNEL = StepKernel("rigid", METHODS, "implicit", TOLERANCE, _finish, _step)
