@@ -22,13 +22,14 @@ if TYPE_CHECKING:
 
 MONOMIALS = ((0,), (1,), (2,), (0, 1), (1, 2), (2, 0))
 """The factors of ξ, η, ζ, ξη, ηζ, ζξ; their integrals over the cube are 0."""
-MODES = tuple(
+MODES = [
     (component, number)
     for component, (i, j) in enumerate(PAIRS)
     for number, factors in enumerate(MONOMIALS)
     if (i == j and i in factors) or (i != j and sum(axis in (i, j) for axis in factors) == 1)
-)
+]
 """Covariant strain component and monomial of each mode: three of each normal strain, four of each shear."""
+COMPONENT, MONOMIAL = np.array(MODES).T
 
 
 class EnhancedStrain3D8N(KinematicLinear):
@@ -87,8 +88,7 @@ class EnhancedStrain3D8N(KinematicLinear):
                 product = base[..., k, i] * base[..., m, j]
                 T[..., row, c] = product if i == j else product + base[..., k, j] * base[..., m, i]
         scale = j0 / determinant(self._jacobian(self.dN(xi)))[..., None]  # (..., g, 1)
-        components, M = _reference_modes(xi.tobytes())
-        return (scale * M)[..., None, :] * T[..., None, :, components]
+        return (scale * _monomials(xi)[:, MONOMIAL])[..., None, :] * T[..., None, :, COMPONENT]
 
     def _amplitudes(self, C: ArrayLike | None, G: Array) -> Array:
         """Return D⁻¹ L (..., 21, 24)."""
@@ -124,16 +124,9 @@ def _monomials(xi: Array) -> Array:
 
 
 @remembered
-def _reference_modes(points: bytes) -> tuple[Array, Array]:
-    """Return the strain component of each mode (21,), and its monomial at points (g, 21)."""
-    components, numbers = np.array(MODES).T
-    return components, _monomials(np.frombuffer(points).reshape(-1, 3))[:, numbers]
-
-
-@remembered
 def _check_rule(rule: Rule) -> None:
     """Raise InputError for a rule that does not tell the modes of a strain apart, or their mean from 0."""
-    components, M = _reference_modes(np.ascontiguousarray(rule.points).tobytes())
-    seen = [np.linalg.matrix_rank(M[:, components == c]) for c in range(6)]
+    M = _monomials(rule.points)[:, MONOMIAL]
+    seen = [np.linalg.matrix_rank(M[:, COMPONENT == c]) for c in range(6)]
     if seen != [3, 3, 3, 4, 4, 4] or np.abs(rule.weights @ M).max() > 1e-12:
         raise InputError(f"enhanced strains need 2x2x2 points or more; got {rule}; take hexahedron(degree=3)")

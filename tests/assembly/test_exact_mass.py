@@ -87,8 +87,7 @@ def test_convective_matrix_is_exact_and_the_second_is_exact_on_affine_cells(kind
     """H is a rational function elsewhere: measured up to 3e-3 of its largest entry for this distortion."""
     X = cell(kind, geometry)
     shape = kl.ELEMENTS[kind].shape
-    block = kl.Block(kind, np.arange(len(X))[None], np.array([1]), np.array([1]), shape)
-    model = kl.Model(kl.Mesh(X, [block]), kl.Isotropic3D(E=1.0, nu=0.3, density=2.0))
+    model = kl.Model(kl.Mesh(X, {kind: [range(len(X))]}), kl.Isotropic3D(E=1.0, nu=0.3, density=2.0))
     groups, motion = model.element_groups(), Rotation((1.0, 2.0, -0.5), center=(0.3, -0.1, 0.2))
     pattern = Pattern(len(X), [groups[0].nodes])
     terms = MotionMatrices(motion, X, groups, pattern, Mass(X, groups, pattern, False))

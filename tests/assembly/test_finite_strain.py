@@ -18,7 +18,6 @@ from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import MaterialError
 from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.materials.orthotropic3d import Orthotropic3D
-from kratos_lite.mesh import Block, Mesh
 from kratos_lite.testing.patches import patch
 
 NAMES = [f"KinematicLinear3D{n}N" for n in (4, 5, 6, 8, 10, 13, 15, 20, 27)]
@@ -127,9 +126,7 @@ def test_homogeneous_deformation_is_carried_by_surface_tractions(name, way):
     element = ELEMENTS[name]
     points, nodes = patch(element.shape, (2, 2, 2), move=0.08)
     nodes = nodes.astype(np.int32)
-    mesh = Mesh(
-        points, [Block(name, nodes, np.arange(1, len(nodes) + 1), np.ones(len(nodes), int), element.shape)]
-    )
+    mesh = kl.Mesh(points, {name: nodes})
     F = np.eye(3) + np.random.default_rng(6).uniform(-0.2, 0.2, (3, 3))
     E = (F.T @ F - np.eye(3)) / 2
     lam, mu = SOIL.C[0, 1], SOIL.C[3, 3]

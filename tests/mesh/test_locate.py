@@ -19,14 +19,8 @@ TURN = exp([0.3, -0.8, 0.5])
 each_element = pytest.mark.parametrize("name", NAMES)
 
 
-def block(name, nodes, first_id=1):
-    nodes = np.atleast_2d(nodes).astype(np.int32)
-    ids = np.arange(first_id, first_id + len(nodes))
-    return Block(name, nodes, ids, np.ones_like(ids), ELEMENTS[name].shape)
-
-
 def one_cell(name, X):
-    return Mesh(X, [block(name, np.arange(len(X)))])
+    return Mesh(X, {name: [np.arange(len(X))]})
 
 
 def points_in(shape, count, seed=0):
@@ -105,7 +99,7 @@ def test_the_middle_of_a_shared_face_belongs_to_the_lower_row_whatever_the_sizes
     points[points[:, 0] == 1.0, 0] = 100.0
     nodes = kl.box((1.0, 1.0, 1.0), (2, 1, 1)).blocks[0].nodes
     for order in ([0, 1], [1, 0]):
-        mesh = Mesh(points, [block("KinematicLinear3D8N", nodes[order])])
+        mesh = Mesh(points, {"KinematicLinear3D8N": nodes[order]})
         assert mesh.locate([0.5, 0.3, 0.7]).rows == 0
 
 
@@ -154,7 +148,7 @@ def test_blocks_without_a_shape_without_cells_or_of_faces_contain_nothing():
     mesh = four_cells()
     nodes = mesh.blocks[0].nodes
     strange = Block("Spring", nodes[:, :2], np.array([1]), np.array([1]), None)
-    empty = block("KinematicLinear3D8N", np.zeros((0, 8)))
+    empty = Block("KinematicLinear3D8N", [])
     shell = Block("Shell", nodes[:, :4], np.array([1]), np.array([1]), Quadrilateral4)
     mesh = Mesh(mesh.points, [strange, empty, shell, *mesh.blocks, empty])
     X, rows = points_of(four_cells(), 20)
@@ -214,9 +208,9 @@ def test_boxes_enclose_curved_cells_and_fit_straight_ones():
         xi = points_in(shape, 2000)
         for seed in range(20):
             X = shape.nodes + 0.3 * np.random.default_rng(seed).uniform(-1, 1, shape.nodes.shape)
-            low, high = cell_boxes(X, block(name, np.arange(len(X))))
+            low, high = cell_boxes(X, Block(name, [np.arange(len(X))]))
             assert ((low <= shape.N(xi) @ X) & (shape.N(xi) @ X <= high)).all()
-        low, high = cell_boxes(shape.nodes, block(name, np.arange(len(X))))
+        low, high = cell_boxes(shape.nodes, Block(name, [np.arange(len(X))]))
         np.testing.assert_allclose([low[0], high[0]], [shape.nodes.min(0), shape.nodes.max(0)], atol=1e-7)
 
 

@@ -52,14 +52,8 @@ def test_equal_sets_are_paired_with_the_next_one_across_groups(way):
 
 def test_faces_of_mixed_cells(way):
     """A brick with a wedge on its side and a pyramid on top of it."""
-    corners = (kl.KinematicLinear3D8N.nodes + 1) / 2
-    assert corners.shape == (8, 3)
-    cells = {8: [range(8)], 6: [(1, 8, 2, 5, 9, 6)], 5: [(4, 5, 6, 7, 10)]}
-    blocks = []
-    for n, nodes in cells.items():
-        rows = np.array([list(c) for c in nodes], dtype=np.int32)
-        kind = kl.ELEMENTS[f"KinematicLinear3D{n}N"]
-        blocks.append(Block(kind.__name__, rows, np.array([n]), np.array([1]), kind.shape))
+    cells = {8: range(8), 6: (1, 8, 2, 5, 9, 6), 5: (4, 5, 6, 7, 10)}
+    blocks = [Block(f"KinematicLinear3D{n}N", [nodes]) for n, nodes in cells.items()]
     faces = Faces(blocks)
     pairs = {
         tuple(sorted(faces.element[[a, b]].tolist())) for a, b in zip(faces.one, faces.other, strict=True)

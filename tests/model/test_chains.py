@@ -14,14 +14,8 @@ def cells(corners):
     """Return unit cubes at whole-numbered corners (k, 3), which share the nodes where they meet."""
     every = (np.asarray(corners)[:, None] + CUBE).reshape(-1, 3)
     points, nodes = np.unique(every, axis=0, return_inverse=True)
-    mesh = kl.Mesh(points.astype(float), [block_of(nodes.reshape(-1, 8))])
+    mesh = kl.Mesh(points.astype(float), {"KinematicLinear3D8N": nodes.reshape(-1, 8)})
     return kl.Model(mesh, STEEL)
-
-
-def block_of(nodes, element="KinematicLinear3D8N"):
-    plain = kl.box(element=element).blocks[0]
-    count = len(nodes)
-    return kl.Block(plain.name, nodes, np.arange(1, count + 1), np.zeros(count, dtype=int), plain.shape)
 
 
 def staircase(n, step=(1, 0, 1)):
@@ -112,7 +106,7 @@ def test_bodies_that_share_three_nodes_are_one_body():
     """Linear cells beside quadratic ones share the corners of a face, but no face."""
     fine = kl.box((1, 1, 100), (1, 1, 100), "KinematicLinear3D20N")
     nodes = fine.blocks[0].nodes
-    blocks = [block_of(nodes[::2], "KinematicLinear3D20N"), block_of(nodes[1::2, :8])]
+    blocks = {"KinematicLinear3D20N": nodes[::2], "KinematicLinear3D8N": nodes[1::2, :8]}
     assert connected_bodies.bodies(kl.Mesh(fine.points, blocks)).body.max() == 0
 
 
