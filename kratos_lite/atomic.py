@@ -33,16 +33,10 @@ def read_arrays(path: str | Path, names: Sequence[str], what: str) -> dict[str, 
 
 def write_arrays(path: str | Path, arrays: Mapping[str, Any]) -> None:
     """Write named arrays or numbers to an .npz file, as a whole or not at all; SolveError if one is NaN."""
-    from zipfile import ZipFile
-
-    from numpy.lib.format import write_array  # np.savez takes allow_pickle for a name before NumPy 2.1
-
+    for name, values in arrays.items():
+        refuse_nan(path, name, values)
     buffer = io.BytesIO()
-    with ZipFile(buffer, "w") as file:
-        for name, values in arrays.items():
-            refuse_nan(path, name, values)
-            with file.open(f"{name}.npy", "w", force_zip64=True) as entry:
-                write_array(entry, np.asarray(values), allow_pickle=False)
+    np.savez(buffer, **arrays)
     write_whole(path, buffer.getvalue())
 
 

@@ -98,6 +98,12 @@ def _orbits(d: int, orbits: Sequence[tuple[float, tuple[float, ...]]]) -> tuple[
     return np.array(points), np.array(weights) / (6 if d == 3 else 2)
 
 
+def _gauss_product(degree: int, d: int) -> Rule:
+    """Return the Gauss-Legendre product on [-1, 1]^d."""
+    n = _points_for(degree)
+    return Rule(*gauss.tensor_product(n, d), 2 * n - 1, f"Gauss-Legendre {'x'.join([str(n)] * d)}")
+
+
 @lru_cache
 def point(degree: int = 0) -> Rule:
     """Return the one-point rule of a point."""
@@ -116,8 +122,7 @@ def line(degree: int) -> Rule:
     -------
     Rule
     """
-    n = _points_for(degree)
-    return Rule(*gauss.tensor_product(n, 1), 2 * n - 1, f"Gauss-Legendre {n}")
+    return _gauss_product(degree, 1)
 
 
 @lru_cache
@@ -132,8 +137,7 @@ def quadrilateral(degree: int) -> Rule:
     -------
     Rule
     """
-    n = _points_for(degree)
-    return Rule(*gauss.tensor_product(n, 2), 2 * n - 1, f"Gauss-Legendre {n}x{n}")
+    return _gauss_product(degree, 2)
 
 
 @lru_cache
@@ -153,8 +157,7 @@ def hexahedron(degree: int) -> Rule:
     >>> [len(hexahedron(degree)) for degree in (1, 3, 5)]
     [1, 8, 27]
     """
-    n = _points_for(degree)
-    return Rule(*gauss.tensor_product(n, 3), 2 * n - 1, f"Gauss-Legendre {n}x{n}x{n}")
+    return _gauss_product(degree, 3)
 
 
 @lru_cache

@@ -1,4 +1,4 @@
-"""Shape functions at many points: at once where they broadcast, else one by one."""
+"""Shape functions at many points, at once where they broadcast, and the node orders of VTK."""
 
 import numpy as np
 import pytest
@@ -22,3 +22,21 @@ def test_functions_of_a_user_need_not_broadcast():
         return Tetrahedron4.dN(np.zeros(3))  # constant, (4, 3) whatever xi is
 
     assert at_points(gradients, np.zeros((5, 3))).shape == (5, 4, 3)
+
+
+@pytest.mark.parametrize(
+    ("name", "edges"),
+    [
+        ("Hexahedron20", "01 12 23 30 45 56 67 74 04 15 26 37"),
+        ("Hexahedron27", "01 12 23 30 45 56 67 74 04 15 26 37"),
+        ("Wedge15", "01 12 20 34 45 53 03 14 25"),
+        ("Pyramid13", "01 12 23 30 04 14 24 34"),
+        ("Tetrahedron10", "01 12 20 03 13 23"),
+    ],
+)
+def test_mid_edge_nodes_stand_in_the_order_of_vtk(name, edges):
+    """Source: VTK User's Guide, file formats."""
+    shape = SHAPES[name]
+    ends = np.array([[int(end) for end in edge] for edge in edges.split()])
+    middles = shape.nodes[list(shape.to_vtk)][shape.corners : shape.corners + len(ends)]
+    np.testing.assert_array_equal(middles, shape.nodes[ends].mean(axis=1))
