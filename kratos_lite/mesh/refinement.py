@@ -79,15 +79,13 @@ def axes_along(mesh: Mesh, block: Block, direction: Array) -> Ints:
     """Return the axis of each cell (m,) all of whose edges are straight and along a direction (3,), or -1."""
     shape = block.shape
     assert shape is not None
-    corners = shape.nodes[: shape.corners]
     axes = np.full(len(block), -1)
     if shape.cell not in ("hexahedron", "wedge", "quadrilateral", "line"):
         return axes
+    pairs = np.array(shape.edges or ((0, 1),))
+    steps = np.ptp(shape.nodes[pairs], axis=1) > 0
     for axis in (2,) if shape.cell == "wedge" else range(shape.nodes.shape[1]):
-        steps = [(a, b) for a, b in shape.edges or ((0, 1),) if np.ptp(corners[[a, b]], axis=0)[axis] > 0]
-        ends = np.array(
-            [step for step in steps if np.count_nonzero(np.ptp(corners[list(step)], axis=0)) == 1]
-        )
+        ends = pairs[steps[:, axis] & (steps.sum(axis=1) == 1)]
         edges = mesh.points[block.nodes[:, ends[:, 1]]] - mesh.points[block.nodes[:, ends[:, 0]]]
         across = np.linalg.norm(np.cross(edges, direction), axis=-1)
         length = np.linalg.norm(edges, axis=-1) * np.linalg.norm(direction)
