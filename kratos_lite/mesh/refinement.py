@@ -47,7 +47,7 @@ QUADRATIC: dict[str, type[Shape]] = {
 
 
 def refine(mesh: Mesh, elements: ArrayLike | None = None, keep: ArrayLike | None = None) -> RefinedMesh:
-    """Return a mesh in which elements are cut into smaller ones of the same kind.
+    """Return a mesh in which elements are cut into smaller ones of the same type.
 
     A hexahedron, tetrahedron or wedge gives 8, a pyramid 6 and 4 tetrahedra.  Where a neighbor stays as it
     is, nodes hang: they take what its edge or face interpolates.
@@ -107,7 +107,7 @@ def _cuts(mesh: Mesh, block: Block, cells: Ints, direction: Array | None) -> lis
     if not len(cells):
         return []
     if block.shape is None or block.shape.nodes.shape[1] != 3:
-        raise MeshError(f"{mesh.place(block, int(cells[0]))}: cells of this kind cannot be refined")
+        raise MeshError(f"{mesh.place(block, int(cells[0]))}: cells of this type cannot be refined")
     if direction is not None:
         if (axes_along(mesh, block.take(cells), direction) < 0).any():
             raise MeshError(f"block {block.name}: not every element has edges along {direction.tolist()}")
