@@ -20,12 +20,7 @@ class Tabular:
     """What is shown as a table of labels and values, printed or in a notebook."""
 
     def table(self) -> list[tuple[str, str]]:
-        """Return the rows of the summary.
-
-        Returns
-        -------
-        Labels and values.
-        """
+        """Return labels and values of a summary."""
         return []
 
     def __str__(self) -> str:

@@ -115,15 +115,15 @@ def geometries_of(points: Array, group: ElementGroup) -> Geometries:
     """Return AFFINE, STRAIGHT or CURVED of the elements of a group, (m,); see `geometries`."""
     shape, nodes = group.element.shape, group.tables()[0]
     if interpolated := getattr(kernels("gauss"), "interpolated", None):
-        kinds, points = np.full(len(nodes), CURVED, dtype=np.int8), as_double(points)
+        geometry_of, points = np.full(len(nodes), CURVED, dtype=np.int8), as_double(points)
         for geometry in (AFFINE, STRAIGHT):
-            spanned, curved = interpolations(shape)[geometry], kinds == CURVED
+            spanned, curved = interpolations(shape)[geometry], geometry_of == CURVED
             if spanned and curved.any():
                 cells = nodes if curved.all() else nodes[curved]
-                kinds[curved] = np.where(
+                geometry_of[curved] = np.where(
                     interpolated(points, cells, *spanned, ROUNDING) > 0, geometry, CURVED
                 )
-        return kinds
+        return geometry_of
     parts = [geometries(shape, points[nodes[chunk]]) for chunk in group.chunks()]
     return np.concatenate([np.zeros(0, dtype=np.int8), *parts])
 
@@ -217,7 +217,7 @@ def _fitting(element: type[KinematicLinear], chosen: Rule | int) -> Rule:
 
 
 def element_class(mesh: Mesh, block: Block, formulation: str | None = None) -> type[KinematicLinear]:
-    """Return the element class of a block, whatever its material; raise InputError for unknown kinds."""
+    """Return the element class of a block, whatever its material; raise InputError for unknown types."""
     try:
         return element_of(block.name, formulation, None)
     except InputError as error:

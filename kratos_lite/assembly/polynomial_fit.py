@@ -140,11 +140,11 @@ def _fit(samples: Samples, patches: Lists, weights: Array, degree: Ints, means: 
     centers = [np.add.reduceat(v, every.start[:-1]) for v in (samples.places, samples.values)]
     count = every.lengths
     sizes = np.bincount(patches.owner, weights=count[patches.entries], minlength=len(patches))
-    kinds = np.column_stack([sizes.astype(int), patches.lengths, degree, means])
+    keys = np.column_stack([sizes.astype(int), patches.lengths, degree, means])
     frame, terms = np.zeros((len(patches), 12)), np.zeros((len(patches), MONOMIALS[degree.max(initial=0)], 6))
-    for kind in sorted(set(map(tuple, kinds.tolist()))):
-        alike = np.flatnonzero((kinds == kind).all(axis=1))
-        size, members, order, simple = kind
+    for key in sorted(set(map(tuple, keys.tolist()))):
+        alike = np.flatnonzero((keys == key).all(axis=1))
+        size, members, order, simple = key
         for part in np.array_split(alike, 1 + len(alike) * size // 100_000):
             at = patches.start[part, None] + np.arange(members)
             elements, weight = patches.entries[at], weights[at]

@@ -114,9 +114,9 @@ def geometries(shape: type[Shape], X: Array) -> Geometries:
     """Return AFFINE, STRAIGHT or CURVED of cells X (..., n, 3)."""
     near = ROUNDING * np.abs(X).max(axis=(-2, -1))
     X = X - X[..., :1, :]
-    kinds = np.full(X.shape[:-2], CURVED, dtype=np.int8)
+    geometry_of = np.full(X.shape[:-2], CURVED, dtype=np.int8)
     for geometry in (STRAIGHT, AFFINE):
         if spanned := interpolations(shape)[geometry]:
             nodes, C = spanned
-            kinds[np.abs(X - C @ X[..., nodes, :]).max(axis=(-2, -1)) <= near] = geometry
-    return kinds
+            geometry_of[np.abs(X - C @ X[..., nodes, :]).max(axis=(-2, -1)) <= near] = geometry
+    return geometry_of

@@ -33,18 +33,18 @@ class CellMass(PlacedCell):
     mass_rule: ClassVar[Rule | None] = None
 
     @classmethod
-    def mass_rules(cls, kinds: Geometries, factors: int, flow: bool = False) -> list[tuple[Mask, Rule]]:
+    def mass_rules(cls, geometry_of: Geometries, factors: int, flow: bool = False) -> list[tuple[Mask, Rule]]:
         """Return masks (...) of cells and the rules for products of shape functions over them."""
         stated = cls.mass_rule if factors == 2 and not flow else None
         if stated is None and not has_rules(cls.shape):
             stated = cls.rule
         if stated is not None:
-            return [(np.ones(kinds.shape, dtype=bool), stated)]
+            return [(np.ones(geometry_of.shape, dtype=bool), stated)]
         rules: dict[Rule, Mask] = {}
-        for kind in (AFFINE, STRAIGHT, CURVED):
-            mask = np.asarray(kinds == kind)
-            if mask.any() or (kind == AFFINE and not kinds.size):
-                rule = exact_rule(cls.shape, factors, kind, flow)
+        for geometry in (AFFINE, STRAIGHT, CURVED):
+            mask = np.asarray(geometry_of == geometry)
+            if mask.any() or (geometry == AFFINE and not geometry_of.size):
+                rule = exact_rule(cls.shape, factors, geometry, flow)
                 rules[rule] = rules[rule] | mask if rule in rules else mask
         return [(mask, rule) for rule, mask in rules.items()]
 

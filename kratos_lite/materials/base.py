@@ -97,11 +97,7 @@ class LinearMaterial:
         return "the strain energy of some strain is not positive"
 
     def compliance(self) -> Array:
-        """Return the compliance S, strain = S stress; subclasses define it.
-
-        Returns
-        -------
-        (6, 6) float, 1/Pa
+        """Return the compliance S (6, 6) in 1/Pa, strain = S stress; subclasses define it.
 
         Raises
         ------
@@ -111,11 +107,7 @@ class LinearMaterial:
         raise TypeError(f"{type(self).__name__} must define compliance() or elasticity()")
 
     def elasticity(self) -> Array:
-        """Return the elasticity matrix C, by default the inverse of the compliance.
-
-        Returns
-        -------
-        (6, 6) float, Pa
+        """Return the elasticity matrix C (6, 6) in Pa, by default the inverse of the compliance.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Mesh: points, blocks of cells of one kind, and named parts.  It knows no physics."""
+"""Mesh: points, blocks of cells of one type, and named parts.  It knows no physics."""
 
 from kratos_lite.mesh.blocks import (
     NO_ROWS,

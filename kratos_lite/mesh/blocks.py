@@ -1,4 +1,4 @@
-"""Blocks of cells of one kind, and named parts."""
+"""Blocks of cells of one type, and named parts."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ NO_ROWS: Ints = read_only(np.zeros(0, dtype=np.int64))
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Cells of one kind: elements, or the conditions that carry loads; its arrays are read-only.
+    """Cells of one type: elements, or the conditions that carry loads; its arrays are read-only.
 
     Parameters
     ----------
-    name : kind as registered or as written in the file, e.g. ``KinematicLinear3D8N``.
+    name : type as registered or as written in the file, e.g. ``KinematicLinear3D8N``.
     nodes : (m, k) int, indices of ``mesh.points``, in Kratos order.
     ids : (m,) int, ids of the cells; 1 … m if not given.
     properties : int or (m,) int, property id of the cells.
     shape : the reference cell; if not given, that of the registered element of this name, or None for a
-        kind that kratos_lite does not know.
+        type that kratos_lite does not know.
     lines : (m,) int, line of each cell in the file it came from, or None.
 
     Raises

@@ -92,10 +92,10 @@ def kind_of(element: str) -> tuple[str, type[Shape]]:
     if not isinstance(element, str):
         raise InputError(f"element must be a name such as KinematicLinear3D8N; got {element!r}")
     element = _full_name(element)
-    kind = ELEMENTS[element]
-    if kind.shape.cell not in SPLITS:
-        raise InputError(f"{element} has cell {kind.shape.cell!r}; boxes are made of {', '.join(SPLITS)}")
-    return element if is_unnamed(element) else kind.__name__, kind.shape
+    cls = ELEMENTS[element]
+    if cls.shape.cell not in SPLITS:
+        raise InputError(f"{element} has cell {cls.shape.cell!r}; boxes are made of {', '.join(SPLITS)}")
+    return element if is_unnamed(element) else cls.__name__, cls.shape
 
 
 def unit_cells(

@@ -185,24 +185,24 @@ def split_faces(blocks: Sequence[Block], centers: Centers, corner: Mask, existin
         if shape is None or not len(block):
             continue
         for face in shape.faces:
-            kind = FACE_SHAPES[len(face)]
+            shape_of_face = FACE_SHAPES[len(face)]
             nodes = block.nodes[:, list(face)].astype(np.int64)
-            around = nodes[:, np.array(kind.edges)]
+            around = nodes[:, np.array(shape_of_face.edges)]
             middles = centers.find(keys_of(around))
             ends = (middles >= 0) & corner[middles]
             whole = ends.all(axis=1)
-            if kind.corners == 4:
+            if shape_of_face.corners == 4:
                 own = centers.find(keys_of(nodes[:, :4]))
                 whole &= (own >= 0) & corner[own]
                 middles = np.column_stack([middles, own])
             cells = np.flatnonzero(whole)
-            yield Split(kind, nodes[cells], middles[cells], at.start + cells)
-            for half in (0, 1) if kind.corners == 4 else ():
+            yield Split(shape_of_face, nodes[cells], middles[cells], at.start + cells)
+            for half in (0, 1) if shape_of_face.corners == 4 else ():
                 cells = np.flatnonzero(ends[:, half] & ends[:, half + 2] & ~whole)
                 if len(cells):
                     line = keys_of(middles[cells][:, [half, half + 2]])
                     cells = cells[are_among(line, existing)]
-                yield Split(kind, nodes[cells], middles[cells], at.start + cells, half)
+                yield Split(shape_of_face, nodes[cells], middles[cells], at.start + cells, half)
 
 
 def hanging_nodes(blocks: Sequence[Block], centers: Centers, n_nodes: int) -> HangingNodes | None:

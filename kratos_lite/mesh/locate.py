@@ -12,6 +12,7 @@ import numpy as np
 from kratos_lite.errors import InputError, MeshError
 from kratos_lite.mesh.blocks import NO_ROWS, Cells, with_rows
 from kratos_lite.mesh.boxes import BoxTree, cell_boxes, curvature, is_solid, nearest_element
+from kratos_lite.shapes import Shape
 from kratos_lite.shapes.inverse import inverse_map, outside_by
 from kratos_lite.typing import Array, Ints, Mask, Rows
 from kratos_lite.validation import finite
@@ -184,41 +185,40 @@ class _Search:
         self._try(x, at[lower][order], row[lower][order], element, xi)
         return element, xi
 
-    def _try(self, x: Array, at: Ints, rows: Ints, element: Ints, xi: Array) -> None:
-        """Write row and xi of those points x[at] that lie in the elements in `rows`."""
+    def _by_block(self, rows: Ints) -> Iterator[tuple[type[Shape], Ints, Array]]:
+        """Yield, for each block, which of some elements are in it, and their nodes (m, k, 3)."""
         numbers = self.block_of(rows)
-        hits, where = np.zeros(len(at), dtype=bool), np.zeros((len(at), 3))
         for number, block in enumerate(self.mesh.blocks):
             chosen = np.flatnonzero(numbers == number)
             if len(chosen) and block.shape is not None:
-                inverse = inverse_map(block.shape, self._nodes(number, rows[chosen]), x[at[chosen]])
-                hits[chosen], where[chosen] = inverse.inside, inverse.xi
-        element[at[hits]], xi[at[hits]] = rows[hits], where[hits]
+                cells = rows[chosen] - self.starts[number]
+                yield block.shape, chosen, self.mesh.points[block.nodes[cells]]
 
-    def _nodes(self, number: int, rows: Ints) -> Array:
-        """Return the nodes (m, k, 3) of elements of a block."""
-        return self.mesh.points[self.mesh.blocks[number].nodes[rows - self.starts[number]]]
+    def _try(self, x: Array, at: Ints, rows: Ints, element: Ints, xi: Array) -> None:
+        """Write element and xi of those points x[at] that lie in the elements in `rows`."""
+        hits, where = np.zeros(len(at), dtype=bool), np.zeros((len(at), 3))
+        for shape, chosen, X in self._by_block(rows):
+            inverse = inverse_map(shape, X, x[at[chosen]])
+            hits[chosen], where[chosen] = inverse.inside, inverse.xi
+        element[at[hits]], xi[at[hits]] = rows[hits], where[hits]
 
     def _retry(self, x: Array, at: Ints, rows: Ints, element: Ints, xi: Array) -> None:
         """Try strongly curved cells again from elsewhere; from the middle Newton may reach another xi."""
-        numbers = self.block_of(rows)
-        for number, block in enumerate(self.mesh.blocks):
-            chosen = np.flatnonzero(numbers == number)
-            if not len(chosen) or block.shape is None or len(block.shape.nodes) == block.shape.corners:
+        for shape, chosen, X in self._by_block(rows):
+            if len(shape.nodes) == shape.corners:
                 continue
-            pyramid = block.shape.cell == "pyramid"
-            curved = curvature(block.shape, self._nodes(number, rows[chosen])) > (0 if pyramid else CURVED)
-            chosen = chosen[curved]
-            middle = block.shape.nodes[: block.shape.corners].mean(axis=0)
-            starts = middle + 0.8 * (block.shape.nodes - middle)  # on the way from there to each node
-            images = block.shape.N(starts) @ self._nodes(number, rows[chosen])
-            order = ((images - x[at[chosen], None]) ** 2).sum(axis=2).argsort(axis=1)
+            pyramid = shape.cell == "pyramid"
+            curved = curvature(shape, X) > (0 if pyramid else CURVED)
+            pending, cells = chosen[curved], X[curved]
+            middle = shape.nodes[: shape.corners].mean(axis=0)
+            starts = middle + 0.8 * (shape.nodes - middle)  # on the way from there to each node
+            images = shape.N(starts) @ cells
+            order = ((images - x[at[pending], None]) ** 2).sum(axis=2).argsort(axis=1)
             for start in order.T[: len(starts) if pyramid else STARTS]:
-                left = element[at[chosen]] < 0
-                pairs = chosen[left]
-                X = self._nodes(number, rows[pairs])
+                missing = element[at[pending]] < 0
+                pairs = pending[missing]
                 inverse = inverse_map(
-                    block.shape, X, x[at[pairs]], max_iterations=15, start=starts[start[left]]
+                    shape, cells[missing], x[at[pairs]], max_iterations=15, start=starts[start[missing]]
                 )
                 hits = pairs[inverse.inside]
                 element[at[hits]], xi[at[hits]] = rows[hits], inverse.xi[inverse.inside]
@@ -226,9 +226,6 @@ class _Search:
     def _near_edge(self, element: Ints, xi: Array) -> Mask:
         """Return which points lie so near the boundary of their cell that others may contain them too."""
         near = np.zeros(len(element), dtype=bool)
-        numbers = np.where(element >= 0, self.block_of(element), -1)
-        for number, block in enumerate(self.mesh.blocks):
-            chosen = np.flatnonzero(numbers == number)
-            if len(chosen) and block.shape is not None:
-                near[chosen] = outside_by(block.shape.cell, xi[chosen]) > -NEAR_EDGE
+        for shape, chosen, _ in self._by_block(element):
+            near[chosen] = outside_by(shape.cell, xi[chosen]) > -NEAR_EDGE
         return near

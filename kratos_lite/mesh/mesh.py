@@ -252,12 +252,7 @@ class Mesh(Tabular):
         return f"{where}element {block.ids[cell]} ({block.name})"
 
     def used_nodes(self) -> Mask:
-        """Return which nodes belong to an element.
-
-        Returns
-        -------
-        (n,) bool
-        """
+        """Return which nodes belong to an element, (n,) bool."""
         used = np.zeros(self.n_nodes, dtype=bool)
         for block in self.blocks:
             used[block.nodes] = True
@@ -418,18 +413,12 @@ class Mesh(Tabular):
     # ---- for other programs ------------------------------------------------------------------
 
     def to_pyvista(self) -> Any:
-        """Return the mesh as a grid of PyVista, with the ids of nodes, elements and properties.
-
-        Returns
-        -------
-        pyvista.UnstructuredGrid
+        """Return a pyvista.UnstructuredGrid, with the ids of nodes, elements and properties.
 
         Raises
         ------
-        InputError
-            VTK has no number for the shape of an element.
-        KratosLiteError
-            PyVista is not installed.
+        InputError, KratosLiteError
+            VTK has no number for the shape of an element; PyVista is not installed.
         """
         from kratos_lite.mesh.vtk import mesh_fields, pyvista_grid  # rarely needed
 
@@ -438,11 +427,7 @@ class Mesh(Tabular):
     # ---- summary ---------------------------------------------------------------------------
 
     def table(self) -> list[tuple[str, str]]:
-        """Return the rows of a summary: nodes, extent, elements, conditions and parts.
-
-        Returns
-        -------
-        Labels and values.
+        """Return labels and values of a summary: nodes, extent, elements, conditions and parts.
 
         Examples
         --------
@@ -478,12 +463,7 @@ class Mesh(Tabular):
         return self.all_faces.boundary
 
     def reoriented(self) -> Mesh:
-        """Return the mesh in which inverted elements have the node order of their mirror image.
-
-        Returns
-        -------
-        Mesh
-        """
+        """Return the mesh in which inverted elements have the node order of their mirror image."""
         blocks = []
         for block in self.blocks:
             turn = inverted(block, self.points)

@@ -205,7 +205,7 @@ def _compressed(sources: Sequence[tuple[Ints, Array]]) -> tuple[Ints, Ints, Arra
 
 
 def name_of(name: str, shape: type[Shape]) -> str:
-    """Return the name of the same kind of element or condition with another shape."""
+    """Return the name of the same family of elements or conditions with another shape."""
     stem = name.rstrip("N").rstrip("0123456789")
     wanted = f"{stem}{len(shape.nodes)}N"
     if name in ELEMENTS and wanted not in ELEMENTS:

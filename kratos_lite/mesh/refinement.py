@@ -47,7 +47,7 @@ QUADRATIC: dict[str, type[Shape]] = {
 
 
 def refine(mesh: Mesh, elements: ArrayLike | None = None, keep: ArrayLike | None = None) -> RefinedMesh:
-    """Return a mesh in which elements are cut into smaller ones of the same kind.
+    """Return a mesh in which elements are cut into smaller ones of the same type.
 
     A hexahedron, tetrahedron or wedge gives 8, a pyramid 6 and 4 tetrahedra.  Where a neighbor stays as it
     is, nodes hang: they take what its edge or face interpolates.
@@ -79,15 +79,13 @@ def axes_along(mesh: Mesh, block: Block, direction: Array) -> Ints:
     """Return the axis of each cell (m,) all of whose edges are straight and along a direction (3,), or -1."""
     shape = block.shape
     assert shape is not None
-    corners = shape.nodes[: shape.corners]
     axes = np.full(len(block), -1)
     if shape.cell not in ("hexahedron", "wedge", "quadrilateral", "line"):
         return axes
+    pairs = np.array(shape.edges or ((0, 1),))
+    steps = np.ptp(shape.nodes[pairs], axis=1) > 0
     for axis in (2,) if shape.cell == "wedge" else range(shape.nodes.shape[1]):
-        steps = [(a, b) for a, b in shape.edges or ((0, 1),) if np.ptp(corners[[a, b]], axis=0)[axis] > 0]
-        ends = np.array(
-            [step for step in steps if np.count_nonzero(np.ptp(corners[list(step)], axis=0)) == 1]
-        )
+        ends = pairs[steps[:, axis] & (steps.sum(axis=1) == 1)]
         edges = mesh.points[block.nodes[:, ends[:, 1]]] - mesh.points[block.nodes[:, ends[:, 0]]]
         across = np.linalg.norm(np.cross(edges, direction), axis=-1)
         length = np.linalg.norm(edges, axis=-1) * np.linalg.norm(direction)
@@ -109,7 +107,7 @@ def _cuts(mesh: Mesh, block: Block, cells: Ints, direction: Array | None) -> lis
     if not len(cells):
         return []
     if block.shape is None or block.shape.nodes.shape[1] != 3:
-        raise MeshError(f"{mesh.place(block, int(cells[0]))}: cells of this kind cannot be refined")
+        raise MeshError(f"{mesh.place(block, int(cells[0]))}: cells of this type cannot be refined")
     if direction is not None:
         if (axes_along(mesh, block.take(cells), direction) < 0).any():
             raise MeshError(f"block {block.name}: not every element has edges along {direction.tolist()}")

@@ -25,7 +25,7 @@ QUADRATIC = {"tetrahedron": "3D10N", "wedge": "3D15N", "pyramid": "3D13N", "hexa
 
 
 def check_locking(mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
-    """Return a warning for each kind of elements that will lock, with the better choice."""
+    """Return a warning for each element class that will lock, with the better choice."""
     warnings = [*_near_half(groups), *_with_apex(groups)]
     for element in dict.fromkeys(group.element for group in groups if _shears(group.element)):
         warnings += _in_bending(mesh, element, [group for group in groups if group.element is element])
@@ -38,10 +38,10 @@ def check_locking(mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
 def _near_half(groups: Sequence[ElementGroup]) -> list[str]:
     """Warn of plain elements with ν near ½; ten-node tetrahedra have sound displacements."""
     replacements: dict[str, str] = {}
-    for kind, C in ((group.element, group.material.C) for group in groups):
-        plain = not kind.custom and kind.formulation == "standard"
-        if plain and kind.__name__ != "KinematicLinear3D10N" and bulk_over_shear(C) > NEAR_HALF:
-            replacements[kind.__name__] = better_element(kind, "BBar")
+    for element, C in ((group.element, group.material.C) for group in groups):
+        plain = not element.custom and element.formulation == "standard"
+        if plain and element.__name__ != "KinematicLinear3D10N" and bulk_over_shear(C) > NEAR_HALF:
+            replacements[element.__name__] = better_element(element, "BBar")
     if not replacements:
         return []
     names, better = ", ".join(sorted(replacements)), ", ".join(sorted(set(replacements.values())))
@@ -56,30 +56,30 @@ def _with_apex(groups: Sequence[ElementGroup]) -> list[str]:
             counts[group.element] = counts.get(group.element, 0) + len(group)
     half = sum(map(len, groups)) / 2
     return [
-        f"{kind.__name__} locks in bending (comes out far too stiff); take KinematicLinear"
-        f"{QUADRATIC[kind.shape.cell]}"
-        for kind, count in counts.items()
-        if kind.shape.cell == "tetrahedron" or count > half
+        f"{element.__name__} locks in bending (comes out far too stiff); take KinematicLinear"
+        f"{QUADRATIC[element.shape.cell]}"
+        for element, count in counts.items()
+        if element.shape.cell == "tetrahedron" or count > half
     ]
 
 
-def better_element(kind: type[KinematicLinear], family: str = "KinematicLinear") -> str:
+def better_element(element: type[KinematicLinear], family: str = "KinematicLinear") -> str:
     """Return the name of the element to take in place of one that locks."""
-    known = formulations_of(kind.shape)
+    known = formulations_of(element.shape)
     if "enhanced" in known:
         return known["enhanced"].__name__
-    family = "KinematicLinear" if kind.shape.cell == "tetrahedron" else family
-    linear = len(kind.nodes) == kind.shape.corners
-    return f"{family}{QUADRATIC[kind.shape.cell]}" if linear else known["b_bar"].__name__
+    family = "KinematicLinear" if element.shape.cell == "tetrahedron" else family
+    linear = len(element.nodes) == element.shape.corners
+    return f"{family}{QUADRATIC[element.shape.cell]}" if linear else known["b_bar"].__name__
 
 
 # ---- in bending ----------------------------------------------------------------------------------------
 
 
-def _in_bending(mesh: Mesh, kind: type[KinematicLinear], groups: Sequence[ElementGroup]) -> list[str]:
+def _in_bending(mesh: Mesh, element: type[KinematicLinear], groups: Sequence[ElementGroup]) -> list[str]:
     """Warn of plain linear bricks and wedges that are long: of the one with most G/E (a/t)², by its edges."""
     most, text = 0.0, ""
-    edges = np.array(kind.shape.edges).T
+    edges = np.array(element.shape.edges).T
     for group in groups:
         X = mesh.points[group.nodes]
         length = np.linalg.norm(X[:, edges[0]] - X[:, edges[1]], axis=2)
@@ -88,14 +88,14 @@ def _in_bending(mesh: Mesh, kind: type[KinematicLinear], groups: Sequence[Elemen
         excess = _shear_over_young(group.material.C) * ratio**2
         worst = int(np.argmax(excess))
         if ratio[worst] > LONG and excess[worst] > most:
-            element = mesh.element_ids[group.rows[worst]]
+            identifier = mesh.element_ids[group.rows[worst]]
             most = float(excess[worst])
-            text = f"such as element {element} ({ratio[worst]:.3g} times as long as thick)"
+            text = f"such as element {identifier} ({ratio[worst]:.3g} times as long as thick)"
     if not text:
         return []
     return [
-        f"{kind.__name__} may come out up to {1 + most:.2g} times too stiff in bending, {text}; "
-        f"take {better_element(kind)}"
+        f"{element.__name__} may come out up to {1 + most:.2g} times too stiff in bending, {text}; "
+        f"take {better_element(element)}"
     ]
 
 
@@ -107,7 +107,7 @@ def _shear_over_young(C: Array) -> float:
         return 0.0
 
 
-def _shears(kind: type[KinematicLinear]) -> bool:
+def _shears(element: type[KinematicLinear]) -> bool:
     """Return whether an element is a plain linear brick or wedge of the library, which bends by shearing."""
-    linear = kind.shape.cell in ("hexahedron", "wedge") and len(kind.nodes) == kind.shape.corners
-    return linear and is_builtin(kind) and kind.formulation != "enhanced"
+    linear = element.shape.cell in ("hexahedron", "wedge") and len(element.nodes) == element.shape.corners
+    return linear and is_builtin(element) and element.formulation != "enhanced"

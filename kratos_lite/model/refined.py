@@ -52,12 +52,12 @@ def _carry_rules(structure: Structure, new: Structure, finer: RefinedMesh) -> No
     new._rules, new._rule_of = dict(structure._rules), rule_of
     if (rule_of < 0).all():
         return
-    kinds = [
+    shapes = [
         np.concatenate([np.full(len(b), hash(b.shape)) for b in mesh.blocks])
         for mesh in (finer.coarse, finer.mesh)
     ]
     fixed = [number for number, rule in structure._rules.items() if isinstance(rule, Rule)]
-    if (np.isin(rule_of, fixed) & (kinds[0][finer.elements] != kinds[1])).any():
+    if (np.isin(rule_of, fixed) & (shapes[0][finer.elements] != shapes[1])).any():
         raise ModelError(
             "a quadrature rule that replaces that of elements does not fit those of another shape"
         )

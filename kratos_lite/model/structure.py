@@ -412,12 +412,7 @@ class Structure(Tabular):
         self.supports.constrain(dependents, independents, weights, constant)
 
     def rigid_modes(self) -> Array:
-        """Return the rigid-body modes of all nodes.
-
-        Returns
-        -------
-        (3n, 6): translations in x, y and z, rotations about x, y and z.
-        """
+        """Return the rigid-body modes (3n, 6): translations in x, y and z, rotations about x, y and z."""
         return rigid_modes(self.mesh.points)
 
     # ---- loads and motion ----------------------------------------------------------------------
@@ -536,11 +531,7 @@ class Structure(Tabular):
     # ---- checks -------------------------------------------------------------------------------
 
     def check_geometry(self) -> list[str]:
-        """Check coordinates, node lists and det J of all elements, whatever their material.
-
-        Returns
-        -------
-        Warnings, one sentence each.
+        """Return warnings of coordinates, node lists and det J of all elements, whatever their material.
 
         Raises
         ------
@@ -550,11 +541,7 @@ class Structure(Tabular):
         return checks.check_geometry(self.mesh, self.formulation)
 
     def checked(self) -> tuple[list[ElementGroup], list[str]]:
-        """Return what a solution starts from, of a model that passes all checks but that of `free_motions`.
-
-        Returns
-        -------
-        Element groups and warnings.
+        """Return element groups and warnings of a model that passes all checks but that of `free_motions`.
 
         Raises
         ------
@@ -578,12 +565,7 @@ class Structure(Tabular):
         return free_motions(self.mesh, self.supports, groups)
 
     def remarks(self) -> list[str]:
-        """Return what readers of files noted, and constants of materials that no engineering material has.
-
-        Returns
-        -------
-        Notes, one sentence each.
-        """
+        """Return what readers of files noted, and constants of materials that no engineering material has."""
         return [*self.notes, *checks.unusual_constants(self._used_materials())]
 
     def _used_materials(self) -> list[LinearMaterial]:
@@ -593,12 +575,7 @@ class Structure(Tabular):
     # ---- summary ------------------------------------------------------------------------------
 
     def table(self) -> list[tuple[str, str]]:
-        """Return the rows of a summary.
-
-        Returns
-        -------
-        Labels and values.
-        """
+        """Return labels and values of a summary."""
         without = int((self._material_of < 0).sum())
         rows = self.mesh.table()
         rows += [("formulation", text)] if (text := self.chosen()) else []

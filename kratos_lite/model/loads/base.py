@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from copy import copy
+from functools import lru_cache
 from types import FunctionType
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
@@ -198,17 +199,15 @@ class TimeDependentLoad(Load):
         -------
         A function of the time in s: (n, 3) in N, or 0.
         """
-        kept: list[tuple[float, Load | None, Array | float]] = []
+        last: tuple[Load | None, Array | float] = None, 0.0
 
+        @lru_cache(maxsize=2)
         def forces(time: float) -> Array | float:
-            for at, _, known in kept:
-                if at == time:
-                    return known
+            nonlocal last
             load = self.at(time)
-            same = [known for _, one, known in kept if one is load]
-            nodal = same[0] if same else 0.0 if load is None else forces_of(load)
-            kept[:] = [*kept[-1:], (time, load, nodal)]
-            return nodal
+            if load is not last[0]:
+                last = load, 0.0 if load is None else forces_of(load)
+            return last[1]
 
         return forces
 
