@@ -12,6 +12,7 @@ import numpy as np
 
 import kratos_lite as kl
 from kratos_lite.mesh.centers import raise_order
+from kratos_lite.mesh.refinement import refine
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.typing import Array, Ints
 from kratos_lite.verification.meshes import element, kind_of
@@ -100,6 +101,13 @@ def bonded(kind: str, n: int) -> kl.Model:
     return model
 
 
+def hanging(kind: str, n: int) -> kl.Model:
+    """Return the unit cube with cells half as large in one octant, nodes of which hang."""
+    mesh = kl.box((1.0, 1.0, 1.0), 3 * (max(2, round(n / 1.875 ** (1 / 3))),), element(kind))
+    centers = np.concatenate([mesh.points[block.nodes].mean(axis=1) for block in mesh.blocks])
+    return weighty(refine(mesh, (centers < 0.5).all(axis=1)).mesh)
+
+
 def _link(
     model: kl.Model, dependent: Ints, independent: Iterable[tuple[Iterable[int], Iterable[float]]]
 ) -> None:
@@ -157,6 +165,7 @@ MAKERS: dict[str, Maker] = {
     "contrast_inclusions": with_inclusions,
     "links_periodic": periodic,
     "links_bonded": bonded,
+    "links_hanging": hanging,
     "tetrahedra": unordered,
     **{name_of(nu): nearly_incompressible(nu) for nu in RATIOS},
 }
