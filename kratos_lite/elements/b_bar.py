@@ -8,8 +8,7 @@ import numpy as np
 
 from kratos_lite.elements import arguments
 from kratos_lite.elements.kinematic_linear import KinematicLinear
-from kratos_lite.elements.stiffness import strain_rows
-from kratos_lite.elements.tables import StrainTables, cofactors, determinant
+from kratos_lite.elements.tables import StrainTables, cofactors, determinant, strain_rows
 from kratos_lite.quadrature import Rule
 from kratos_lite.typing import Array
 

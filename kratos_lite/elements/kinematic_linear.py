@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from kratos_lite import voigt
-from kratos_lite.elements import arguments, custom, stiffness
+from kratos_lite.elements import arguments, custom, tables
 from kratos_lite.elements.mass import CellMass
-from kratos_lite.elements.tables import StrainTables, lame_constants
+from kratos_lite.elements.tables import StrainTables
 from kratos_lite.errors import InputError
 from kratos_lite.quadrature import Rule
 from kratos_lite.registry import Registry
@@ -135,7 +135,7 @@ class KinematicLinear(CellMass):
             Axes of the elements, axes of the points, 6, 3n.
         """
         at_gauss = xi is self.rule.points
-        return stiffness.strain_rows(self._gauss[1] if at_gauss else np.swapaxes(self.dNdX(xi), -1, -2))
+        return tables.strain_rows(self._gauss[1] if at_gauss else np.swapaxes(self.dNdX(xi), -1, -2))
 
     def _operator(self, C: ArrayLike | None, xi: Array | None = None) -> Array:
         """Return B (..., g, 6, 3n) at points (g, 3), or at the Gauss points."""
@@ -226,7 +226,7 @@ class KinematicLinear(CellMass):
         -------
         (..., 3n, 3n) float, N/m
         """
-        return stiffness.by_dof(self.stiffness_by_axis(C))
+        return tables.by_dof(self.stiffness_by_axis(C))
 
     def stiffness_by_axis(self, C: ArrayLike) -> Array:
         """Return the stiffness in the order in which assembly takes it: by axis, then node.
@@ -242,15 +242,15 @@ class KinematicLinear(CellMass):
         """
         C = arguments.elasticity(C, self.X)
         if "local_system" in self.custom:
-            return stiffness.by_axis(custom.stiffness(self, C))
+            return tables.by_axis(custom.stiffness(self, C))
         return self._stiffness(C)
 
     def _stiffness(self, C: Array) -> Array:
         """Return K (..., 3, n, 3, n) of B; in a short way where C is isotropic and B that of gradients."""
-        if C.ndim == 2 and self.has_standard_strain() and (lame := lame_constants(C)):
-            return stiffness.isotropic(self._gauss[1], self.dV, lame)
+        if C.ndim == 2 and self.has_standard_strain() and (lame := tables.lame_constants(C)):
+            return tables.isotropic(self._gauss[1], self.dV, lame)
         B = self._operator(C)
-        return stiffness.by_axis(stiffness.summed(B, (C[..., None, :, :] if C.ndim > 2 else C) @ B, self.dV))
+        return tables.by_axis(tables.summed(B, (C[..., None, :, :] if C.ndim > 2 else C) @ B, self.dV))
 
     def local_system(self, C: ArrayLike, u: ArrayLike) -> tuple[Array, Array]:
         """Return stiffness and internal force vector of B: what a formulation of its own overrides.
@@ -268,4 +268,4 @@ class KinematicLinear(CellMass):
         r_int : (..., n, 3) float, N; K u
         """
         C = arguments.elasticity(C, self.X)
-        return stiffness.by_dof(self._stiffness(C)), self.internal_force(self.stress(C, u), C)
+        return tables.by_dof(self._stiffness(C)), self.internal_force(self.stress(C, u), C)

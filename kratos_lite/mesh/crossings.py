@@ -30,12 +30,12 @@ def crossings(mesh: Mesh, a: Array, b: Array) -> Array:
         return locate(near if len(near.blocks) else mesh, a + t[:, None] * (b - a)).require().rows
 
     t = np.linspace(0, 1, 2 * near.n_elements + 2)
-    rows = element(t)
-    while len(gaps := np.flatnonzero((np.diff(rows) != 0) & (np.diff(t) > SHORT))):
+    elements = element(t)
+    while len(gaps := np.flatnonzero((np.diff(elements) != 0) & (np.diff(t) > SHORT))):
         middle = (t[gaps] + t[gaps + 1]) / 2
-        rows = np.insert(rows, gaps + 1, element(middle))
+        elements = np.insert(elements, gaps + 1, element(middle))
         t = np.insert(t, gaps + 1, middle)
-    changes = np.flatnonzero(np.diff(rows))
+    changes = np.flatnonzero(np.diff(elements))
     return np.concatenate([[0.0], (t[changes] + t[changes + 1]) / 2, [1.0]])
 
 

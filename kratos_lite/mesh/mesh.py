@@ -53,7 +53,7 @@ class Mesh(Tabular):
     ------
     MeshError
         If points, cells or ids have the wrong shape or are no finite numbers, an id occurs twice, a cell or a
-        part has rows that do not exist, or there is no such element.
+        part has indices that do not exist, or there is no such element.
 
     Examples
     --------
@@ -241,7 +241,7 @@ class Mesh(Tabular):
         Parameters
         ----------
         block : an element block.
-        cell : row of the cell in the block.
+        cell : index of the cell in the block.
 
         Returns
         -------

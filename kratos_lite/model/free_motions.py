@@ -101,24 +101,24 @@ class FreeMotions:
     def held(self) -> Mask:
         """Components (n, 3), one for each free motion, that hold these firmly.
 
-        Gram-Schmidt on the rows of R: each is that along which what is left of the motions goes farthest.
+        Gram-Schmidt on the rows of R: each is that along which what remains of the motions goes farthest.
         """
         chosen, part = np.zeros_like(self.supports.fixed), self.part
         if not self.any:
             return chosen
-        left = self._pair[0] * ~self.supports.fixed[..., None]
-        left.reshape(-1, left.shape[2])[self.supports.dependents().dependents] = 0.0
-        for step in range(left.shape[2]):
-            size = (left**2).sum(axis=2)
+        remaining = self._pair[0] * ~self.supports.fixed[..., None]
+        remaining.reshape(-1, remaining.shape[2])[self.supports.dependents().dependents] = 0.0
+        for step in range(remaining.shape[2]):
+            size = (remaining**2).sum(axis=2)
             best = self._by_part(size.max(axis=1), largest=True)
             here = np.flatnonzero((size.max(axis=1) == best[part]) & (self.counts[part] > step) & (part >= 0))
             node = here[np.unique(part[here], return_index=True)[1]]
             axis = size[node].argmax(axis=1)
             chosen[node, axis] = True
-            row = np.zeros((len(best), left.shape[2]))
-            row[part[node]] = left[node, axis]
+            row = np.zeros((len(best), remaining.shape[2]))
+            row[part[node]] = remaining[node, axis]
             along = (row / np.sqrt(np.maximum(best, np.finfo(float).tiny))[:, None])[part, None]
-            left -= (left * along).sum(axis=2, keepdims=True) * along
+            remaining -= (remaining * along).sum(axis=2, keepdims=True) * along
         return chosen
 
     # ---- what is refused -----------------------------------------------------------------------------

@@ -65,12 +65,12 @@ def _halved_squares(mesh: Mesh) -> Ints:
 
 def check_coincident(mesh: Mesh, constraints: Constraints | None = None) -> list[str]:
     """Warn of different nodes at the same place (within 1e-8 of the mean spacing) that nothing ties."""
-    rows = np.flatnonzero(mesh.used_nodes())
-    if len(rows) < 2:
+    used = np.flatnonzero(mesh.used_nodes())
+    if len(used) < 2:
         return []
-    X, ids = mesh.points[rows], mesh.node_ids[rows]
+    X, ids = mesh.points[used], mesh.node_ids[used]
     size = max(float(np.ptp(x)) for x in X.T)  # by columns, which is faster
-    coincident = _nodes_at_one_place(X, ids, 1e-8 * size / len(rows) ** (1 / 3))
+    coincident = _nodes_at_one_place(X, ids, 1e-8 * size / len(used) ** (1 / 3))
     if coincident and constraints is not None:
         ends = constraints.dependents[constraints.owner] // 3, constraints.independents // 3
         pairs = np.unique(np.stack(ends, axis=1), axis=0)

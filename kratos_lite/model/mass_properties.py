@@ -280,7 +280,7 @@ def _check_volumes(volumes: Array, group: ElementGroup, chunk: slice) -> None:
     bad = np.flatnonzero(~(volumes > 0))
     if len(bad):
         raise MeshError(
-            f"the element in row {group.rows[chunk][bad[0]]} ({group.element.__name__}) has volume "
+            f"the element of index {group.rows[chunk][bad[0]]} ({group.element.__name__}) has volume "
             f"{volumes[bad[0]]:.3g} m³; it must be > 0; mesh.reoriented() fixes inverted elements"
         )
 

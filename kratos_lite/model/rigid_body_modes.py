@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -58,9 +59,14 @@ class _Constraints:
     body: Ints
     weight: Array
 
-    def take(self, rows: Ints) -> _Constraints:
+    @cached_property
+    def number(self) -> Ints:
+        """The equation of each entry, counted from 0 without gaps."""
+        return np.searchsorted(distinct(self.row), self.row)
+
+    def take(self, chosen: Ints) -> _Constraints:
         """Return some of the entries."""
-        return _Constraints(self.row[rows], self.dof[rows], self.body[rows], self.weight[rows])
+        return _Constraints(self.row[chosen], self.dof[chosen], self.body[chosen], self.weight[chosen])
 
 
 def _equations(mesh: Mesh, connected: Bodies, supports: Supports) -> _Constraints:
@@ -102,7 +108,7 @@ def _by_group(group_of: Ints, equations: _Constraints) -> tuple[list[Ints], list
     owner = group_of[equations.body]
     order = np.argsort(owner, kind="stable")
     taken = np.split(order, np.searchsorted(owner[order], numbers))
-    return groups, [equations.take(rows) for rows in taken]
+    return groups, [equations.take(chosen) for chosen in taken]
 
 
 def _free_modes(mesh: Mesh, frames: tuple[Array, Array], group: Ints, equations: _Constraints) -> Array:
@@ -110,7 +116,7 @@ def _free_modes(mesh: Mesh, frames: tuple[Array, Array], group: Ints, equations:
 
     A rotation is scaled with the size of its body, so that all modes move points about as far.
     """
-    row = np.searchsorted(distinct(equations.row), equations.row)
+    row = equations.number
     C = np.zeros((int(row.max(initial=-1)) + 1, 6 * len(group)))
     np.add.at(C, (row[:, None], _columns(group, equations)), _on_modes(mesh, frames, equations))
     triangle = np.linalg.qr(np.vstack([C, np.zeros((C.shape[1], C.shape[1]))]), mode="r")
@@ -134,7 +140,7 @@ def _on_modes(mesh: Mesh, frames: tuple[Array, Array], equations: _Constraints) 
     R = R[np.arange(len(R)), axis]
     R[:, 3:] /= frames[1][equations.body, None]
     R *= equations.weight[:, None]
-    row = np.searchsorted(distinct(equations.row), equations.row)
+    row = equations.number
     largest = np.zeros(int(row.max(initial=-1)) + 1)
     np.maximum.at(largest, row, np.abs(R).max(axis=1))
     return np.asarray(R / np.maximum(largest, np.finfo(float).tiny)[row, None])
@@ -149,7 +155,7 @@ def _free_modes_of_many(
     """
     from scipy.sparse import csr_array, eye_array
 
-    row = np.searchsorted(distinct(equations.row), equations.row)
+    row = equations.number
     count, n = int(row.max()) + 1, 6 * len(group)
     value = _on_modes(mesh, frames, equations)
     places = np.repeat(row, 6), _columns(group, equations).ravel()

@@ -64,10 +64,10 @@ def check_spurious_modes(
     free = np.zeros(mesh.n_elements, dtype=bool)
     free[elements] = ~sound[elements] & ~np.any(chained, axis=1)
     if free.any():
-        row = int(free.argmax())
-        element = next(group.element.__name__ for group in groups if row in group.rows)
+        index = int(free.argmax())
+        element = next(group.element.__name__ for group in groups if index in group.rows)
         raise ModelError(
-            f"element {mesh.element_ids[row]} ({element}) can deform without stress: {free.sum()} "
+            f"element {mesh.element_ids[index]} ({element}) can deform without stress: {free.sum()} "
             "elements have neighbors along one axis at most, and 2x2x2 points do not see all of their "
             "deformations; take BBar3D20N or KinematicLinear3D20N, or more elements side by side"
         )

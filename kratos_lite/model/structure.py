@@ -148,9 +148,9 @@ class Structure(Tabular):
             There is no such part, property or element.
         """
         checks.checked_material(material)
-        rows = self.mesh.elements(where)
+        elements = self.mesh.elements(where)
         self._materials.append(material)
-        self._material_of[rows] = len(self._materials) - 1
+        self._material_of[elements] = len(self._materials) - 1
         self._changes += 1
 
     @property
@@ -274,14 +274,14 @@ class Structure(Tabular):
         MeshError
             There is no such part, property or element.
         """
-        s, rows = finite(stress, "a prestress"), self.mesh.elements(where)
-        if s.shape not in ((6,), (len(rows), 6)):
+        s, elements = finite(stress, "a prestress"), self.mesh.elements(where)
+        if s.shape not in ((6,), (len(elements), 6)):
             raise InputError(
-                f"a prestress has six components xx yy zz xy yz zx, or shape ({len(rows)}, 6); "
+                f"a prestress has six components xx yy zz xy yz zx, or shape ({len(elements)}, 6); "
                 f"got shape {s.shape}"
             )
         total = np.zeros((self.mesh.n_elements, 6)) if self._prestress is None else self._prestress.copy()
-        total[rows] += s
+        total[elements] += s
         total.flags.writeable = False
         self._prestress = total
         self._changes += 1
@@ -582,7 +582,7 @@ class Structure(Tabular):
         rows += [("material", str(material)) for material in self._used_materials()]
         rows += [("material", f"none for {without} elements")] if without else []
         rows.append(("fixed", f"{self.supports.fixed.sum()} components"))
-        rows += [("support", str(fixing)) for fixing in self.supports.named.values()]
+        rows += [("support", str(condition)) for condition in self.supports.named.values()]
         if len(self.supports.constraints):
             rows.append(("constraints", str(len(self.supports.constraints))))
         names = {id(load): f"{name}: " for name, load in self.named_loads.items()}

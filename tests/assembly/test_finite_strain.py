@@ -228,16 +228,6 @@ def test_highest_frequency_is_a_bound(name, lumped):
     assert linear == pytest.approx(bound, rel=1e-12)
 
 
-@elements
-@pytest.mark.parametrize("lumped", [False, True])
-def test_highest_frequency_of_one_element_is_exact(name, lumped):
-    element = ELEMENTS[name]
-    X, nodes = np.ascontiguousarray(element.nodes), np.arange(len(element.nodes), dtype=np.int32)[None]
-    groups = [ElementGroup(element, element.rule, UNIT, nodes, np.arange(1))]
-    bound = finite_strain.highest_frequency(X, groups, lumped=lumped)
-    assert bound == pytest.approx(true_frequency(X, groups, np.zeros_like(X), lumped), rel=1e-11)
-
-
 def test_highest_frequencies_of_the_reference_cells():
     """Largest eigenvalues of K of single cells with E = ρ = 1, ν = 0.3: those of Solfec, but the pyramid."""
     largest = {4: 1.005427, 5: 2.448228, 6: 2.237320, 8: 2.5}

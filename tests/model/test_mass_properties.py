@@ -258,8 +258,8 @@ def test_broken_meshes_are_refused():
         MassProperties.of(mesh.points, [group(name, nodes, 0.0)])
     with pytest.raises(InputError, match="points of a mesh must be finite"):
         MassProperties.of(mesh.points * np.nan, [group(name, nodes)])
-    with pytest.raises(MeshError, match=r"row 0 .*has volume 0 m³"):
+    with pytest.raises(MeshError, match=r"index 0 .*has volume 0 m³"):
         MassProperties.of(mesh.points * [1, 1, 0], [group(name, nodes)])
     nodes[1] = nodes[1][[4, 5, 6, 7, 0, 1, 2, 3]]
-    with pytest.raises(MeshError, match=r"row 1 .*3D8N\) has volume -0\.333 m³.*reoriented\(\)"):
+    with pytest.raises(MeshError, match=r"index 1 .*3D8N\) has volume -0\.333 m³.*reoriented\(\)"):
         MassProperties.of(mesh.points, [group(name, nodes)])

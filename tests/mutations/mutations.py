@@ -140,7 +140,7 @@ MUTATIONS = [
         "return -group.material.density",
         LOADS,
     ),
-    Mutation("model/loads/nodal.py", "total[rows] += self.force", "total[rows] -= self.force", LOADS),
+    Mutation("model/loads/nodal.py", "total[nodes] += self.force", "total[nodes] -= self.force", LOADS),
     # ---- mass properties, time series
     Mutation(
         "time_series.py",

@@ -80,10 +80,10 @@ class PointLoad(Load):
             nodes, N = _around(mesh, self._point)
             total[nodes] = N[:, None] * self.force
             return total
-        rows = mesh.nodes(self.where)
-        if mesh.whole and not len(rows):
+        nodes = mesh.nodes(self.where)
+        if mesh.whole and not len(nodes):
             raise ModelError(f"a point load finds no node in {self.where!r}")
-        total[rows] += self.force
+        total[nodes] += self.force
         return total
 
     def refined(self, finer: RefinedMesh) -> Load:
