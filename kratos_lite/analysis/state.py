@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
+from kratos_lite.analysis.fields import Fields
 from kratos_lite.bodies.body import Body
 from kratos_lite.errors import InputError
 from kratos_lite.typing import Array
@@ -18,14 +19,18 @@ BODY_FIELDS = ("q", "u", "external_work")
 MODEL_FIELDS = ("u", "v", "a", "reactions", "imbalance")
 
 
+@runtime_checkable
 class InTime(Protocol):
-    """A model in time, which makes and takes states."""
+    """A model in time."""
 
     def state(self) -> State:
         """Return the state of now."""
 
     def restore(self, state: State) -> None:
         """Go on from a state."""
+
+    def result(self, state: State | None = None) -> Fields:
+        """Return the result of a state."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +120,7 @@ class State:
 
 def _check_subject(subject: object) -> None:
     """Raise InputError for what has no states."""
-    if not isinstance(subject, Body) and not hasattr(subject, "restore"):
+    if not isinstance(subject, (Body, InTime)):
         raise InputError(
             f"a body, or a model in time, model.transient(), has states; got {type(subject).__name__}"
         )
