@@ -114,8 +114,8 @@ class State:
         values = self.__dict__.get("values", {})
         if name not in values:
             raise AttributeError(f"the state of a {self.__dict__.get('kind')} has no {name!r}")
-        found: Array = values[name]
-        return found
+        value: Array = values[name]
+        return value
 
 
 def _check_subject(subject: object) -> None:
@@ -135,10 +135,10 @@ def check_state(state: object, kind: str, shapes: Mapping[str, tuple[int, ...]])
         other = "a model" if state.kind == "model" else f"a {state.kind} body"
         raise InputError(f"this is the state of {other}; one of {whose} is needed")
     for name, shape in shapes.items():
-        found = np.shape(state.values[name]) if name in state.values else "none"
-        if found != shape:
+        actual = np.shape(state.values[name]) if name in state.values else "none"
+        if actual != shape:
             raise InputError(
-                f"this state does not fit: {name} of {whose} has shape {shape} here; got {found}"
+                f"this state does not fit: {name} of {whose} has shape {shape} here; got {actual}"
             )
     number(state.time, "the time of a state", least=0, unit="s")
     whole_number(state.step, "the steps of a state", least=0)

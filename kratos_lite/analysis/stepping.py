@@ -23,7 +23,7 @@ from kratos_lite.view.progress import watched
 
 _log = logging.getLogger("kratos_lite")
 SAFETY = 0.95
-"""Share of the critical step that automatic substeps take."""
+"""Fraction of the critical step that automatic substeps take."""
 MOST_SUBSTEPS = 1_000_000
 """Parts of one step; more would take the time of a whole run until the first state."""
 
@@ -83,7 +83,7 @@ def integrate(
     count = None if steps is None else whole_number(steps, "steps")
     if until is not None and not takes(until, 1):
         raise InputError(f"until must be a function of a state; got {short(until)}")
-    function_or_none(progress, "progress must be a function of a phase and a share")
+    function_or_none(progress, "progress must be a function of a phase and a fraction")
     stepper = subject if isinstance(subject, TransientAnalysis) else BodyStepper(subject)
     parts = 1 if substeps == "auto" else whole_number(substeps, "substeps", ", or 'auto'")
     if substeps == "auto":

@@ -67,7 +67,7 @@ def series_of(thing: Any, given: dict[str, Any], most: int) -> tuple[list[list[S
         if not isinstance(things[0], Fields) or not things[0].u.any():
             raise InputError("nothing moves here: give modes, states, or a result with displacements")
         subjects = [
-            _grown(_subject(things[0], given), share) for share in (1 - np.cos(2 * np.pi * phases)) / 2
+            _scaled(_subject(things[0], given), fraction) for fraction in (1 - np.cos(2 * np.pi * phases)) / 2
         ]
         titles = [""] * len(subjects)
     scale = factor_of(subjects, _factor(given, None))
@@ -171,13 +171,13 @@ def _values(result: Fields | None, mesh: Mesh, u: Array | None, given: dict[str,
     return Values(numbers, unit=unit or "")
 
 
-def _grown(subject: Subject, share: float) -> Subject:
-    """Return a share of a linear response."""
+def _scaled(subject: Subject, fraction: float) -> Subject:
+    """Return a fraction of a linear response."""
     values = subject.values
     if values is not None and not values.log:
-        values = replace(values, numbers=share * values.numbers)
+        values = replace(values, numbers=fraction * values.numbers)
     assert subject.u is not None
-    return replace(subject, u=share * subject.u, values=values)
+    return replace(subject, u=fraction * subject.u, values=values)
 
 
 def _heads(subjects: Sequence[Subject], given: dict[str, Any], factor: float) -> str:
@@ -212,7 +212,7 @@ def _modes(thing: Any, given: dict[str, Any]) -> tuple[Numbers, list[str]]:
 def _phase(
     thing: Any, given: dict[str, Any], shapes: Numbers, titles: list[str], turn: complex
 ) -> list[Subject]:
-    """Return modes side by side in a phase, colored by their displacement as a share of the largest one."""
+    """Return modes side by side in a phase, colored by displacement as a fraction of the largest."""
     mesh = _mesh(thing)
     u = (shapes * turn).real
     size = np.linalg.norm(shapes, axis=2).max(axis=1)
