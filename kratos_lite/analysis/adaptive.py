@@ -46,11 +46,11 @@ BULK, BULK_FAR, FAR = 0.5, 0.8, 3.0
 GROWTH = 1.2
 """How many times more elements the next mesh has at least."""
 FLAT = 0.05
-"""Share of the error asked for that the stress may vary along a direction in which nothing is cut."""
+"""Fraction of the error asked for that the stress may vary along a direction in which nothing is cut."""
 ROUGH, ROUGH_SHARE = 1e-5, 1e-3
-"""Relative residual of the meshes on the way at most, and as a share of the error asked for."""
+"""Relative residual of the meshes on the way at most, and as a fraction of the error asked for."""
 FAIR = 1e-3
-"""Share of the forces that such a mesh may miss to equilibrium; beyond it is solved in full."""
+"""Fraction of the forces that such a mesh may miss to equilibrium; beyond it is solved in full."""
 STEPS = 25
 """Meshes after which the accuracy counts as out of reach."""
 SCANT = 0.05

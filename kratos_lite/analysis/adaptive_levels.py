@@ -25,15 +25,15 @@ CORRECTED = 1.25
 MOST_CORRECTED = 1.3
 """Times that it may exceed the estimate of its own mesh: short steps say little."""
 SETTLED = 0.9
-"""Share to which estimates must fall, so that they can be corrected."""
+"""Fraction to which estimates must fall, so that they can be corrected."""
 AIM = 0.9
-"""Share of the error asked for at which the next mesh aims."""
+"""Fraction of the error asked for at which the next mesh aims."""
 SINGULAR = 0.25
-"""Share of its squared error that an element keeps when it is cut or becomes quadratic, from which the
+"""Fraction of its squared error that an element keeps when it is cut or becomes quadratic, from which the
 solution counts as singular there."""
 
 ROUNDING = 1e-10
-"""Share of the sizes that a quantity is the sum of, up to which its value is rounding."""
+"""Fraction of the sizes that a quantity is the sum of, up to which its value is rounding."""
 
 
 @dataclass(eq=False)
@@ -144,7 +144,7 @@ class Level:
         return parents
 
     def kept(self) -> Array:
-        """Return the share of its squared error (m,) that each element keeps if it is cut."""
+        """Return the fraction of its squared error (m,) that each element keeps if it is cut."""
         smooth = 4.0**-self.order
         kept = np.full(len(self.squares), smooth)
         if self.before is None:

@@ -43,8 +43,8 @@ class Difference:
     def row(self, unit: str) -> str:
         """Return its line of the table."""
         parts = (
-            f"{name} {value:.6e} {unit}" + (f" ({share:.3g} of the first)" if np.isfinite(share) else "")
-            for name, value, share in (
+            f"{name} {value:.6e} {unit}" + (f" ({ratio:.3g} of the first)" if np.isfinite(ratio) else "")
+            for name, value, ratio in (
                 ("largest", self.maximum, self.relative_maximum),
                 ("L2", self.l2, self.relative_l2),
             )
@@ -91,7 +91,7 @@ def compare(first: Result, second: Result) -> Comparison:
     """Compare two results of one body, on the same mesh or on two meshes.
 
     On two meshes, displacements N u and recovered stresses of the second are taken at the nodes of the first.
-    Mean squares weight each node with an equal share of the volume of each of its elements.
+    Mean squares weight each node with an equal part of the volume of each of its elements.
 
     Parameters
     ----------
@@ -107,8 +107,6 @@ def compare(first: Result, second: Result) -> Comparison:
         One of them is no result.
     MeshError
         No node of the first lies in the mesh of the second.
-    ModelError
-        Several processes share a mesh.
 
     Examples
     --------
@@ -176,7 +174,7 @@ def _sizes(values: Array, weight: Array) -> tuple[Array, float]:
 
 
 def _volumes(result: Result) -> Array:
-    """Return the volume (n,) in m³ of each node: equal shares of those of its elements."""
+    """Return the volume (n,) in m³ of each node: equal parts of those of its elements."""
     total = np.zeros(result.mesh.n_nodes)
     for group in result.groups:
         k = group.nodes.shape[1]

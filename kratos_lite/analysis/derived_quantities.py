@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,17 +18,12 @@ from kratos_lite.validation import finite
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-
-class Reacting(Protocol):
-    """A result or a state."""
-
-    @property
-    def reactions(self) -> Array:
-        """Return the reactions (n, 3) in N."""
+    from kratos_lite.analysis.result import Result
+    from kratos_lite.analysis.state import State
 
 
 def reaction_resultant(
-    model: Structure, of: Reacting, where: Where | None = None, center: ArrayLike | None = None
+    model: Structure, of: Result | State, where: Where | None = None, center: ArrayLike | None = None
 ) -> tuple[Array, Array]:
     """Return the force of the supports on the body and its moment about a point, as those of a hub.
 
@@ -78,7 +73,7 @@ def reaction_resultant(
 
 
 def motion_summary(
-    e: EquationsOfMotion, of: Reacting, critical: float | None, time: float = 0.0
+    e: EquationsOfMotion, of: Result | State, critical: float | None, time: float = 0.0
 ) -> dict[str, Any]:
     """Return the figures of a motion at a time for a report; `critical` is the lowest critical rate."""
     assert e.terms is not None

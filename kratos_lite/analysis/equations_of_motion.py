@@ -261,7 +261,7 @@ class EquationsOfMotion:
         return self.model.free_motions(self.groups)
 
     def is_symmetric(self, time: float, c: float) -> bool:
-        """Return whether a matrix with the share c of damping is symmetric at a time."""
+        """Return whether a matrix with the factor c of damping is symmetric at a time."""
         rate, acceleration = self.rates(time)
         damped = bool(self.terms and self.terms.motion.damping)
         return not (acceleration or (rate and (c or damped)))

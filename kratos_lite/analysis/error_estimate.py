@@ -56,7 +56,7 @@ SAFETY = {"recovery": 1.7, "averaging": 1.8}
 
 NEGLIGIBLE, COARSE, FEW, FOCUS = 1e-9, 1.7, 8, 0.4
 """Relative error that is rounding; ratio of the differences to recovered and averaged stresses beyond which a
-mesh is coarse; elements that are few; share of the error in the worst hundredth of elements that is much."""
+mesh is coarse; elements that are few; much of the error, in the worst hundredth of elements."""
 WORST = 3
 """Least number of elements of that hundredth; meshes of less than twenty times as many have none."""
 
@@ -103,7 +103,7 @@ def _warnings(recovered: Array, is_coarse: bool, groups: Sequence[ElementGroup],
     if in_few_elements(recovered, count):
         element = mesh.element_ids[int(recovered.argmax())]
         warnings.append(
-            f"a large share of the error lies in few elements, most in element {element}: near a re-entrant "
+            f"a large part of the error lies in few elements, most in element {element}: near a re-entrant "
             "corner, the edge of a support or a concentrated load stresses have no limit"
         )
     return warnings
@@ -115,12 +115,12 @@ def too_few(mesh: Mesh) -> list[str]:
     return [f"{n} elements are too few to estimate their error by one another"] if n < FEW else []
 
 
-def in_few_elements(shares: Array, count: int) -> bool:
-    """Return whether the hundredth of `count` elements with the largest shares holds much of their sum."""
+def in_few_elements(errors: Array, count: int) -> bool:
+    """Return whether the hundredth of `count` elements with the largest errors holds much of their sum."""
     if count < 20 * WORST:
         return False
     few = max(WORST, count // 100)
-    return float(np.partition(shares, -few)[-few:].sum()) > FOCUS * float(shares.sum())
+    return float(np.partition(errors, -few)[-few:].sum()) > FOCUS * float(errors.sum())
 
 
 def _locks(group: ElementGroup) -> bool:
@@ -203,16 +203,16 @@ def error_of(
                 f"{quantity}: multi-point constraints tie the part to nodes beside it, so that its reaction "
                 "is that of no support; take the whole of what is tied together"
             )
-    shares, averaged = recovery.products(strained, z, result.mesh.n_elements)
+    contributions, averaged = recovery.products(strained, z, result.mesh.n_elements)
     local = quantity.local(result)
     absolute = max(
-        SAFETY["recovery"] ** 2 * float(np.abs(shares).sum()),
+        SAFETY["recovery"] ** 2 * float(np.abs(contributions).sum()),
         SAFETY["averaging"] ** 2 * abs(float(averaged.sum())),
     )
     absolute += SAFETY["recovery"] * (float(np.abs(local).sum()) + quantity.spread(result))
-    warnings += _concentrated(np.abs(shares)) + too_few(result.mesh)
-    shares = shares + local
-    return QuantityError(value, float(shares.sum()), absolute, shares, quantity.unit, warnings)
+    warnings += _concentrated(np.abs(contributions)) + too_few(result.mesh)
+    contributions = contributions + local
+    return QuantityError(value, float(contributions.sum()), absolute, contributions, quantity.unit, warnings)
 
 
 def _concentrated(sizes: Array) -> list[str]:
@@ -235,6 +235,6 @@ def _shared(result: Solved, held: Mask, part: Mask) -> list[str]:
         if both.any():
             return [
                 f"{int(both.sum())} faces beside the part are held along {AXES[axis]}, too: nodes on its "
-                "edge carry a share of theirs, which depends on the mesh and is not in the estimate"
+                "edge carry a part of theirs, which depends on the mesh and is not in the estimate"
             ]
     return []

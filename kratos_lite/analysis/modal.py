@@ -45,7 +45,7 @@ def complex_modes(
     with phase("check"):
         e = EquationsOfMotion(model, steady=True, progress=progress)
     with phase("assemble"):
-        M, C, K = (reduced(e, e.matrix(0.0, *shares)) for shares in ((1, 0, 0), (0, 1, 0), (0, 0, 1)))
+        M, C, K = (reduced(e, e.matrix(0.0, *factors)) for factors in ((1, 0, 0), (0, 1, 0), (0, 0, 1)))
     with phase("modes"):
         pencil = Pencil(M, C, K, neutral_motions(M, C, K, _rigid_motions(e)))
         values, shapes = pencil.modes(whole_number(count, "count"))

@@ -72,7 +72,7 @@ class Model(Structure):
         ----------
         solver : ``auto``, ``dense``, ``direct`` or ``amg``.
         tolerance : relative residual at which the iterative solver stops.
-        progress : called with the phase and the share done, 0 … 1.
+        progress : called with the phase and the fraction done, 0 … 1.
         error : relative error of the energy norm, such as 0.01, for which the mesh is made finer and linear
             elements quadratic where needed; the result is on the final mesh, the model stays as it is.
         most_unknowns : with `error`: no mesh with more of them is solved (as many as fit into the free
@@ -253,7 +253,7 @@ class Model(Structure):
         ----------
         count : number of modes.
         lumped : concentrate the mass at the nodes.
-        progress : called with the phase and the share done, 0 … 1.
+        progress : called with the phase and the fraction done, 0 … 1.
 
         Returns
         -------
@@ -280,7 +280,7 @@ class Model(Structure):
         Parameters
         ----------
         count : number of modes.
-        progress : called with the phase and the share done, 0 … 1.
+        progress : called with the phase and the fraction done, 0 … 1.
 
         Returns
         -------

@@ -23,7 +23,7 @@ SHOWN = 6
 CANDIDATES = 400
 """States, evenly spread, among which they are chosen."""
 ALIKE = 0.02
-"""Share of its size that a body moves between positions that are worth drawing."""
+"""Fraction of its size that a body moves between positions that are worth drawing."""
 ENERGIES = ("kinetic", "internal", "potential", "sum")
 
 

@@ -111,7 +111,7 @@ class PointValues:
 GAUSS_POINTS = 5
 """On the part of a line in one element: exact to degree 9 of x σ."""
 ZERO = 1e-10
-"""Share of the largest stress that is drawn as 0: rounding."""
+"""Fraction of the largest stress that is drawn as 0: rounding."""
 
 
 class LineValues(PointValues):
@@ -142,7 +142,7 @@ class LineValues(PointValues):
         super().__init__(fields, located, recovered)
 
     def _on_line(self, t: Array) -> Array:
-        """Return points (..., 3) at shares t (...) of the line."""
+        """Return points (..., 3) at fractions t (...) of the line."""
         a, b = self._ends
         return a * (1 - t[..., None]) + b * t[..., None]
 

@@ -48,9 +48,9 @@ class Prepared:
 
     def components_with(self, nodes: Mask) -> Mask:
         """Return the components with one of some nodes, a mask (n,)."""
-        found = np.zeros(len(self.free.counts), dtype=bool)
-        found[self.component[nodes & self.used]] = True
-        return found
+        chosen = np.zeros(len(self.free.counts), dtype=bool)
+        chosen[self.component[nodes & self.used]] = True
+        return chosen
 
 
 def prepared(model: Structure) -> Prepared:
@@ -108,13 +108,13 @@ def load_set(
     model: Structure,
     state: Prepared,
     dirichlet: DirichletConditions,
-    given: Load | Sequence[Load],
+    loads: Load | Sequence[Load],
     phase: Phases,
 ) -> LoadSet:
     """Return loads as nodal forces; an error where they do not fit, or a free component is not in balance."""
-    if not isinstance(given, (Load, list, tuple)):
-        raise InputError(f"a load, or a list of them, is needed; got {type(given).__name__}")
-    loads = [given] if isinstance(given, Load) else list(given)
+    if not isinstance(loads, (Load, list, tuple)):
+        raise InputError(f"a load, or a list of them, is needed; got {type(loads).__name__}")
+    loads = [loads] if isinstance(loads, Load) else list(loads)
     for load in loads:
         if not isinstance(load, Load):
             raise InputError(f"a load such as Gravity or Traction is needed; got {type(load).__name__}")
@@ -170,7 +170,7 @@ def system_of(
     backend: str,
     petsc: str | None,
 ) -> ConstrainedSystem:
-    """Return the constrained system of some elements of a model, for an backend.
+    """Return the constrained system of some elements of a model, for a backend.
 
     Components `held` (n, 3) of what supports leave free are 0, too.
     """

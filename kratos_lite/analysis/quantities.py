@@ -178,7 +178,7 @@ class MeanDisplacement(Quantity):
 
     Parameters
     ----------
-    part : nodes by part name, predicate, mask or rows.  The faces on the boundary among them count; a part
+    part : nodes by part name, predicate, mask or indices.  The faces on the boundary among them count; a part
         without any counts by the elements that have all their nodes in it.
     axis : ``"x"``, ``"y"`` or ``"z"``.
 
@@ -244,7 +244,7 @@ class ReactionOf(Quantity):
 
     Parameters
     ----------
-    part : nodes by part name, predicate, mask or rows.
+    part : nodes by part name, predicate, mask or indices.
     axis : ``"x"``, ``"y"`` or ``"z"``.
 
     Raises

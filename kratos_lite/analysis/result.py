@@ -82,7 +82,7 @@ class Result(ElementFields, Tabular):
 
         Parameters
         ----------
-        where : nodes by part, predicate, mask or rows; all if not given.
+        where : nodes by part, predicate, mask or indices; all if not given.
 
         Returns
         -------
@@ -100,7 +100,7 @@ class Result(ElementFields, Tabular):
 
         Parameters
         ----------
-        where : nodes by part, predicate, mask or rows; all if not given.
+        where : nodes by part, predicate, mask or indices; all if not given.
 
         Returns
         -------

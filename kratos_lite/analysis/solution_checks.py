@@ -26,7 +26,7 @@ class Phases:
     """Seconds spent in each named phase; `progress` is called where one begins and ends."""
 
     def __init__(self, progress: Progress | None = None) -> None:
-        function_or_none(progress, "progress must be a function of a phase and a share")
+        function_or_none(progress, "progress must be a function of a phase and a fraction")
         self.seconds: dict[str, float] = {}
         self.progress = progress
 
@@ -100,9 +100,9 @@ def check_solution(solution: Solution, u: Array, balance: tuple[float, float]) -
 
 
 LARGE = 0.1
-"""Displacement, as share of the diagonal of the body, from which it is not small."""
+"""Displacement, as fraction of the diagonal of the body, from which it is not small."""
 TINY = 1e-11
-"""Displacement, as share of the diagonal, below which a load does nothing: 0.2 Pa on steel do more."""
+"""Displacement, as fraction of the diagonal, below which a load does nothing: 0.2 Pa on steel do more."""
 STRAINED = 0.05
 """Strain from which it is not small."""
 SAMPLE = 500
@@ -128,8 +128,8 @@ def check_deformation(model: Structure, groups: Sequence[ElementGroup], u: Array
         largest = _diagonal(moved[mesh.used_nodes()])
     found = []
     if largest > LARGE * size:
-        share = largest / size
-        times = f"{share:.0%} of" if share < 2 else f"{share:.3g} times"
+        fraction = largest / size
+        times = f"{fraction:.0%} of" if fraction < 2 else f"{fraction:.3g} times"
         found.append(f"displacements differ by {largest:.3g} m, {times} the size of the body")
     elif largest < TINY * size:
         return [

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
+from kratos_lite.analysis.fields import Fields
 from kratos_lite.bodies.body import Body
 from kratos_lite.errors import InputError
 from kratos_lite.typing import Array
@@ -18,14 +19,18 @@ BODY_FIELDS = ("q", "u", "external_work")
 MODEL_FIELDS = ("u", "v", "a", "reactions", "imbalance")
 
 
+@runtime_checkable
 class InTime(Protocol):
-    """A model in time, which makes and takes states."""
+    """A model in time."""
 
     def state(self) -> State:
         """Return the state of now."""
 
     def restore(self, state: State) -> None:
         """Go on from a state."""
+
+    def result(self, state: State | None = None) -> Fields:
+        """Return the result of a state."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,13 +114,13 @@ class State:
         values = self.__dict__.get("values", {})
         if name not in values:
             raise AttributeError(f"the state of a {self.__dict__.get('kind')} has no {name!r}")
-        found: Array = values[name]
-        return found
+        value: Array = values[name]
+        return value
 
 
 def _check_subject(subject: object) -> None:
     """Raise InputError for what has no states."""
-    if not isinstance(subject, Body) and not hasattr(subject, "restore"):
+    if not isinstance(subject, (Body, InTime)):
         raise InputError(
             f"a body, or a model in time, model.transient(), has states; got {type(subject).__name__}"
         )
@@ -130,10 +135,10 @@ def check_state(state: object, kind: str, shapes: Mapping[str, tuple[int, ...]])
         other = "a model" if state.kind == "model" else f"a {state.kind} body"
         raise InputError(f"this is the state of {other}; one of {whose} is needed")
     for name, shape in shapes.items():
-        found = np.shape(state.values[name]) if name in state.values else "none"
-        if found != shape:
+        actual = np.shape(state.values[name]) if name in state.values else "none"
+        if actual != shape:
             raise InputError(
-                f"this state does not fit: {name} of {whose} has shape {shape} here; got {found}"
+                f"this state does not fit: {name} of {whose} has shape {shape} here; got {actual}"
             )
     number(state.time, "the time of a state", least=0, unit="s")
     whole_number(state.step, "the steps of a state", least=0)

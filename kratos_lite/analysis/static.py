@@ -55,7 +55,7 @@ class StaticAnalysis:
     model : the structure.
     solver : ``auto``, ``dense``, ``direct`` or ``amg``.
     tolerance : relative residual at which the iterative solver stops.
-    progress : called with the phase and the share done, 0 … 1.
+    progress : called with the phase and the fraction done, 0 … 1.
     backend, petsc : see `Model.solve`.
 
     Attributes
@@ -183,9 +183,9 @@ class StaticAnalysis:
                 c = supports.constraint_map(self._equations.system.nodes).c
                 self._equations = replace(self._equations, prescribed=c)
 
-    def _load(self, given: Load | Sequence[Load]) -> LoadSet:
+    def _load(self, loads: Load | Sequence[Load]) -> LoadSet:
         phase, self._phase = self._phase, Phases(self.progress)
-        return load_set(self.model, self._state, self._dirichlet, given, phase)
+        return load_set(self.model, self._state, self._dirichlet, loads, phase)
 
     def _warnings(self, case: LoadSet) -> list[str]:
         """Return the warnings of the model and of a load set."""

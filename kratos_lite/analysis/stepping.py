@@ -6,7 +6,7 @@ import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from math import ceil, inf
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -23,30 +23,9 @@ from kratos_lite.view.progress import watched
 
 _log = logging.getLogger("kratos_lite")
 SAFETY = 0.95
-"""Share of the critical step that automatic substeps take."""
-
-
+"""Fraction of the critical step that automatic substeps take."""
 MOST_SUBSTEPS = 1_000_000
 """Parts of one step; more would take the time of a whole run until the first state."""
-
-
-class Stepper(Protocol):
-    """What the loop advances."""
-
-    def critical_step(self) -> float:
-        """Return the longest stable step in s."""
-
-    def prepare(self, h: float, parts: int) -> None:
-        """Check steps of h s, each in so many parts, and make ready for them."""
-
-    def advance(self, h: float, count: int) -> None:
-        """Take so many steps."""
-
-    def diverged(self) -> bool:
-        """Return whether the motion has grown beyond all bounds."""
-
-    def state(self) -> State:
-        """Return the state of now."""
 
 
 def integrate(
@@ -104,8 +83,8 @@ def integrate(
     count = None if steps is None else whole_number(steps, "steps")
     if until is not None and not takes(until, 1):
         raise InputError(f"until must be a function of a state; got {short(until)}")
-    function_or_none(progress, "progress must be a function of a phase and a share")
-    stepper: Stepper = subject if isinstance(subject, TransientAnalysis) else BodyStepper(subject)
+    function_or_none(progress, "progress must be a function of a phase and a fraction")
+    stepper = subject if isinstance(subject, TransientAnalysis) else BodyStepper(subject)
     parts = 1 if substeps == "auto" else whole_number(substeps, "substeps", ", or 'auto'")
     if substeps == "auto":
         critical = stepper.critical_step()
@@ -131,7 +110,7 @@ def _ends(answer: Any) -> bool:
 
 
 def _states(
-    stepper: Stepper,
+    stepper: BodyStepper | TransientAnalysis,
     h: float,
     count: int | None,
     every: int,
@@ -154,7 +133,7 @@ def _states(
                 return
 
 
-def _divergence(stepper: Stepper, h: float) -> SolveError:
+def _divergence(stepper: BodyStepper | TransientAnalysis, h: float) -> SolveError:
     with np.errstate(over="ignore", invalid="ignore"):
         state = stepper.state()
     return SolveError(

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import numpy as np
 
 from kratos_lite.analysis.fields import FIELDS, PARTS, Fields
 from kratos_lite.analysis.peak import Solved, peak
-from kratos_lite.analysis.state import State
+from kratos_lite.analysis.state import InTime, State
 from kratos_lite.errors import InputError, nearest
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.structure import Structure
@@ -28,17 +28,6 @@ KINDS = (
     "a mesh, a model, a result, several of them, a body with states, a transient with states, the report of "
     "an adaptive solution, or the class of an element"
 )
-
-
-@runtime_checkable
-class Transient(Protocol):
-    """A model in time."""
-
-    def state(self) -> State:
-        """Return the state of now."""
-
-    def result(self, state: State | None = None) -> Fields:
-        """Return the result of a state."""
 
 
 def panels_of(thing: Any, given: dict[str, Any]) -> tuple[list[Subject], Options]:
@@ -67,7 +56,7 @@ def series_of(thing: Any, given: dict[str, Any], most: int) -> tuple[list[list[S
         return [_phase(thing, given, shapes, titles, turn) for turn in turns], options_of(
             given, _factor(given, 1.0)
         )
-    if isinstance(thing, Transient) and given["values"] is None:
+    if isinstance(thing, InTime) and given["values"] is None:
         given["values"] = "displacement"
     things, titles = _several(thing, given)
     if len(things) > 1:
@@ -78,7 +67,7 @@ def series_of(thing: Any, given: dict[str, Any], most: int) -> tuple[list[list[S
         if not isinstance(things[0], Fields) or not things[0].u.any():
             raise InputError("nothing moves here: give modes, states, or a result with displacements")
         subjects = [
-            _grown(_subject(things[0], given), share) for share in (1 - np.cos(2 * np.pi * phases)) / 2
+            _scaled(_subject(things[0], given), fraction) for fraction in (1 - np.cos(2 * np.pi * phases)) / 2
         ]
         titles = [""] * len(subjects)
     scale = factor_of(subjects, _factor(given, None))
@@ -108,7 +97,7 @@ def _factor(given: dict[str, Any], otherwise: float | None) -> float | None:
 def _several(thing: Any, given: dict[str, Any]) -> tuple[list[Any], list[str]]:
     """Return things to draw and their titles, if any."""
     titles = given["titles"]
-    if isinstance(thing, Transient):
+    if isinstance(thing, InTime):
         states = thing.state() if given["states"] is None else given["states"]
         states = [states] if isinstance(states, State) else list(states)
         if not states:
@@ -182,13 +171,13 @@ def _values(result: Fields | None, mesh: Mesh, u: Array | None, given: dict[str,
     return Values(numbers, unit=unit or "")
 
 
-def _grown(subject: Subject, share: float) -> Subject:
-    """Return a share of a linear response."""
+def _scaled(subject: Subject, fraction: float) -> Subject:
+    """Return a fraction of a linear response."""
     values = subject.values
     if values is not None and not values.log:
-        values = replace(values, numbers=share * values.numbers)
+        values = replace(values, numbers=fraction * values.numbers)
     assert subject.u is not None
-    return replace(subject, u=share * subject.u, values=values)
+    return replace(subject, u=fraction * subject.u, values=values)
 
 
 def _heads(subjects: Sequence[Subject], given: dict[str, Any], factor: float) -> str:
@@ -223,7 +212,7 @@ def _modes(thing: Any, given: dict[str, Any]) -> tuple[Numbers, list[str]]:
 def _phase(
     thing: Any, given: dict[str, Any], shapes: Numbers, titles: list[str], turn: complex
 ) -> list[Subject]:
-    """Return modes side by side in a phase, colored by their displacement as a share of the largest one."""
+    """Return modes side by side in a phase, colored by displacement as a fraction of the largest."""
     mesh = _mesh(thing)
     u = (shapes * turn).real
     size = np.linalg.norm(shapes, axis=2).max(axis=1)

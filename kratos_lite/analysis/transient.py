@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 DIVERGED = 1e9
 """Displacements by the size of the model beyond which a motion has lost its stability."""
 OFF_SUPPORT = 1e-6
-"""Share of the largest displacement by which a state may miss its supports."""
+"""Fraction of the largest displacement by which a state may miss its supports."""
 OFF_BALANCE = 1e-4
-"""Share of the largest force by which the accelerations of a state may miss the balance."""
+"""Fraction of the largest force by which the accelerations of a state may miss the balance."""
 
 
 def _version(model: Structure) -> list[Any]:
@@ -54,7 +54,7 @@ class TransientAnalysis:
         where they hold.
     lumped : whether the mass stands in the nodes; central differences always lump it.
     rayleigh : α in 1/s and β in s of the damping α M + β K.
-    progress : called with the phase and the share done, 0 … 1, while the equations are made.
+    progress : called with the phase and the fraction done, 0 … 1, while the equations are made.
 
     Attributes
     ----------
@@ -92,7 +92,7 @@ class TransientAnalysis:
         rayleigh: tuple[float, float] = (0.0, 0.0),
         progress: Progress | None = None,
     ) -> None:
-        function_or_none(progress, "progress must be a function of a phase and a share")
+        function_or_none(progress, "progress must be a function of a phase and a fraction")
         chosen = Newmark() if integrator is None else integrator
         self.integrator = INTEGRATORS[chosen]() if isinstance(chosen, str) else chosen
         if not isinstance(self.integrator, ModelIntegrator):
@@ -139,10 +139,10 @@ class TransientAnalysis:
 
     def _nodal(self, values: ArrayLike, what: str) -> Array:
         """Return nodal vectors (n, 3) as (3a,)."""
-        given, n = finite(values, what), self.equations.system.n_nodes
-        if given.shape != (n, 3):
-            raise InputError(f"{what} needs shape ({n}, 3); got {given.shape}")
-        return self.equations.system.gather(given).copy()
+        vectors, n = finite(values, what), self.equations.system.n_nodes
+        if vectors.shape != (n, 3):
+            raise InputError(f"{what} needs shape ({n}, 3); got {vectors.shape}")
+        return self.equations.system.gather(vectors).copy()
 
     def _balanced(self, prescribed: Array) -> Array:
         """Return a of M a = f - C v - K u + reactions, with the acceleration of what is prescribed."""

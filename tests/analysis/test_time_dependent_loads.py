@@ -97,8 +97,12 @@ def test_what_is_no_function_is_refused(wrong):
 def test_what_is_no_load_is_refused(wrong):
     with pytest.raises(kl.InputError, match=r"the load at t = 0 s must be a PointLoad or another, or None"):
         beam(kl.TimeDependentLoad(lambda t: wrong)).transient()
+
+
+@pytest.mark.parametrize("load", [3.0, kl.TimeDependentLoad(lambda t: None)])
+def test_an_amplitude_is_one_of_a_constant_load(load):
     with pytest.raises(kl.InputError, match="an amplitude multiplies a constant load"):
-        ScaledLoad(kl.TimeDependentLoad(lambda t: None), 1.0)
+        ScaledLoad(load, 1.0)
 
 
 # ---- Bossak ----------------------------------------------------------------------------------------

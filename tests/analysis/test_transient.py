@@ -313,7 +313,7 @@ def test_restart_is_the_same_bit_by_bit(name, tmp_path):
     again = made()
     kl.read_state(tmp_path / "state.npz").restore(again)
     second = last(again, 1e-3, 35)
-    for field in ("u", "v", "a", "reactions"):
+    for field in ("u", "v", "a", "reactions", "imbalance"):
         assert (getattr(second, field) == getattr(whole, field)).all()
     assert (second.time, second.step) == (whole.time, 60)
 

@@ -120,16 +120,25 @@ def test_substeps_are_part_of_a_written_state(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "change", [lambda m: m.fix("x+"), lambda m: m.add(kl.Gravity((0, 0, -9.81))), lambda m: m.loads.clear()]
+    "change",
+    [
+        lambda m: m.fix("x+"),
+        lambda m: m.fix("z-", "z", 1e-3, override=True),
+        lambda m: m.add(kl.Gravity((0, 0, -9.81))),
+        lambda m: m.loads.clear(),
+    ],
 )
-def test_a_change_of_the_model_during_a_run_is_refused(change):
+def test_a_change_of_the_model_before_or_during_a_run_is_refused(change):
     subject = model()
     subject.add(kl.Gravity((0, 0, -1.0)))
-    states = kl.integrate(subject.transient(), 1e-3, 5)
+    transient = subject.transient()
+    states = kl.integrate(transient, 1e-3, 5)
     next(states)
     change(subject)
     with pytest.raises(ModelError, match="the model has changed since this transient was made"):
         next(states)
+    with pytest.raises(ModelError, match="the model has changed since this transient was made"):
+        kl.integrate(transient, 1e-3, 2)
 
 
 def test_a_motion_comes_by_add_alone():

@@ -215,12 +215,6 @@ def test_rubber_and_steel(element, inside):
     check(model, most(75, 95))
 
 
-def test_two_rubbers():
-    model = body("EnhancedStrain3D8N")
-    model.assign(rubber(E=3e8), np.flatnonzero(centers(model)[:, 0] > 0.5))
-    check(model, most(50, 60))
-
-
 def test_a_rubber_with_fibers_is_nearly_incompressible():
     fibers = kl.Orthotropic3D(
         E_x=9e6, E_y=3e6, E_z=3e6, nu_xy=0.4999, nu_yz=0.833, nu_xz=0.4999, G_xy=1e6, G_yz=1e6, G_xz=1e6,
@@ -349,18 +343,6 @@ def test_tolerances_refer_to_forces_without_the_bulk_modulus():
     assert report.force_error < 1e-3
 
 
-def test_a_system_is_prepared_once_for_many_right_sides(monkeypatch):
-    made = []
-    original = multigrid.multigrid
-    monkeypatch.setattr(multigrid, "multigrid", lambda *given: made.append(1) or original(*given))
-    analysis = body("EnhancedStrain3D8N").static("amg")
-    direct = body("EnhancedStrain3D8N").static("direct")
-    for g in ((0.0, 0.0, -9.81), (5.0, 0.0, 0.0)):
-        found, exact = (one.solve(kl.Gravity(g)).u for one in (analysis, direct))
-        close(found, exact, 1e-7)
-    assert made == [1]
-
-
 def test_without_kernels(monkeypatch):
     monkeypatch.setattr(multigrid, "kernels", lambda name: None)
     check(body("EnhancedStrain3D8N", cells=5), 50)
@@ -415,14 +397,6 @@ def test_the_kernel_refuses_what_does_not_fit():
 @compiled
 def test_results_do_not_depend_on_the_number_of_threads():
     same_on_all_threads(lambda: body("EnhancedStrain3D8N").solve("amg").u, (1, 2, 3))
-
-
-def test_progress_grows_to_its_end():
-    told = []
-    body("BBar3D27N").solve("amg", progress=lambda phase, share: told.append((phase, share)))
-    shares = [share for phase, share in told if phase == "solve"]
-    assert shares == sorted(shares)
-    assert shares[-1] == 1
 
 
 def test_no_load_has_no_displacement():

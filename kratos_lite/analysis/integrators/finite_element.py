@@ -149,10 +149,10 @@ def _balanced(
 
 def warn_of_stiffness(body: Deformable, h: float) -> None:
     """Warn where linearly implicit steps of h s may let a stiff body that spins gain energy."""
-    if (share := h * body.highest_frequency()) > STIFF:
+    if (number := h * body.highest_frequency()) > STIFF:
         _log.warning(
             "linearly_implicit with h ω = %.3g: above %g a stiff body that spins may gain energy without "
             "bound; use energy_momentum, a shorter step or damping",
-            share,
+            number,
             STIFF,
         )
