@@ -47,37 +47,18 @@ class AffineBody(Body):
 
     @staticmethod
     @abstractmethod
-    def matrix_of(q: Array) -> Array:
-        """Return A of configurations.
-
-        Parameters
-        ----------
-        q : (..., 12).
-
-        Returns
-        -------
-        (..., 3, 3) float, a view.
-        """
+    def _matrix_of(q: Array) -> Array:
+        """Return A (..., 3, 3) of configurations (..., 12), a view."""
 
     @staticmethod
     @abstractmethod
-    def check_matrix(A: Array) -> None:
-        """Check that A is one of this kind of body.
-
-        Parameters
-        ----------
-        A : (..., 3, 3).
-
-        Raises
-        ------
-        InputError
-            It is no rotation, or its determinant is not positive.
-        """
+    def _check_matrix(A: Array) -> None:
+        """Raise InputError unless A (..., 3, 3) is one of this kind of body."""
 
     def position(self, X: ArrayLike, q: Array | None = None) -> Array:
         """Return x = A (X - X̄) + x̄; see `Body.position`."""
         q = self.q if q is None else q
-        return self._moved(X, self.matrix_of(q), q[..., 9:])
+        return self._moved(X, self._matrix_of(q), q[..., 9:])
 
     def _moved(self, X: ArrayLike, A: Array, translation: Array) -> Array:
         """Return A (X - X̄) + translation, (..., m, 3) or (..., 3)."""
@@ -97,12 +78,12 @@ class AffineBody(Body):
         q = finite(q, "a configuration")
         if q.shape != self.q.shape:
             raise InputError(f"a configuration of this body has shape {self.q.shape}; got {q.shape}")
-        self.check_matrix(self.matrix_of(q))
+        self._check_matrix(self._matrix_of(q))
         self.q[...] = q
 
     def rotate(self, rotation: ArrayLike) -> None:
         """Set A to a rotation Λ (3, 3) or (..., 3, 3); see `Body.rotate`."""
-        self.matrix_of(self.q)[...] = fitting(check_rotation(rotation), self.q.shape[:-1], 2, "a rotation")
+        self._matrix_of(self.q)[...] = fitting(check_rotation(rotation), self.q.shape[:-1], 2, "a rotation")
 
     def _rigid_velocity(self, linear: ArrayLike, angular: ArrayLike) -> Array:
         """Set the velocity of the mass center; return the spatial angular velocity, both checked."""
@@ -119,7 +100,7 @@ class AffineBody(Body):
 
     def push_forward(self, vector: Array, X: Array, q: Array) -> Array:
         """Return A times the vector; see `FreeBody.push_forward`."""
-        return np.asarray(self.matrix_of(q) @ vector)
+        return np.asarray(self._matrix_of(q) @ vector)
 
     def mass_center(self) -> Array:
         """Return x̄ (..., 3) in m."""

@@ -260,20 +260,6 @@ class FiniteElementBody(Deformable):
         """Return the internal force vector of the formulation, (3n,) in N."""
         return self.formulation.load(self.q if q is None else q)
 
-    def load_over(self, q: Array, dq: Array, damping: float) -> Array:
-        """Return the load over an increment, whose work is the change of strain energy.
-
-        Parameters
-        ----------
-        q, dq : (3n,) configuration and increment in m.
-        damping : the ratio η/h, which adds the viscous stress.
-
-        Returns
-        -------
-        (3n,) in N.
-        """
-        return self.formulation.load_over(q, dq, damping)
-
     def internal_energy(self) -> float:
         """Return the strain energy in J."""
         return self.formulation.energy(self.q)
@@ -282,19 +268,6 @@ class FiniteElementBody(Deformable):
         """Return the tangent (3n, 3n) of the internal force vector in N/m."""
         return self.formulation.stiffness(self.q if q is None else q)
 
-    def damping_load(self, q: Array, u: Array) -> Array:
-        """Return K(q) u, the viscous load for η = 1.
-
-        Parameters
-        ----------
-        q, u : (3n,) configuration in m and velocity in m/s.
-
-        Returns
-        -------
-        (3n,) in N/s.
-        """
-        return self.formulation.damping_load(q, u)
-
     def mass_solver(self) -> Solve:
         """Return what solves M x = b, for motions that the formulation has."""
         return self.formulation.mass_solver(self.q)
@@ -302,21 +275,6 @@ class FiniteElementBody(Deformable):
     def solver(self, q: Array, c: float) -> Solve:
         """Return what solves (M + c K(q)) x = b."""
         return self.formulation.solver(q, c)
-
-    def increment_solver(self, q: Array, dq: Array, damping: float, c: float) -> Solve:
-        """Return what solves (M + c D) x = b, D the derivative of `load_over` with respect to dq.
-
-        Parameters
-        ----------
-        q, dq : (3n,) configuration and increment in m.
-        damping : the ratio η/h.
-        c : s².
-
-        Returns
-        -------
-        A function of b.
-        """
-        return self.formulation.increment_solver(q, dq, damping, c)
 
     def solve_static(
         self, residual: Array, entries: Entries, gap: Array, tangent: Entries

@@ -85,22 +85,16 @@ class PseudoRigidBody(AffineBody, Deformable):
     @property
     def deformation(self) -> Array:
         """Deformation gradient F (..., 3, 3), a copy."""
-        return self.matrix_of(self.q).copy()
+        return self._matrix_of(self.q).copy()
 
     @staticmethod
-    def matrix_of(q: Array) -> Array:
+    def _matrix_of(q: Array) -> Array:
         """Return F (..., 3, 3) of configurations (..., 12), or Ḟ of velocities; see `AffineBody`."""
         return q[..., :9].reshape(*q.shape[:-1], 3, 3)
 
     @staticmethod
-    def check_matrix(A: Array) -> None:
-        """Check F (..., 3, 3).
-
-        Raises
-        ------
-        InputError
-            det F ≤ 0.
-        """
+    def _check_matrix(A: Array) -> None:
+        """Raise InputError unless det F > 0."""
         lowest = float(np.linalg.det(A).min())
         if lowest <= 0:
             raise InputError(
@@ -110,7 +104,7 @@ class PseudoRigidBody(AffineBody, Deformable):
     def velocity(self, X: ArrayLike, q: Array | None = None, u: Array | None = None) -> Array:
         """Return v = Ḟ (X - X̄) + v̄, shaped as by `position`, in m/s."""
         u = self.u if u is None else u
-        return self._moved(X, self.matrix_of(u), u[..., 9:])
+        return self._moved(X, self._matrix_of(u), u[..., 9:])
 
     def set_velocity(self, linear: ArrayLike = (0, 0, 0), angular: ArrayLike = (0, 0, 0)) -> None:
         """Set the velocity of the mass center in m/s and the spatial angular velocity in rad/s."""
@@ -119,7 +113,7 @@ class PseudoRigidBody(AffineBody, Deformable):
 
     def affine_motion(self) -> tuple[Array, Array]:
         """Return F and Ḟ (3, 3); see `Body.affine_motion`."""
-        return self.deformation, self.matrix_of(self.u).copy()
+        return self.deformation, self._matrix_of(self.u).copy()
 
     def set_affine_motion(
         self, F: Array, rate: Array, center: Array, velocity: Array, angular_momentum: Array
@@ -160,7 +154,7 @@ class PseudoRigidBody(AffineBody, Deformable):
 
     def times_mass(self, v: Array) -> Array:
         """Return V̇ E0 row by row and m v̄; see `Body.times_mass`."""
-        rows = (self.matrix_of(v) @ self.mass_properties.euler).reshape(*v.shape[:-1], 9)
+        rows = (self._matrix_of(v) @ self.mass_properties.euler).reshape(*v.shape[:-1], 9)
         return np.concatenate([rows, self.mass[..., None] * v[..., 9:]], axis=-1)
 
     # ---- deformation ----------------------------------------------------------------------------
@@ -229,7 +223,7 @@ class PseudoRigidBody(AffineBody, Deformable):
 
     def spin(self) -> Array:
         """Return the axial vector of Ḟ E0 F^T - F E0 Ḟ^T, (..., 3) in kg m²/s."""
-        H = self.matrix_of(self.u) @ self.mass_properties.euler @ np.swapaxes(self.deformation, -1, -2)
+        H = self._matrix_of(self.u) @ self.mass_properties.euler @ np.swapaxes(self.deformation, -1, -2)
         return 2 * axial(H)
 
 

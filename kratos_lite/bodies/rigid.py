@@ -83,12 +83,12 @@ class RigidBody(AffineBody):
     # ---- motion ----------------------------------------------------------------------------------
 
     @staticmethod
-    def matrix_of(q: Array) -> Array:
-        """Return Λ (..., 3, 3) of configurations (..., 12); see `AffineBody.matrix_of`."""
+    def _matrix_of(q: Array) -> Array:
+        """Return Λ (..., 3, 3) of configurations (..., 12); see `AffineBody._matrix_of`."""
         return rotation_of(q)
 
     @staticmethod
-    def check_matrix(A: Array) -> None:
+    def _check_matrix(A: Array) -> None:
         """Raise InputError unless A is a rotation."""
         check_rotation(A, "the rotation of a configuration")
 
@@ -162,21 +162,8 @@ class RigidBody(AffineBody):
         return self.mass_properties.inertia, self._inverse, self.mass_properties.mass
 
     def mass_solver(self) -> Solve:
-        """Return what solves M x = b; see `Body`."""
-        return self.apart
-
-    def apart(self, b: Array) -> Array:
-        """Return M^-1 b: torques and forces answer apart.
-
-        Parameters
-        ----------
-        b : (6, k) columns.
-
-        Returns
-        -------
-        (6, k).
-        """
-        return np.concatenate([self._inverse @ b[:3], b[3:] / self.mass])
+        """Return what solves M x = b: torques and forces answer apart; see `Body`."""
+        return lambda b: np.concatenate([self._inverse @ b[:3], b[3:] / self.mass])
 
     @cached_property
     def _inverse(self) -> Array:

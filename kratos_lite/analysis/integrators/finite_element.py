@@ -58,7 +58,7 @@ class _Kick(_FiniteElement):
         load = body.external_force(qh, body.time + h / 2, v)
         force = load - body.internal_force(qh)
         if body.damping:
-            force -= body.damping * body.damping_load(qh, body.u)
+            force -= body.damping * body.formulation.damping_load(qh, body.u)
 
         def advance(extra: Array) -> Step:
             u = body.u + h * solve(force + extra)
@@ -127,7 +127,7 @@ def _balanced(
     for _ in range(NEWTON_MAX):
         dq = h / 2 * (u + v)
         load = body.external_force(q + dq / 2, body.time + h / 2, loading)
-        force = load + extra - body.load_over(q, dq, ratio)
+        force = load + extra - body.formulation.load_over(q, dq, ratio)
         step = solve(h * force - body.times_mass(v - u))
         size, scale = float(np.abs(step).max()), float(np.abs(v).max())
         if not np.isfinite(size):
@@ -139,7 +139,7 @@ def _balanced(
             given = float(np.abs(solve(h * (load + extra))).max())  # at rest, loads tell what is small
             if size <= 1e-9 * max(scale, given):
                 return v, load
-            solve = body.increment_solver(q, h / 2 * (u + v), ratio, h * h / 2)
+            solve = body.formulation.increment_solver(q, h / 2 * (u + v), ratio, h * h / 2)
         last = size
     raise SolveError(
         f"the energy–momentum step at t = {body.time:g} s with dt = {h:g} s does not converge; "

@@ -129,11 +129,11 @@ class Formulation(ABC):
         return self.stiffness(q) @ u
 
     def load_over(self, q: Array, dq: Array, damping: float) -> Array:
-        """Return the load of the energy–momentum method; see `FiniteElementBody`."""
+        """Return the load (3n,) over an increment, whose work is the change of energy; damping is η/h."""
         raise self._no_energy_momentum()
 
     def increment_solver(self, q: Array, dq: Array, damping: float, c: float) -> Solve:
-        """Return the solver of the energy–momentum method; see `FiniteElementBody`."""
+        """Return what solves (M + c D) x = b, D the derivative of `load_over` with respect to dq."""
         raise self._no_energy_momentum()
 
     def _no_energy_momentum(self) -> ModelError:

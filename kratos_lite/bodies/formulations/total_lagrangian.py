@@ -43,12 +43,12 @@ class TotalLagrangian(Formulation):
         return self._factorized(self.stiffness(q), c, iterate=self.is_large)
 
     def load_over(self, q: Array, dq: Array, damping: float) -> Array:
-        """Return the load of the energy–momentum method; see `FiniteElementBody`."""
+        """Return the load of the energy–momentum method; see `Formulation`."""
         q, dq = q.reshape(-1, 3), dq.reshape(-1, 3)
         return finite_strain.internal_load(self.points, self.groups, q, dq, damping).ravel()
 
     def increment_solver(self, q: Array, dq: Array, damping: float, c: float) -> Solve:
-        """Return the solver of the energy–momentum method; see `FiniteElementBody`."""
+        """Return the solver of the energy–momentum method; see `Formulation`."""
         if self.is_large:  # its symmetric part will do: that of the tangent at the middle
             return self.solver(q + dq / 2, c / 2 * (1 + 2 * damping))
         q, dq = q.reshape(-1, 3), dq.reshape(-1, 3)
