@@ -1,6 +1,7 @@
 """Measure: ``python -m benchmarks quick``, or ``full``, or one set by its name.
 
-Sets: ``kratos error growth stall assembly parse skips cube1 motion ale distributed effectivity adaptive``.
+Sets: ``kratos error growth stall assembly parse skips cube1 motion ale distributed``, and in this process
+``effectivity adaptive edges``.
 
 ``report`` makes the pages and pictures of the docs from the results kept; ``references`` makes the
 energies of the scenes without an exact field.  See benchmarks/README.md.
@@ -52,6 +53,7 @@ NOT_FULL = ("quick", "full", "distributed")
 OTHERS: dict[str, Callable[[argparse.Namespace], int | None]] = {
     "effectivity": lambda o: accuracy.effectivity(o.scenes, o.elements),
     "adaptive": lambda o: accuracy.adaptive(o.scenes, o.elements),
+    "edges": lambda o: accuracy.edges(),
     "references": lambda o: references(o.cells or (4, 8, 16)),
     "report": lambda o: write_report(),
 }

@@ -5,8 +5,9 @@
 ones.  ``python -m benchmarks adaptive`` asks `Model.solve(error=…)` for three errors from one coarse mesh of
 8N, and solves meshes made by hand of several elements, uniform ones, and graded ones at the corner.
 Times are of the processor, that of the solution alone; hand-made meshes have theirs at the true error of the
-adaptive solution, on the line through the two meshes of one element nearest to it.  Both write the last
-section of docs/about/estimated-errors.md.
+adaptive solution, on the line through the two meshes of one element nearest to it.  ``python -m benchmarks
+edges`` counts the unknowns that singular edges and corners take.  All write the last section of
+docs/about/estimated-errors.md.
 """
 
 from __future__ import annotations
@@ -27,6 +28,8 @@ from benchmarks.programs.adaptive import geometry_of, scene_of
 from benchmarks.tables import Row, table
 from kratos_lite import voigt
 from kratos_lite.errors import KratosLiteError
+from kratos_lite.mesh.refinement import refine
+from kratos_lite.model.refined import refined
 from kratos_lite.verification import fields
 from kratos_lite.verification.errors import errors, norms
 from kratos_lite.verification.meshes import kind_of
@@ -254,6 +257,91 @@ def adaptive(names: Sequence[str] | None, kinds: Sequence[str] | None) -> None:
     write_page()
 
 
+# ---- singular edges ----------------------------------------------------------------------------------
+
+STEEL = kl.Isotropic3D(E=210e9, nu=0.3)
+
+
+def notched(corner: Sequence[float], clamped: str, kind: str, n: int) -> kl.Model:
+    """Return a cube of side 2 without the cells beyond a corner along all axes, under a body force."""
+    mesh = kl.box((2, 2, 2), (2 * n, 2 * n, 2 * n), f"Element3D{kind}", (-1, -1, -1))
+    (block,) = mesh.blocks
+    centers = mesh.points[block.nodes].mean(axis=1)
+    block = block.take(np.flatnonzero(~(centers > corner).all(axis=1)))
+    used, nodes = np.unique(block.nodes, return_inverse=True)
+    mesh = kl.Mesh(mesh.points[used], {block.name: nodes.reshape(block.nodes.shape)})
+    model = kl.Model(mesh, STEEL)
+    model.fix(clamped)
+    model.add(kl.BodyForce((1e5, 2e5, -1e6)))
+    return model
+
+
+def cracked(kind: str, n: int) -> kl.Model:
+    """Return half of a cube of side 2 with a crack over half of its section, pulled."""
+    model = kl.Model(kl.box((2, 2, 1), (2 * n, 2 * n, n), f"Element3D{kind}"), STEEL)
+    model.fix(lambda X: (X[:, 2] == 0) & (X[:, 0] >= 1), "z")
+    model.fix("x+", "x")
+    model.fix("y-", "y")
+    model.add(kl.Traction("z+", (0, 0, 1e6)))
+    return model
+
+
+EDGES: dict[str, Callable[[str, int], kl.Model]] = {
+    "corner of a cube (Fichera)": lambda kind, n: notched((0, 0, 0), "z-", kind, n),
+    "re-entrant edge": lambda kind, n: notched((0, -1, 0), "z-", kind, n),
+    "re-entrant edge, clamped end": lambda kind, n: notched((0, -1, 0), "y-", kind, n),
+    "clamped side": lambda kind, n: notched((1, 1, 1), "z-", kind, n),
+    "crack front": cracked,
+}
+"""Scenes of singularities in space, whose exact energy nobody knows."""
+ON_EDGES = (0.1, 0.05, 0.03, 0.02)
+SINGULAR = """
+Singular edges and corners: unknowns, and the error in percent that is reported; of bulk marking by hand,
+which cuts the 20N cells with half of the squared error and solves each mesh in full; of uniform 20N meshes.
+
+"""
+
+
+def bulk_marking(model: kl.Model, error: float) -> tuple[int, float]:
+    """Return unknowns and error of the first mesh below an error, half of its square cut on the way."""
+    while True:
+        result = model.solve()
+        estimate = result.error()
+        if estimate.relative <= error:
+            return result.report.unknowns, estimate.relative
+        squares = estimate.per_element**2
+        order = np.argsort(-squares)
+        count = 1 + np.searchsorted(np.cumsum(squares[order]), squares.sum() / 2)
+        model = refined(model, refine(model.mesh, np.sort(order[:count])))
+
+
+def edges() -> None:
+    """Measure the scenes of singularities in space and write them to the page."""
+    rows: list[Row] = []
+    for name, make in EDGES.items():
+        row: Row = {"scene": name}
+        reports = [make("8N", 2).solve(error=error).report for error in ON_EDGES]
+        row["asked"] = [(report.unknowns, report.error) for report in reports]
+        row["by_hand"] = [bulk_marking(make("20N", 2), error) for error in ON_EDGES[:-1]]
+        uniform = [make("20N", n).solve() for n in (2, 4, 8)]
+        row["uniform"] = [(result.report.unknowns, result.error().relative) for result in uniform]
+        print(row, flush=True)
+        rows.append(row)
+    save(RESULTS / "edges.json", {"set": "edges", "rows": rows})
+    write_page()
+
+
+def of_edges(rows: Sequence[Row]) -> str:
+    """Return the table of singular edges."""
+    body = []
+    for row in rows:
+        for label in ("asked", "by_hand", "uniform"):
+            found = [f"{unknowns}: {100 * error:.2g}" for unknowns, error in row[label]]
+            found += [""] * (len(ON_EDGES) - len(found))
+            body.append([row["scene"] if label == "asked" else "", label.replace("_", " "), *found])
+    return table(["scene", "meshes", *(f"{100 * error:g} %" for error in ON_EDGES)], body)
+
+
 # ---- the page --------------------------------------------------------------------------------------
 
 
@@ -264,7 +352,9 @@ def page() -> str:
     text = TEXT + across(rows, entry, SCENES) + STRESSES + across(rows, stress_entry, smooth)
     if not found:
         return text
-    return text + REQUESTED.format(kinds=", ".join(BY_HAND)) + beside_hand(found["rows"], found["hand"])
+    text += REQUESTED.format(kinds=", ".join(BY_HAND)) + beside_hand(found["rows"], found["hand"])
+    singular = load(RESULTS / "edges.json")
+    return text + SINGULAR + of_edges(singular["rows"]) if singular else text
 
 
 def write_page() -> None:
