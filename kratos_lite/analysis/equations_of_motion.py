@@ -20,11 +20,11 @@ from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.linear_solver import LinearSolver
 from kratos_lite.solvers.mass import Mass
 from kratos_lite.solvers.plan import Plan, repeated
-from kratos_lite.typing import Array, Progress
+from kratos_lite.typing import Array, Mask, Progress
 from kratos_lite.validation import finite
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    pass
 
 Solve: TypeAlias = Callable[[Array, Array], Array]
 """Takes nodal forces and prescribed displacements (3a,), returns displacements (3a,)."""
@@ -33,27 +33,10 @@ Solve: TypeAlias = Callable[[Array, Array], Array]
 class EquationsOfMotion:
     """Mass, damping, stiffness and loads of a model, on the nodes that its elements use.
 
-    Parameters
-    ----------
-    model : elements with density, supports, loads, and its motion if it has one.
-    lumped : whether the mass stands in the nodes.
-    rayleigh : α in 1/s and β in s of the damping α M + β K.
-    free : whether supports may leave rigid motions free.
-    steady : take a rate that changes as one that stays, unless the motion is given an acceleration.
-    massless : let materials have no density, where the mass is only looked at.
-
-    Attributes
-    ----------
-    groups : the elements, on all nodes of the mesh.
-    system : pattern, K and supports.
-    mass : M.
-    terms : the matrices of the motion, or None.
-    applied : function of the time that gives the nodal forces (3a,) of all loads but those of the motion.
-    prescribed : what supports prescribe; called with the time, displacements (3a,) where free ones are 0.
-    step : s, over which an acceleration is taken from the rate; 0 for its slope.
-    warnings : what the checks of the model and of its motion at the time 0 found.
-
-    Vectors are (3a,): dof = 3·node + axis of the nodes that elements use.
+    Vectors are (3a,): dof = 3·node + axis of these nodes.  `rayleigh` are α in 1/s and β in s of the damping
+    α M + β K.  Supports may leave rigid motions `free` or not.  If `steady`, a rate that changes is taken as
+    one that stays, unless the motion is given an acceleration.  Materials may be `massless` where the mass is
+    only looked at.
     """
 
     def __init__(
@@ -68,9 +51,9 @@ class EquationsOfMotion:
         progress: Progress | None = None,
     ) -> None:
         self.model, self._steady = model, steady
-        self.step = 0.0
+        self.step = 0.0  # s, over which an acceleration is taken from the rate; 0 for its slope
         self.rayleigh = _checked_rayleigh(rayleigh)
-        self.groups, self.warnings = model.checked()
+        self.groups, self.warnings = model.checked()  # elements on all nodes of the mesh
         if not free:
             self.free_motions.check((), moving=False)
         for group in self.groups:
@@ -114,11 +97,9 @@ class EquationsOfMotion:
         return 3 * len(self.system.nodes)
 
     @cached_property
-    def held(self) -> NDArray[np.bool_]:
-        """Which degrees of freedom (3a,) supports or constraints hold."""
-        held = np.ones(self.size, dtype=bool)
-        held[self.system.constraint_map.free] = False
-        return held
+    def constrained(self) -> Mask:
+        """Which degrees of freedom (3a,) follow from supports or constraints."""
+        return ~self.system.constraint_map.is_free
 
     def load(self, time: float) -> Array:
         """Return the nodal forces (3a,) at a time, those of the motion among them."""

@@ -91,9 +91,7 @@ class ConstrainedSystem:
     def _is_plate(self) -> bool:
         from kratos_lite.solvers.plate_level import plate_axes  # a quick start for small models
 
-        free = np.zeros(3 * len(self.points), dtype=bool)
-        free[self.constraint_map.free] = True
-        return plate_axes(self.points, free) is not None
+        return plate_axes(self.points, self.constraint_map.is_free) is not None
 
     @cached_property
     def pattern(self) -> Pattern:

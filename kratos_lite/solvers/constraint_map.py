@@ -28,6 +28,13 @@ class ConstraintMap:
     # (N, q) sparse; None without dependent dofs, where q is added to the free components of c
     T: csr_array[Any, Any] | None = None
 
+    @property
+    def is_free(self) -> Mask:
+        """Which degrees of freedom (N,) are free."""
+        is_free = np.zeros(len(self.c), dtype=bool)
+        is_free[self.free] = True
+        return is_free
+
     def holding(self, constrained: Mask) -> ConstraintMap:
         """Return the map with some of the free ones (N,) constrained, too, where they are at q = 0."""
         keep = ~constrained.ravel()[self.free]

@@ -15,7 +15,7 @@ from kratos_lite.solvers import direct
 from kratos_lite.solvers.constraint_map import ConstraintMap
 from kratos_lite.solvers.iteration import ConvergenceForecast
 from kratos_lite.solvers.plan import Plan, after, is_quick_to_factorize, tolerance_of
-from kratos_lite.typing import Array, Ints, Mask, Progress
+from kratos_lite.typing import Array, Ints, Progress
 
 if TYPE_CHECKING:
     from kratos_lite.solvers.coarse_level import PCoarseLevel
@@ -164,12 +164,6 @@ class LinearSolver:
         return replace(self.K, A=constrained(self.K.A, T, free), D=D)
 
     @cached_property
-    def _free(self) -> Mask:
-        free = np.zeros(len(self.constraint_map.c), dtype=bool)
-        free[self.constraint_map.free] = True
-        return free
-
-    @cached_property
     def _multigrid(self) -> Solver:
         linear, matrix = self.p_coarse_level() if self.p_coarse_level else None, self._blocks
         if linear is not None and self.constraint_map.T is not None:
@@ -179,10 +173,10 @@ class LinearSolver:
         if self.plan.method == "amg":
             from kratos_lite.solvers.multigrid import multigrid  # a quick start for small models
 
-            return multigrid(matrix, self._free, self.points, linear)
+            return multigrid(matrix, self.constraint_map.is_free, self.points, linear)
         from kratos_lite.solvers.displacement_pressure import DisplacementPressure  # rarely needed
 
-        return DisplacementPressure(matrix, self._free, self.points, linear)
+        return DisplacementPressure(matrix, self.constraint_map.is_free, self.points, linear)
 
     @cached_property
     def norm(self) -> float:
@@ -197,7 +191,7 @@ class LinearSolver:
         self, b: Array, tolerance: float, progress: Progress | None, continued: bool
     ) -> tuple[Solution, Plan]:
         """Solve by multigrid; return also how it is solved, in another way if that did not converge."""
-        free, rhs = self.constraint_map.free, np.zeros(len(self._free))
+        free, rhs = self.constraint_map.free, np.zeros(len(self.constraint_map.c))
         rhs[free] = b
         aim = tolerance if continued else tolerance_of(tolerance, len(b))
         forecast = ConvergenceForecast(tolerance) if is_quick_to_factorize(len(b)) else None

@@ -299,8 +299,7 @@ def hierarchy(model):
     """Return the multigrid of a model, and a right side."""
     module = kernels("multigrid")
     system = ConstrainedSystem(model.mesh.points, model.element_groups(), model.supports.constraint_map)
-    free = np.zeros(3 * len(system.points), dtype=bool)
-    free[system.constraint_map.free] = True
+    free = system.constraint_map.is_free
     linear = coarse_level.p_coarse_level(system.points, system.groups)
     b = np.random.default_rng(1).standard_normal(len(free)) * free
     return Compiled(module, system.K, free, system.points, linear), b

@@ -48,14 +48,14 @@ class CentralDifference(ModelIntegrator):
 
     def step(self, e: EquationsOfMotion, now: Kinematics, start: float, h: float) -> Kinematics:
         """Take a step; α M damps the velocity at its end, β K that half a step before."""
-        (u, v, a), held = now, e.held
+        (u, v, a), constrained = now, e.constrained
         half = v + h / 2 * a
         u = u + h * half
         prescribed = e.prescribed.at_end(start + h, h)
-        u[held] = prescribed[0][held]
+        u[constrained] = prescribed[0][constrained]
         force = e.load(start + h) - e.times_damping(half, start) - e.times_stiffness(u, start)
         a = e.mass.solve(force) / (1 + e.rayleigh[0] * h / 2)  # v = half + h/2 a
-        a[held] = prescribed[2][held]
+        a[constrained] = prescribed[2][constrained]
         v = half + h / 2 * a
-        v[held] = prescribed[1][held]
+        v[constrained] = prescribed[1][constrained]
         return u, v, a
