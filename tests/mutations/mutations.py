@@ -289,8 +289,8 @@ MUTATIONS = [
     ),
     Mutation(
         "ale/matrices.py",
-        "return (self.G - self._transposed(self.G)) / 2",
-        "return (self.G + self._transposed(self.G)) / 2",
+        "np.asarray((self.G - transposed.data) / 2)",
+        "np.asarray((self.G + transposed.data) / 2)",
         MATRICES,
     ),
     # ---- bodies
