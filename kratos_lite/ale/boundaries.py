@@ -54,8 +54,7 @@ def dashpots(mesh: Mesh, direction: Array, system: ConstrainedSystem, moving: Ma
     # Source: Lysmer & Kuhlemeyer, J. Eng. Mech. Div. ASCE 95 (1969) 859-877.
     pattern = system.pattern
     data = np.zeros((len(pattern.indices), 3, 3))
-    rows = np.repeat(np.arange(pattern.n_nodes, dtype=np.int64), np.diff(pattern.indptr))
-    keys = rows * pattern.n_nodes + pattern.indices
+    keys = pattern.rows().astype(np.int64) * pattern.n_nodes + pattern.indices
     local = np.full(mesh.n_nodes, -1)
     local[system.nodes] = np.arange(len(system.nodes))
     of_element = np.zeros((mesh.n_elements, 3, 3))

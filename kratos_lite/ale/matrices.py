@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +17,9 @@ from kratos_lite.solvers.constrained_system import select
 from kratos_lite.solvers.mass import Mass
 from kratos_lite.typing import Array, Ints, Mask
 from kratos_lite.voigt import tensor
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 
 class MotionMatrices:
@@ -54,7 +58,6 @@ class MotionMatrices:
         self.pattern, self.mass = pattern, mass
         self.moving = np.ones(len(points), dtype=bool) if moving is None else moving
         self.groups = select(groups, self.moving)
-        self._made: dict[str, Array] = {}
 
     @property
     def moving_points(self) -> Array:
@@ -92,42 +95,28 @@ class MotionMatrices:
         """
         return data if self.moving.all() else np.where(self.moving[self.pattern.rows()], data, 0.0)
 
-    def make(self, names: str) -> None:
-        """Make G, H or both, of those not made before, in one pass over the elements.
+    def _inertia_matrix(self, name: str) -> Array:
+        motion = self.motion  # points from the center on, where no digits are lost
+        velocity = np.column_stack([motion.A, motion.field(motion.center)])
+        points = self.points - motion.center
+        return self._spread(inertia_matrices(points, self.groups, self._own[0], name, velocity)[name])
 
-        Parameters
-        ----------
-        names : ``"G"``, ``"H"`` or ``"GH"``.
-        """
-        missing = "".join(name for name in names if name not in self._made)
-        if missing:
-            motion = self.motion  # points from the center on, where no digits are lost
-            velocity = np.column_stack([motion.A, motion.field(motion.center)])
-            made = inertia_matrices(
-                self.points - motion.center,
-                self.groups,
-                self._own[0],
-                missing,
-                velocity,
-            )
-            self._made |= {name: self._spread(data) for name, data in made.items()}
-
-    @property
+    @cached_property
     def G(self) -> Array:
         """∫ ρ N_i c·grad N_j in kg/s for the rate 1."""
-        self.make("G")
-        return self._made["G"]
+        return self._inertia_matrix("G")
 
-    @property
+    @cached_property
     def H(self) -> Array:
         """∫ ρ (c·grad N_i)(c·grad N_j) in kg/s² for the rate 1."""
-        self.make("H")
-        return self._made["H"]
+        return self._inertia_matrix("H")
 
     @cached_property
     def S(self) -> Array:
         """The skew part (G - G^T) / 2."""
-        return (self.G - self._transposed(self.G)) / 2
+        transposed = self._sparse(self.G).T.tocsr()
+        transposed.sort_indices()
+        return np.asarray((self.G - transposed.data) / 2)
 
     @property
     def gyroscopic(self) -> Array:
@@ -139,13 +128,11 @@ class MotionMatrices:
         """What the acceleration multiplies in the stiffness; G where material passes through open faces."""
         return self.G if self.motion.is_open else self.gyroscopic
 
-    def _transposed(self, data: Array) -> Array:
+    def _sparse(self, data: Array) -> csr_array[Any, Any]:
         from scipy.sparse import csr_array
 
         n = self.pattern.n_nodes
-        matrix = csr_array((data, self.pattern.indices, self.pattern.indptr), shape=(n, n)).T.tocsr()
-        matrix.sort_indices()
-        return np.asarray(matrix.data)
+        return csr_array((data, self.pattern.indices, self.pattern.indptr), shape=(n, n))
 
     def times(self, data: Array, v: Array) -> Array:
         """Return a product with nodal vectors.
@@ -159,10 +146,7 @@ class MotionMatrices:
         -------
         (n, 3).
         """
-        from scipy.sparse import csr_array
-
-        n = self.pattern.n_nodes
-        return np.asarray(csr_array((data, self.pattern.indices, self.pattern.indptr), shape=(n, n)) @ v)
+        return np.asarray(self._sparse(data) @ v)
 
     # ---- loads for the rates 1 --------------------------------------------------------------------
 

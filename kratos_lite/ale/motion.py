@@ -17,7 +17,7 @@ its loads and a factor 2 corrected; Nackenhorst, Comput. Methods Appl. Mech. Eng
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -25,14 +25,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.ale.boundaries import leak
 from kratos_lite.ale.moving_part import check_ties, moving_nodes
-from kratos_lite.ale.rate import Rate, vector_rates
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh, WhereElements
 from kratos_lite.model.structure import Attachment, Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
-from kratos_lite.time_series import Factor
+from kratos_lite.time_series import Factor, TimeSeries, function_of, slope_of
 from kratos_lite.typing import Array, Ints, Mask
 from kratos_lite.validation import finite, number
 
@@ -302,3 +301,58 @@ def _unit(direction: ArrayLike | str) -> Array:
         raise InputError(f"an axis needs three components, not all 0; got {direction!r}")
     v = v / largest
     return np.asarray(v / np.linalg.norm(v))
+
+
+# ---- rates in time ------------------------------------------------------------------------------------
+
+
+class Rate:
+    """A rate in time and its acceleration, of numbers, `TimeSeries` or functions of time in s."""
+
+    def __init__(self, rate: Factor, acceleration: Factor | None, what: str = "a rate") -> None:
+        self.is_accelerated = acceleration is not None
+        self.value = function_of(rate, what)
+        self.slope = slope_of(rate, what)
+        if acceleration is not None:
+            self.slope = function_of(acceleration, "an acceleration")
+        self.steady = not (callable(rate) or callable(acceleration) or acceleration)
+        self.is_changing = callable(rate if acceleration is None else acceleration)
+        if not callable(rate) and (isinstance(acceleration, TimeSeries) or not callable(acceleration)):
+            number = not (acceleration is None or isinstance(acceleration, TimeSeries))
+            self.value = _accelerated(self.value(0.0), self.slope(0.0) if number else acceleration)
+
+    def at(self, time: float, step: float = 0.0, steady: bool = False) -> tuple[float, float]:
+        """Return rate and acceleration at a time in s, the mean over a step in s if not given."""
+        if self.is_accelerated or not (steady or step):
+            return self.value(time), self.slope(time)
+        if steady:
+            return self.value(time), 0.0
+        start, end = max(time - step / 2, 0.0), time + step / 2
+        return self.value(time), (self.value(end) - self.value(start)) / (end - start)
+
+
+def vector_rates(
+    velocity: Sequence[Factor], acceleration: Sequence[Factor] | None, what: str
+) -> tuple[Rate, Rate, Rate]:
+    """Return the rates of three components, each a number, `TimeSeries` or function of time."""
+    name, none = f"{what} velocity", (None,) * 3
+    accelerations = none if acceleration is None else _components(acceleration, f"{what} acceleration")
+    x, y, z = (Rate(*pair, name) for pair in zip(_components(velocity, name), accelerations, strict=True))
+    return x, y, z
+
+
+def _components(values: Sequence[Factor], what: str) -> tuple[Factor, Factor, Factor]:
+    try:
+        x, y, z = values
+    except (TypeError, ValueError):
+        raise InputError(
+            f"{what} has three components, each a number, TimeSeries or function of time; got {values!r:.80}"
+        ) from None
+    return x, y, z
+
+
+def _accelerated(start: float, acceleration: float | TimeSeries | None) -> Callable[[float], float]:
+    """Return the rate in time from its start."""
+    if isinstance(acceleration, TimeSeries):
+        return lambda time: start + acceleration.integral(0.0, time)
+    return lambda time: start + (acceleration or 0.0) * time

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kratos_lite.ale.motion import Motion
-from kratos_lite.ale.rate import vector_rates
+from kratos_lite.ale.motion import Motion, vector_rates
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.elements.tables import lame_constants
 from kratos_lite.mesh import WhereElements

@@ -106,22 +106,6 @@ def test_matrices_of_a_motion_act_on_linear_fields_as_they_must(motion):
     np.testing.assert_allclose(twice, c.T @ (mass @ c), rtol=0, atol=1e-12 * abs(twice).max())
 
 
-def test_both_matrices_of_a_motion_are_made_in_one_pass(monkeypatch):
-    points, groups, pattern = parts(8)
-    terms = MotionMatrices(Rotation("z", 1.0), points, groups, pattern, Mass(points, groups, pattern, False))
-    asked = []
-
-    def counted(*arguments):
-        asked.append(arguments[3])
-        return inertia_matrices(*arguments)
-
-    monkeypatch.setattr("kratos_lite.ale.matrices.inertia_matrices", counted)
-    terms.make("GH")
-    assert terms.G is not terms.H
-    terms.make("H")
-    assert asked == ["GH"]
-
-
 @compiled
 def test_wrong_arguments_are_refused():
     points, _, pattern = parts(8)

@@ -79,6 +79,7 @@ def elastic(**options):
 
 
 IMPLICIT = "of a finite-element body are linearly_implicit, explicit"
+WHOLE_MODES = "modes must be a whole number"
 AS_MANY, ASCEND = "as many values as times", "times of a series must ascend"
 
 
@@ -105,6 +106,10 @@ AS_MANY, ASCEND = "as many values as times", "times of a series must ascend"
     (lambda: elastic(damping=-1.0), "a damping must be one number of seconds, ≥ 0"),
     (lambda: elastic(damping=NAN), "a damping"),
     (lambda: elastic(damping=[0.1, 0.2]), "a damping"),
+    *((lambda m=m: elastic(formulation="modal", modes=m), WHOLE_MODES) for m in (6.5, "many", True)),
+    (lambda: elastic(formulation=3), "unknown formulation of a finite-element body 3"),
+    (lambda: kl.FixedBody(None), "a mesh must be a Mesh, such as"),
+    (lambda: kl.convert(kl.FixedBody(kl.box()), kl.RigidBody), "a fixed body has no mass", kl.ModelError),
     (lambda: elastic().position((2, 0, 0)), "outside the mesh", kl.MeshError),
     (lambda: kl.TimeSeries([0, 1], [0]), AS_MANY),
     (lambda: kl.TimeSeries([], []), AS_MANY),
@@ -154,6 +159,7 @@ def integrated(words, **arguments):
 
 VELOCITIES = (1, 2), (1, 2, NAN), "fast", (1, 2, 1j), [[1, 2, 3, 4]]
 POINTS = (1, 2), (NAN, 0, 0), np.zeros((2, 2, 3))
+MANY, X = np.ones((8, 3)), (0.5, 0.5, 0.5)
 WHOLE, SUBSTEPS = "must be a whole number ≥ 1", "substeps must be a whole number ≥ 1, or 'auto'"
 
 
@@ -190,6 +196,21 @@ WHOLE, SUBSTEPS = "must be a whole number ≥ 1", "substeps must be a whole numb
     constraint(lambda: kl.RigidLink((0, 0, 0), (0, 0, 0)), "a rigid link needs a length"),
     constraint(lambda: kl.RigidLink([[0, 0, 0]], (1, 0, 0)), r"one point \(3,\) is needed"),
     constraint(lambda: kl.RigidLink((9, 0, 0), (1, 0, 0)), "outside the mesh", kl.MeshError),
+    (lambda body: body.set_velocity(linear=MANY), r"a velocity of shape .* does not fit a single body"),
+    (lambda body: body.set_velocity(angular=MANY), "an angular velocity of shape"),
+    (lambda body: body.rotate(np.broadcast_to(np.eye(3), (4, 3, 3))), "a rotation of shape"),
+    (lambda body: body.angular_momentum((1, 2)), "three components|shape"),
+    (lambda body: setattr(body, "damping", NAN), "a damping must be finite"),
+    (lambda body: setattr(body, "damping", -1.0), "a damping must be one number"),
+    (lambda body: setattr(body, "tolerance", NAN), "a tolerance must be finite"),
+    (lambda body: setattr(body, "tolerance", -1.0), "a tolerance must be one number"),
+    (lambda body: type(body)(body.mesh, body.material, integrator=""), "the integrators of a"),
+    load(lambda: kl.Force(X, MANY[:2]), "a force of shape"),
+    load(lambda: kl.Spring(X, (1, 0, 0), [1, 2]), "the stiffness of a spring must be one number"),
+    load(lambda: kl.Spring(X, (1, 0, 0), 1, damping=[1, 2]), "the damping of a spring must be one"),
+    load(lambda: kl.Spring(X, (1, 0, 0), 1, length=-1), "the length of a spring must be one number"),
+    load(lambda: kl.Spring(X, (1, 0, 0), 1, length="long"), "the length of a spring must be made of"),
+    constraint(lambda: kl.FixPoint(np.zeros((0, 3))), "a FixPoint needs one point at least"),
     integrated("a step must be one number > 0, in s; got 0", dt=0.0),
     integrated("a step must be one number > 0, in s", dt=-1e-3),
     integrated("a step must be finite", dt=NAN),
@@ -199,7 +220,7 @@ WHOLE, SUBSTEPS = "must be a whole number ≥ 1", "substeps must be a whole numb
     integrated(f"steps {WHOLE}; got 2.5", steps=2.5),
     integrated(f"steps {WHOLE}", steps=True),
     integrated(f"every {WHOLE}", every=0),
-    *(integrated(SUBSTEPS, substeps=value) for value in (0, "many", NAN, 2.5)),
+    *(integrated(SUBSTEPS, substeps=value) for value in (0, "many", NAN, 2.5, None, np.inf, [1], True)),
 )
 def test_what_every_body_refuses(kind, action, words, error):
     refused(body_of(kind), action, words, error)
@@ -290,6 +311,10 @@ def test_what_bodies_of_one_kind_refuse(make, row):
     [
         (lambda q, u, t: np.zeros(5), "a callback must return a generalized force of shape"),
         (lambda q, u, t: np.full_like(u, NAN), "what a callback returns at t = .* must be finite"),
+        *(
+            (lambda q, u, t, v=v: v, "what a callback returns at t = .* s must be")
+            for v in ("much", None, NAN)
+        ),
     ],
 )
 def test_callbacks_that_return_nonsense(kind, function, words):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from motions import end
 
 import kratos_lite as kl
 from kratos_lite.bodies.rotations import exp
@@ -14,8 +15,7 @@ PAIRS = [(a, b) for a in KINDS for b in KINDS]
 def spinning(brick, kind, steps=40):
     body = brick(kind, cells=(1, 2, 2))
     body.set_velocity(FLIGHT, SPIN)
-    for _ in kl.integrate(body, 1e-3, steps, every=steps):
-        pass
+    end(body, 1e-3, steps)
     return body
 
 

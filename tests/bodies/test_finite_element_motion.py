@@ -7,6 +7,7 @@ closed forms of discrete bars, and numbers of Solfec-1.0 where it is right.
 import motions
 import numpy as np
 import pytest
+from motions import end
 
 import kratos_lite as kl
 from kratos_lite.bodies.rotations import exp
@@ -18,12 +19,6 @@ SPIN, FLIGHT, G = (0.05, 10, 0.05), (1, 2, 3), (0, 0, -9.81)
 MOMENTUM = np.array([1.36, 232, 0.52])
 """Angular momentum of the box about its mass center."""
 ALL = [f"KinematicLinear3D{n}N" for n in (4, 5, 6, 8, 10, 13, 15, 20, 27)]
-
-
-def end(body, dt, steps):
-    for _ in kl.integrate(body, dt, steps, every=steps):
-        pass
-    return body
 
 
 def one_element(name, X, E=1.0, **options):

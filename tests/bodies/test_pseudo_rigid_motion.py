@@ -7,6 +7,7 @@ import motions
 import numpy as np
 import pytest
 from computing import BUILT, compiled
+from motions import end
 
 import kratos_lite as kl
 
@@ -49,12 +50,6 @@ def deformed(body, F):
     return body
 
 
-def end(body, dt, steps):
-    for _ in kl.integrate(body, dt, steps, every=steps):
-        pass
-    return body
-
-
 def seen_frequency(values, h):
     """Return the frequency of an undamped oscillation about 0 from three values: exact for a discrete one."""
     values = np.asarray(values)
@@ -85,33 +80,18 @@ def test_frequencies_of_a_box(brick):
 
 
 @pytest.mark.parametrize(
-    ("omega", "shape", "entry", "error"),
-    [(OMEGA_B, np.eye(3), 0, 3e-6), (OMEGA_S, np.eye(3)[[1, 0, 2]] - np.diag([0, 0, 1]), 1, 3e-7)],
+    ("omega", "shape", "entry"),
+    [(OMEGA_B, np.eye(3), 0), (OMEGA_S, np.eye(3)[[1, 0, 2]] - np.diag([0, 0, 1]), 1)],
     ids=["breathing", "shear"],
 )
-@each_integrator
-def test_small_vibrations_are_cosines(integrator, omega, shape, entry, error):
-    body, size = deformed(cube(integrator), np.eye(3) + 1e-6 * shape), 1e-6
-    periods, each = 5, 600
-    h = 2 * np.pi / omega / each
-    states = list(kl.integrate(body, h, periods * each, every=10))
-    seen = np.array([state.q[entry] for state in states]) - np.eye(3).ravel()[entry]
-    t = np.array([state.time for state in states])
-    sine = np.sin(omega * h / 2) if integrator == "DEF_EXP" else np.tan(omega * h / 2)
-    assert abs(sine / (omega * h / 2) - 1) < 1e-4  # what the step itself adds
-    drifted = 2 * np.pi * periods * (omega * h) ** 2 / 12
-    assert np.abs(seen / size - np.cos(omega * t)).max() < error + drifted
-
-
 @pytest.mark.parametrize("omega_h", [0.2, 0.8, 1.6])
 @each_integrator
-def test_the_frequency_of_small_vibrations_is_that_of_the_step(integrator, omega_h):
-    amplitude = 1e-7
-    body = deformed(cube(integrator), (1 + amplitude) * np.eye(3))
-    h = omega_h / OMEGA_B
-    seen = [amplitude] + [state.q[0] - 1 for state in kl.integrate(body, h, 40)]
+def test_the_frequency_of_small_vibrations_is_that_of_the_step(integrator, omega_h, omega, shape, entry):
+    amplitude, h = 1e-7, omega_h / OMEGA_B
+    body, rest = deformed(cube(integrator), np.eye(3) + amplitude * shape), np.eye(3).ravel()[entry]
+    seen = [amplitude] + [state.q[entry] - rest for state in kl.integrate(body, h, 40)]
     inverse = np.arcsin if integrator == "DEF_EXP" else np.arctan
-    assert seen_frequency(seen, h) == pytest.approx(2 / h * inverse(omega_h / 2), rel=1e-6)
+    assert seen_frequency(seen, h) == pytest.approx(2 / h * inverse(omega * h / 2), rel=1e-6)
 
 
 @each_integrator

@@ -5,6 +5,7 @@ Reference values: elliptic integrals for pendulum and bar; closed forms for the 
 
 import numpy as np
 import pytest
+from motions import end
 
 import kratos_lite as kl
 
@@ -21,12 +22,6 @@ def cube(kind, integrator=None, side=0.2, E=1e6, density=1000.0, center=(0, 0, 0
     origin = tuple(np.array(center) - side / 2)
     mesh = kl.box((side,) * 3, origin=origin)
     return kind(mesh, kl.Isotropic3D(E=E, nu=0.3, density=density), integrator=integrator, **options)
-
-
-def end(body, dt, steps):
-    for _ in kl.integrate(body, dt, steps, every=steps):
-        pass
-    return body
 
 
 # ---- projectile, bar, pendulum ---------------------------------------------------------------------
@@ -198,27 +193,34 @@ def test_a_prescribed_displacement_is_met_at_every_step(kind, integrator):
         np.testing.assert_allclose(moved[:, 0], state.time**2, atol=1e-13)
 
 
-@each_body
-def test_a_prescribed_velocity_is_met_at_every_step(kind, integrator):
-    body = cube(kind, integrator)
-    corner = body.mesh.points[[0, 6]]
-    path = kl.TimeSeries([0, 0.02, 0.05], [0.0, 2.0, -1.0])
-    body.constrain(kl.PrescribedVelocity(corner, (0, 3, 4), path))
-    for state in kl.integrate(body, 1e-3, 60):
-        np.testing.assert_allclose(body.velocity(corner) @ [0, 0.6, 0.8], path(state.time), atol=1e-12)
+def gained(t):
+    """Return what the acceleration below adds to a velocity."""
+    return 0.5 + (100 * t * t if t < 0.04 else 0.16 + 8 * (t - 0.04))
 
 
+SPEEDS = kl.TimeSeries([0, 0.02, 0.05], [0.0, 2.0, -1.0])
+PRESCRIBED = {
+    "velocity": (kl.PrescribedVelocity, [0, 6], (0, 3, 4), SPEEDS, SPEEDS, 0.0),
+    "acceleration": (
+        *(kl.PrescribedAcceleration, [0, 1, 2, 3], (1, 0, 0)),
+        *(kl.TimeSeries([0, 0.04], [0, 8.0]), gained, 0.5),
+    ),
+}
+
+
+@pytest.mark.parametrize(
+    ("make", "nodes", "way", "given", "expected", "start"), PRESCRIBED.values(), ids=PRESCRIBED
+)
 @each_body
-def test_a_prescribed_acceleration_adds_up(kind, integrator):
+def test_prescribed_velocities_and_accelerations_are_met_at_every_step(
+    kind, integrator, make, nodes, way, given, expected, start
+):
     body = cube(kind, integrator)
-    body.set_velocity((0.5, 0, 0))
-    body.constrain(
-        kl.PrescribedAcceleration(body.mesh.points[:4], (1, 0, 0), kl.TimeSeries([0, 0.04], [0, 8.0]))
-    )
+    body.set_velocity((start, 0, 0))
+    points, unit = body.mesh.points[nodes], np.array(way) / np.linalg.norm(way)
+    body.constrain(make(points, way, given))
     for state in kl.integrate(body, 1e-3, 60):
-        t = state.time
-        gained = 100 * t * t if t < 0.04 else 0.16 + 8 * (t - 0.04)
-        np.testing.assert_allclose(body.velocity(body.mesh.points[:4])[:, 0], 0.5 + gained, rtol=1e-11)
+        np.testing.assert_allclose(body.velocity(points) @ unit, expected(state.time), rtol=1e-11, atol=1e-12)
 
 
 def test_an_acceleration_by_a_function_is_that_by_a_series():

@@ -7,6 +7,7 @@ import motions
 import numpy as np
 import pytest
 from computing import compiled
+from motions import end
 
 import kratos_lite as kl
 from kratos_lite.bodies.rotations import exp
@@ -45,12 +46,6 @@ def heavy(integrator, W=50.0, angle=0.05):
     body = top((5, 5, 1), (0, 0, W), integrator, exp([angle, 0, 0]))
     body.add(kl.Callback(lambda q, u, t: np.r_[0, 0, 0, -20 * q[7], 20 * q[6], 0, 0, 0, 0]))
     return body, lambda state: float((state.u[:3] ** 2 @ [5, 5, 1]) / 2 + 20 * state.q[8])
-
-
-def end(body, dt, steps):
-    for _ in kl.integrate(body, dt, steps, every=steps):
-        pass
-    return body
 
 
 def gains(body, dt, steps, energy=None):

@@ -289,8 +289,8 @@ MUTATIONS = [
     ),
     Mutation(
         "ale/matrices.py",
-        "return (self.G - self._transposed(self.G)) / 2",
-        "return (self.G + self._transposed(self.G)) / 2",
+        "np.asarray((self.G - transposed.data) / 2)",
+        "np.asarray((self.G + transposed.data) / 2)",
         MATRICES,
     ),
     # ---- bodies
@@ -386,19 +386,19 @@ MUTATIONS = [
         "tests/bodies/test_tangents_of_loads.py",
     ),
     Mutation(
-        "bodies/constraints/fixed.py",
+        "bodies/constraints/points.py",
         "- self.length\n",
         "+ self.length\n",
         "tests/bodies/test_simple_mechanics.py -k pendulum",
     ),
     Mutation(
-        "bodies/constraints/prescribed.py",
+        "bodies/constraints/points.py",
         "(self._moved(x) - self.displacement(time)) * (2 / h)",
         "(self._moved(x) - self.displacement(time - h)) * (2 / h)",
         "tests/bodies/test_simple_mechanics.py -k prescribed",
     ),
     Mutation(
-        "bodies/constraints/prescribed.py",
+        "bodies/constraints/points.py",
         "(body.velocity(self.points) @ self.direction)[:, None] + gained",
         "(body.velocity(self.points) @ self.direction)[:, None] - gained",
         "tests/bodies/test_simple_mechanics.py -k prescribed",

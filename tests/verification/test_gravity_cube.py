@@ -5,6 +5,7 @@ u_z(z) = -ρ g (L z - z²/2) / M with the confined modulus M; σ_zz = -ρ g (L -
 
 import numpy as np
 import pytest
+from meshes import named
 
 import kratos_lite as kl
 from kratos_lite.verification.meshes import warped
@@ -16,10 +17,6 @@ TOP = -1.3221477551020406e-4
 SOIL = kl.Isotropic3D(E=E, nu=NU, density=RHO)
 NODALLY_EXACT = [6, 8, 10, 13, 15, 20, 27]
 QUADRATIC = [10, 13, 15, 20, 27]
-
-
-def kind(n):
-    return f"KinematicLinear3D{n}N"
 
 
 def cube(mesh):
@@ -42,14 +39,14 @@ def test_reference_value_is_the_closed_form():
 @pytest.mark.parametrize("n", [1, 2, 3])
 @pytest.mark.parametrize("nodes", NODALLY_EXACT)
 def test_all_nodes_lie_on_the_exact_parabola(nodes, n):
-    result = cube(kl.box(cells=(n, n, n), element=kind(nodes))).solve()
+    result = cube(kl.box(cells=(n, n, n), element=named(nodes))).solve()
     assert error(result) < 1e-12
     np.testing.assert_allclose(result.displacement("z+")[:, 2], TOP, rtol=1e-12)
 
 
 @pytest.mark.parametrize("n", [1, 2, 3])
 def test_pyramids_are_exact_at_the_top_and_near_inside(n):
-    result = cube(kl.box(cells=(n, n, n), element=kind(5))).solve()
+    result = cube(kl.box(cells=(n, n, n), element=named(5))).solve()
     np.testing.assert_allclose(result.displacement("z+")[:, 2], TOP, rtol=1e-12)
     assert 1e-4 < error(result) < 1.2e-2 / n**2 * 1.2
 
@@ -57,26 +54,26 @@ def test_pyramids_are_exact_at_the_top_and_near_inside(n):
 @pytest.mark.parametrize("n", [2, 3])
 @pytest.mark.parametrize("nodes", [10, 27])
 def test_27_node_bricks_and_10_node_tetrahedra_stay_exact_on_warped_cells(nodes, n):
-    result = cube(warped(kind(nodes), n)).solve()
+    result = cube(warped(named(nodes), n)).solve()
     assert error(result) < 1e-12
 
 
 @pytest.mark.parametrize(("nodes", "low", "high"), [(8, 1e-3, 5e-2), (20, 1e-5, 2e-3), (15, 1e-5, 2e-3)])
 def test_other_cells_lose_exactness_when_warped_by_no_more_than_is_known(nodes, low, high):
-    assert low < error(cube(warped(kind(nodes), 2, seed=0)).solve()) < high
+    assert low < error(cube(warped(named(nodes), 2, seed=0)).solve()) < high
 
 
 def test_four_node_tetrahedra_converge_with_order_two():
     errors = []
     for n in (4, 8):
-        result = cube(kl.box(cells=(n, n, n), element=kind(4))).solve()
+        result = cube(kl.box(cells=(n, n, n), element=named(4))).solve()
         errors.append(np.sqrt(((result.u - exact(result.mesh.points)) ** 2).mean()))
     assert 1.8 < np.log2(errors[0] / errors[1]) < 2.2
 
 
 @pytest.mark.parametrize("nodes", [4, 5, 6, 8, 10, 13, 15, 20, 27])
 def test_reactions_carry_the_weight(nodes):
-    result = cube(kl.box(cells=(2, 2, 2), element=kind(nodes))).solve()
+    result = cube(kl.box(cells=(2, 2, 2), element=named(nodes))).solve()
     assert result.reaction("z-")[:, 2].sum() == pytest.approx(74752.2, rel=1e-12)
     np.testing.assert_allclose(result.report.total_reaction, (0, 0, 74752.2), atol=1e-7)
     np.testing.assert_allclose(result.report.total_load, (0, 0, -74752.2), atol=1e-7)
@@ -87,14 +84,14 @@ def test_reactions_carry_the_weight(nodes):
 @pytest.mark.parametrize("solver", ["dense", "direct", "amg"])
 @pytest.mark.parametrize("nodes", [8, 10])
 def test_every_solver_gives_the_exact_solution(solver, nodes):
-    result = cube(kl.box(cells=(4, 4, 4), element=kind(nodes))).solve(solver, tolerance=1e-12)
+    result = cube(kl.box(cells=(4, 4, 4), element=named(nodes))).solve(solver, tolerance=1e-12)
     assert result.report.solver == solver
     assert error(result) < (1e-10 if solver == "amg" else 1e-12)
 
 
 @pytest.mark.parametrize("nodes", QUADRATIC)
 def test_stress_of_quadratic_elements_is_exact_at_gauss_points_and_nodes(nodes):
-    result = cube(kl.box(cells=(2, 2, 2), element=kind(nodes))).solve()
+    result = cube(kl.box(cells=(2, 2, 2), element=named(nodes))).solve()
     peak = RHO * G
     (group,) = result.groups
     z = group.at(result.mesh.points).gauss_points()[..., 2]
@@ -113,7 +110,7 @@ def stress_at(z):
 
 @pytest.mark.parametrize("nodes", QUADRATIC)
 def test_energy_is_half_the_work_and_equals_the_integral(nodes):
-    result = cube(kl.box(cells=(2, 2, 2), element=kind(nodes))).solve()
+    result = cube(kl.box(cells=(2, 2, 2), element=named(nodes))).solve()
     assert result.energy() == pytest.approx((RHO * G) ** 2 / (6 * M), rel=1e-12)
     assert result.energy() == pytest.approx((result.loads * result.u).sum() / 2, rel=1e-12)
 
@@ -128,7 +125,7 @@ def test_the_unit_of_length_does_not_matter(unit):
 @pytest.mark.parametrize("nodes", [8, 10, 27])
 def test_flat_cells_cost_no_digits(aspect, nodes):
     height = 1 / aspect
-    result = cube(kl.box((1, 1, height), (2, 2, 2), kind(nodes))).solve("direct")
+    result = cube(kl.box((1, 1, height), (2, 2, 2), named(nodes))).solve("direct")
     np.testing.assert_allclose(result.displacement("z+")[:, 2], TOP * height**2, rtol=1e-11)
 
 

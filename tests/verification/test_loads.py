@@ -2,16 +2,12 @@
 
 import numpy as np
 import pytest
-from meshes import joined, with_block
+from meshes import joined, named, with_block
 
 import kratos_lite as kl
 
 STEEL = kl.Isotropic3D(E=2e11, nu=0.3, density=7850.0)
 KINDS = [4, 5, 6, 8, 10, 13, 15, 20, 27]
-
-
-def kind(n):
-    return f"KinematicLinear3D{n}N"
 
 
 def nodal(mesh, *loads, material=STEEL):
@@ -26,7 +22,7 @@ def moment(mesh, forces):
 
 @pytest.mark.parametrize("nodes", KINDS)
 def test_traction_has_the_resultant_and_moment_of_its_integral(nodes):
-    mesh = kl.box((2, 3, 1), (2, 2, 1), kind(nodes))
+    mesh = kl.box((2, 3, 1), (2, 2, 1), named(nodes))
     forces = nodal(mesh, kl.Traction("z+", (5, 7, -11)))
     np.testing.assert_allclose(forces.sum(axis=0), 6 * np.array([5, 7, -11]), rtol=1e-13)
     np.testing.assert_allclose(moment(mesh, forces), 6 * np.cross((1, 1.5, 1), (5, 7, -11)), rtol=1e-12)
@@ -35,7 +31,7 @@ def test_traction_has_the_resultant_and_moment_of_its_integral(nodes):
 
 def test_traction_on_one_quadratic_face_is_the_classic_share():
     for nodes, corner, edge, middle in ((20, -1 / 12, 1 / 3, None), (27, 1 / 36, 1 / 9, 4 / 9)):
-        mesh = kl.box(element=kind(nodes))
+        mesh = kl.box(element=named(nodes))
         force = nodal(mesh, kl.Traction("z+", (0, 0, 1)))[:, 2]
         off = np.abs(mesh.points[:, :2] - 0.5).sum(axis=1)
         top = mesh.points[:, 2] == 1
@@ -47,7 +43,7 @@ def test_traction_on_one_quadratic_face_is_the_classic_share():
 
 @pytest.mark.parametrize("nodes", KINDS)
 def test_pressure_pushes_inward_on_flat_faces(nodes):
-    mesh = kl.box((1, 2, 3), (1, 2, 1), kind(nodes))
+    mesh = kl.box((1, 2, 3), (1, 2, 1), named(nodes))
     for side, axis, sign, area in (("x-", 0, 1, 6), ("x+", 0, -1, 6), ("y+", 1, -1, 3), ("z-", 2, 1, 2)):
         total = nodal(mesh, kl.Pressure(side, 4.0)).sum(axis=0)
         expected = np.zeros(3)
@@ -57,7 +53,7 @@ def test_pressure_pushes_inward_on_flat_faces(nodes):
 
 @pytest.mark.parametrize("nodes", KINDS)
 def test_pressure_all_around_a_curved_body_has_no_resultant(nodes):
-    mesh = kl.annulus(1.0, 2.0, 0.5, (2, 7, 1), kind(nodes))
+    mesh = kl.annulus(1.0, 2.0, 0.5, (2, 7, 1), named(nodes))
     mesh = mesh.replace(points=mesh.points + 0.05 * np.sin(3 * mesh.points[:, [1, 2, 0]]))
     forces = nodal(mesh, kl.Pressure(np.ones(mesh.n_nodes, dtype=bool), 1e3))
     size = np.abs(forces).sum()
@@ -67,7 +63,7 @@ def test_pressure_all_around_a_curved_body_has_no_resultant(nodes):
 
 
 def test_pressure_all_around_squeezes_a_body_evenly():
-    mesh = kl.annulus(1.0, 2.0, 0.5, (2, 8, 1), kind(27))
+    mesh = kl.annulus(1.0, 2.0, 0.5, (2, 8, 1), named(27))
     model = kl.Model(mesh, STEEL)
     model.add(kl.Pressure(np.ones(mesh.n_nodes, dtype=bool), 1e6))
     shrink = -1e6 * (1 - 2 * STEEL.nu) / STEEL.E
@@ -115,7 +111,7 @@ def test_pressure_on_a_face_inside_the_body_is_refused():
 def test_line_load_is_a_force_per_length():
     from kratos_lite.shapes.faces import Line3
 
-    mesh = kl.box((1, 1, 2), element=kind(20))
+    mesh = kl.box((1, 1, 2), element=named(20))
     ends = [int(np.argmin(np.linalg.norm(mesh.points - (1, 1, z), axis=1))) for z in (0, 2, 1)]
     line = kl.Block("Line", np.array([ends], dtype=np.int32), np.array([1]), np.array([0]), Line3)
     edge = kl.Part(nodes=np.array(ends), conditions=np.array([0]))
@@ -128,7 +124,7 @@ def test_line_load_is_a_force_per_length():
 
 @pytest.mark.parametrize("nodes", KINDS)
 def test_body_force_and_gravity_have_the_weight_and_its_moment(nodes):
-    mesh = kl.box((1, 2, 3), (1, 2, 2), kind(nodes), origin=(1, 0, -1))
+    mesh = kl.box((1, 2, 3), (1, 2, 2), named(nodes), origin=(1, 0, -1))
     gravity = nodal(mesh, kl.Gravity((1, 2, -9.81)))
     weight = 6 * 7850 * np.array([1, 2, -9.81])
     np.testing.assert_allclose(gravity.sum(axis=0), weight, rtol=1e-12)
@@ -138,7 +134,7 @@ def test_body_force_and_gravity_have_the_weight_and_its_moment(nodes):
 
 @pytest.mark.parametrize("nodes", KINDS)
 def test_nodal_gravity_is_interpolated(nodes):
-    mesh = kl.box((1, 1, 2), (1, 1, 2), kind(nodes))
+    mesh = kl.box((1, 1, 2), (1, 1, 2), named(nodes))
     z = mesh.points[:, 2]
     field = np.column_stack([0 * z, 0 * z, -9.81 * (1 + z)])
     forces = nodal(mesh, kl.Gravity(field))
@@ -169,7 +165,7 @@ def test_a_point_load_acts_on_each_node_once_and_loads_add_up():
 
 def test_faces_of_mixed_cells_carry_the_whole_load():
     """Two wedges and a brick share a square; the traction covers the squares and triangles of a side."""
-    brick, wedge = kl.box(), kl.box(element=kind(6), origin=(0, 1, 0))
+    brick, wedge = kl.box(), kl.box(element=named(6), origin=(0, 1, 0))
     forces = nodal(joined(brick, wedge, welded=True), kl.Pressure("z+", 1.0), kl.Traction("x+", (1, 0, 0)))
     np.testing.assert_allclose(forces.sum(axis=0), (2, 0, -2), atol=1e-14)
 

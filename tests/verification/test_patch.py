@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from meshes import named
 
 from kratos_lite.verification import patch
 from kratos_lite.verification.meshes import on_boundary, warped
@@ -10,13 +11,9 @@ from kratos_lite.voigt import symmetric_gradient
 KINDS = [4, 5, 6, 8, 10, 13, 15, 20, 27]
 
 
-def kind(n):
-    return f"KinematicLinear3D{n}N"
-
-
 @pytest.mark.parametrize("nodes", KINDS)
 def test_nodal_stress_of_a_linear_field_is_exact(nodes):
-    result = patch.held(warped(kind(nodes), 3, amount=0.24), patch.linear).solve()
+    result = patch.held(warped(named(nodes), 3, amount=0.24), patch.linear).solve()
     stress = result.stress("node")
     np.testing.assert_allclose(stress, patch.constant(result.mesh.points), rtol=1e-11)
     assert not on_boundary(result.mesh).all()
@@ -24,7 +21,7 @@ def test_nodal_stress_of_a_linear_field_is_exact(nodes):
 
 @pytest.mark.parametrize("solver", ["dense", "direct", "amg"])
 def test_linear_field_with_each_solver(solver):
-    result = patch.held(warped(kind(8), 4), patch.linear).solve(solver)
+    result = patch.held(warped(named(8), 4), patch.linear).solve(solver)
     exact = patch.linear(result.mesh.points)
     np.testing.assert_allclose(result.u, exact, rtol=0, atol=1e-10 * np.abs(exact).max())
 
@@ -32,7 +29,7 @@ def test_linear_field_with_each_solver(solver):
 @pytest.mark.parametrize("nodes", [10, 13, 15, 20, 27])
 def test_strain_of_a_quadratic_field_is_exact_on_parallelepipeds(nodes):
     field = patch.quadratic
-    result = patch.held(patch.parallelepipeds(kind(nodes)), field, field.body_force()).solve()
+    result = patch.held(patch.parallelepipeds(named(nodes)), field, field.body_force()).solve()
     (group,) = result.groups
     X = group.at(result.mesh.points).gauss_points()
     strain = symmetric_gradient(2 * np.einsum("ijk,...k->...ij", field.A, X) + field.G)
@@ -41,7 +38,7 @@ def test_strain_of_a_quadratic_field_is_exact_on_parallelepipeds(nodes):
 
 @pytest.mark.parametrize("nodes", [10, 13, 15, 20, 27])
 def test_nodal_stress_of_pure_bending_is_exact_for_quadratic_elements(nodes):
-    model = patch.bent(kind(nodes))
+    model = patch.bent(named(nodes))
     y, largest = model.mesh.points[:, 1], 1e-3 * patch.STEEL.E
     expected = np.column_stack([largest * y, *[0 * y] * 5])
     np.testing.assert_allclose(model.solve().stress("node"), expected, rtol=0, atol=1e-9 * largest)
@@ -49,5 +46,5 @@ def test_nodal_stress_of_pure_bending_is_exact_for_quadratic_elements(nodes):
 
 @pytest.mark.parametrize("nodes", [15, 20])
 def test_a_moved_corner_costs_serendipity_elements_the_quadratic_field(nodes):
-    result = patch.held(warped(kind(nodes), 2), patch.quadratic, patch.quadratic.body_force()).solve()
+    result = patch.held(warped(named(nodes), 2), patch.quadratic, patch.quadratic.body_force()).solve()
     assert 1e-6 < patch.off(patch.quadratic)(result) < 1e-3

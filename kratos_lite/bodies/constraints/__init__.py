@@ -1,11 +1,13 @@
 """Constraints on a single body: fixed points and directions, prescribed motions, rigid links."""
 
 from kratos_lite.bodies.constraints.base import Constraint
-from kratos_lite.bodies.constraints.fixed import FixDirection, FixPoint, RigidLink
-from kratos_lite.bodies.constraints.prescribed import (
+from kratos_lite.bodies.constraints.points import (
+    FixDirection,
+    FixPoint,
     PrescribedAcceleration,
     PrescribedDisplacement,
     PrescribedVelocity,
+    RigidLink,
 )
 
 __all__ = [

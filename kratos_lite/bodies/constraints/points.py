@@ -1,4 +1,4 @@
-"""Constraints that stay as they are: fixed points, fixed directions and rigid links."""
+"""Constraints of points: fixed, moved along a direction as prescribed, or linked to a point in space."""
 
 from __future__ import annotations
 
@@ -9,7 +9,11 @@ from kratos_lite.bodies.constraints.base import Constraint, Points
 from kratos_lite.bodies.free_body import FreeBody
 from kratos_lite.bodies.validation import one_point, vector_of
 from kratos_lite.errors import InputError
+from kratos_lite.time_series import Factor, function_of, integral_of
 from kratos_lite.typing import Array
+
+SHORT = 1e-3
+"""Fraction of a step over which the slope of a displacement is taken."""
 
 
 class FixPoint(Constraint):
@@ -109,3 +113,85 @@ class RigidLink(Constraint):
         """Return by how much the link is too long; see `Constraint.gap`."""
         stretch = np.linalg.norm(x - self.anchor, axis=1) - self.length
         return np.asarray(stretch[:, None] * (2 / h))
+
+
+# ---- prescribed --------------------------------------------------------------------------------------
+
+
+class PrescribedDisplacement(AlongDirection):
+    """Points that move along a direction as prescribed.
+
+    Parameters
+    ----------
+    points, direction : as for `FixDirection`.
+    displacement : m, number, `TimeSeries` or function of the time: by how much the points are moved from
+        where they were when the constraint was made.  A motion starts where the body is; a body at rest
+        (`find_equilibrium`) may be moved by a number.
+    """
+
+    def __init__(self, points: Points, direction: ArrayLike, displacement: Factor) -> None:
+        super().__init__(points, direction)
+        self.displacement = function_of(displacement, "a displacement")
+
+    def gap(self, x: Array, v: Array, time: float, h: float) -> Array:
+        """Return by how much the points are off; see `Constraint.gap`."""
+        return (self._moved(x) - self.displacement(time)) * (2 / h)
+
+    def starting_velocities(self, v: Array, time: float, h: float) -> Array:
+        """Return the slope of the displacement at a time; see `Constraint.starting_velocities`."""
+        short = SHORT * h
+        return np.full_like(v, (self.displacement(time + short) - self.displacement(time)) / short)
+
+
+class PrescribedVelocity(AlongDirection):
+    """Points with a prescribed velocity along a direction at the end of each step.
+
+    Parameters
+    ----------
+    points, direction : as for `FixDirection`.
+    velocity : m/s, number, `TimeSeries` or function of the time.
+    """
+
+    positional = False
+
+    def __init__(self, points: Points, direction: ArrayLike, velocity: Factor) -> None:
+        super().__init__(points, direction)
+        self.speed = function_of(velocity, "a velocity")
+
+    def gap(self, x: Array, v: Array, time: float, h: float) -> Array:
+        """Return the velocity error; see `Constraint.gap`."""
+        return np.asarray(v @ self.direction)[:, None] - self.speed(time)
+
+    def starting_velocities(self, v: Array, time: float, h: float) -> Array:
+        """Return the velocity at a time; see `Constraint.starting_velocities`."""
+        return np.full_like(v, self.speed(time))
+
+
+class PrescribedAcceleration(AlongDirection):
+    """Points with a prescribed acceleration along a direction: it adds up to their velocity.
+
+    Parameters
+    ----------
+    points, direction : as for `FixDirection`.
+    acceleration : m/s², number, `TimeSeries` or function of the time.
+    """
+
+    positional = False
+
+    def __init__(self, points: Points, direction: ArrayLike, acceleration: Factor) -> None:
+        super().__init__(points, direction)
+        function_of(acceleration, "an acceleration")
+        self.acceleration = acceleration
+
+    def begin(self, body: FreeBody, h: float) -> None:
+        """Add what the acceleration adds to the velocity in a step."""
+        gained = integral_of(self.acceleration, body.time, body.time + h)
+        self._target = (body.velocity(self.points) @ self.direction)[:, None] + gained
+
+    def gap(self, x: Array, v: Array, time: float, h: float) -> Array:
+        """Return the velocity error; see `Constraint.gap`."""
+        return np.asarray(v @ self.direction)[:, None] - self._target
+
+    def starting_velocities(self, v: Array, time: float, h: float) -> Array:
+        """Return the velocities as they are; see `Constraint.starting_velocities`."""
+        return v
