@@ -19,6 +19,7 @@ from typing import TypeAlias, TypeVar
 import numpy as np
 
 from kratos_lite.analysis.adaptive_levels import Level, QuantityLevel, layer_direction
+from kratos_lite.analysis.error_estimate import curved
 from kratos_lite.analysis.peak import peak
 from kratos_lite.analysis.quantities import Quantity
 from kratos_lite.analysis.report import RefinementStep
@@ -28,7 +29,6 @@ from kratos_lite.elements import ELEMENTS
 from kratos_lite.elements.custom import is_builtin
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh
-from kratos_lite.mesh.facets import facets
 from kratos_lite.mesh.refined_mesh import RefinedMesh
 from kratos_lite.mesh.refinement import quadratic, raised, refine
 from kratos_lite.model.refined import refined
@@ -85,7 +85,7 @@ def solve_to(
     history: list[RefinementStep] = []
     missed, keep = "", None
     rough = max(tolerance, min(ROUGH, ROUGH_SHARE * aim))
-    warnings = [] if geometry else _curved(model.mesh)
+    warnings = [] if geometry else curved(model.mesh)
     while True:
         start = perf_counter()
         analysis = StaticAnalysis(model, solver, tolerance, progress)
@@ -135,18 +135,6 @@ def _level(
     level = QuantityLevel(model, result, steps, before, quantity)
     level.check_value()
     return level
-
-
-def _curved(mesh: Mesh) -> list[str]:
-    """Return the warning about a surface that seems curved and is not followed, if any."""
-    count, angle = facets(mesh)
-    if not count:
-        return []
-    return [
-        f"{count} boundary faces of straight cells turn by about {angle:.0f}° from one to the next, as if "
-        "they stood for a curved surface: what that costs is not in the error; give geometry={part: function "
-        "of places}, or cells with curved edges"
-    ]
 
 
 def _solved(analysis: StaticAnalysis, start: Array | None, rough: float) -> Result:

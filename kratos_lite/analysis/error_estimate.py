@@ -12,6 +12,7 @@ from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear
 from kratos_lite.errors import ModelError
 from kratos_lite.mesh import Mesh
+from kratos_lite.mesh.facets import facets
 from kratos_lite.model.locking import better_element
 from kratos_lite.model.supports import AXES
 from kratos_lite.typing import Array, Mask
@@ -57,6 +58,8 @@ SAFETY = {"recovery": 1.7, "averaging": 1.8}
 NEGLIGIBLE, COARSE, FEW, FOCUS = 1e-9, 1.7, 8, 0.4
 """Relative error that is rounding; ratio of the differences to recovered and averaged stresses beyond which a
 mesh is coarse; elements that are few; much of the error, in the worst hundredth of elements."""
+CURVED = 10.0
+"""Degrees from one face to the next at which a curved surface of straight cells is off by half a percent."""
 WORST = 3
 """Least number of elements of that hundredth; meshes of less than twenty times as many have none."""
 
@@ -99,7 +102,7 @@ def _warnings(recovered: Array, is_coarse: bool, groups: Sequence[ElementGroup],
             "recovered stresses are farther from those of the elements than averaged ones: the mesh is too "
             "coarse for them, and the estimated error may be several times too large"
         )
-    warnings += too_few(mesh)
+    warnings += too_few(mesh) + curved(mesh, least=CURVED)
     if in_few_elements(recovered, count):
         element = mesh.element_ids[int(recovered.argmax())]
         warnings.append(
@@ -107,6 +110,18 @@ def _warnings(recovered: Array, is_coarse: bool, groups: Sequence[ElementGroup],
             "corner, the edge of a support or a concentrated load stresses have no limit"
         )
     return warnings
+
+
+def curved(mesh: Mesh, least: float = 0.0) -> list[str]:
+    """Return a warning of straight cells that seem to stand for a curved surface."""
+    count, angle = facets(mesh)
+    if not count or angle < least:
+        return []
+    return [
+        f"{count} boundary faces of straight cells turn by about {angle:.0f}° from one to the next, as if "
+        "they stood for a curved surface: what that costs is not in the error; take cells with curved edges, "
+        "or error= with geometry={part: function of places}"
+    ]
 
 
 def too_few(mesh: Mesh) -> list[str]:

@@ -374,5 +374,5 @@ class Result(ElementFields, Tabular):
             ("estimated error", self._stated_error()),
             ("largest von Mises", f"{mises:.6e} Pa (at a Gauss point) {place}"),
             *report.solution_rows(),
-            *[("warning", text) for text in self._error.warnings],
+            *[("warning", text) for text in self._error.warnings if text not in report.warnings],
         ]
