@@ -9,8 +9,8 @@ from kratos_lite.analysis.report import Report, element_counts, vector
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.solution_checks import Phases, check_arguments, check_solution, metrics
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.distributed.part_system import PartSystem
 from kratos_lite.distributed.partition import Partition
+from kratos_lite.distributed.petsc_system import PartSystem
 from kratos_lite.errors import ModelError
 from kratos_lite.model import checks
 from kratos_lite.model.loads import Load, ScaledLoad

@@ -37,39 +37,25 @@ class Ghosts:
         return len(self.numbers)
 
     def update(self, values: Any) -> None:
-        """Give ghosts the values of their owners, in place; `values` (n, k) of any type."""
-        if not (self._givers or self._takers):
-            return
+        """Give ghosts the values of their owners, in place; `values` (n, k) of numbers."""
         comm: Any = self.ranks.comm
-        sent = [np.ascontiguousarray(values[self.wanted[rank]]) for rank in self._takers]
-        open_ = [comm.Irecv(_bytes(values[self._of(rank)]), source=rank) for rank in self._givers]
-        open_ += [comm.Isend(_bytes(one), dest=rank) for one, rank in zip(sent, self._takers, strict=True)]
-        _wait(open_)
+        sent = [values[self.wanted[rank]] for rank in self._takers]
+        requests = [comm.Irecv(values[self._of(rank)], rank) for rank in self._givers]
+        requests += [comm.Isend(copies, rank) for copies, rank in zip(sent, self._takers, strict=True)]
+        for request in requests:
+            request.Wait()
 
     def add(self, values: Any) -> None:
         """Add the values of ghosts to those of their owners, in place; the ghosts keep theirs."""
-        if not (self._givers or self._takers):
-            return
         comm: Any = self.ranks.comm
-        came = [np.empty((len(self.wanted[rank]), *values.shape[1:]), values.dtype) for rank in self._takers]
-        open_ = [comm.Irecv(_bytes(one), source=rank) for one, rank in zip(came, self._takers, strict=True)]
-        open_ += [comm.Isend(_bytes(values[self._of(rank)]), dest=rank) for rank in self._givers]
-        _wait(open_)
-        for one, rank in zip(came, self._takers, strict=True):
-            values[self.wanted[rank]] += one  # a rank has a node once
+        received = [np.empty_like(values[self.wanted[rank]]) for rank in self._takers]
+        requests = [comm.Irecv(copies, rank) for copies, rank in zip(received, self._takers, strict=True)]
+        requests += [comm.Isend(values[self._of(rank)], rank) for rank in self._givers]
+        for request in requests:
+            request.Wait()
+        for copies, rank in zip(received, self._takers, strict=True):
+            values[self.wanted[rank]] += copies  # a rank has a node once
 
     def _of(self, rank: int) -> slice:
         """Return the rows of the ghosts that a rank owns."""
         return slice(int(self.starts[rank]), int(self.starts[rank + 1]))
-
-
-def _bytes(values: Any) -> list[Any]:
-    from mpi4py import MPI
-
-    return [values, values.nbytes, MPI.BYTE]
-
-
-def _wait(requests: list[Any]) -> None:
-    from mpi4py import MPI
-
-    MPI.Request.Waitall(requests)

@@ -116,16 +116,14 @@ class Level:
             vector[:] = 0.0
         if not diagonal:
             return 1.0
-        return MARGIN * float(np.linalg.eigvalsh(_tridiagonal(diagonal, beside[: len(diagonal) - 1]))[-1])
+        return MARGIN * float(
+            np.linalg.eigvalsh(np.diag(diagonal) + np.diag(beside[: len(diagonal) - 1], -1))[-1]
+        )
 
     def dot(self, a: Any, b: Any) -> float:
         """Return the scalar product over all ranks."""
         mine = np.dot(self.own(a).astype(float), self.own(b).astype(float))
         return float(self.ghosts.ranks.sum(float(mine)))
-
-
-def _tridiagonal(diagonal: list[float], beside: list[float]) -> Array:
-    return np.diag(diagonal) + np.diag(beside, 1) + np.diag(beside, -1)
 
 
 class Multigrid:

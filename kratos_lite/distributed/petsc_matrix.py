@@ -9,15 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from kratos_lite.assembly.block_matrix import BlockMatrix, block_rows
+from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.distributed.communicator import Alone
 from kratos_lite.distributed.cut import Dependents
 from kratos_lite.distributed.petsc import petsc
 from kratos_lite.distributed.stiffness import SharedStiffness
-from kratos_lite.typing import Array, Ints, Mask, Rows
-
-NODES_AT_ONCE = 5_000
-"""Nodes whose rows are copied at once: at most 50 MB, little beside a matrix for which memory counts."""
 
 
 def communicator(ranks: Alone) -> Any:
@@ -26,7 +22,7 @@ def communicator(ranks: Alone) -> Any:
 
 
 def petsc_matrix(K: SharedStiffness) -> Any:
-    """Return own rows without what is held as a matrix in single entries (AIJ).
+    """Return own rows without what is held as a matrix in single entries (AIJ); those of K change.
 
     Rows and columns of held degrees of freedom are 0 but for their own diagonal: the matrix stays
     symmetric and positive definite, and its blocks whole, as multigrid of PETSc needs them.  Multigrid
@@ -44,27 +40,17 @@ def petsc_matrix(K: SharedStiffness) -> Any:
     # without rows, PETSc does not see that room was made, and would wait for the others in assembly
     A.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, True)
     A.setOption(PETSc.Mat.Option.NO_OFF_PROC_ENTRIES, True)
-    for first in range(0, own, NODES_AT_ONCE):
-        last = min(first + NODES_AT_ONCE, own)
-        blocks = _blocks(matrix, first, last, K.number, K.held)
-        A.setValuesBlockedIJV(*blocks, rowmap=K.number[first:last].astype(np.int32))
+    touched = np.flatnonzero(K.held[row].any(axis=1) | K.held[matrix.indices].any(axis=1))
+    i, j = row[touched], matrix.indices[touched]
+    free = ~K.held[i][:, :, None] & ~K.held[j][:, None, :]
+    matrix.data[touched] *= free | ((i == j)[:, None, None] & np.eye(3, dtype=bool))
+    columns = K.number[matrix.indices].astype(
+        np.int32
+    )  # PETSc leaves out those of nodes without equations, -1
+    A.setValuesBlockedIJV(matrix.indptr, columns, matrix.data, rowmap=K.number[:own].astype(np.int32))
     A.assemble()
     A.setOption(PETSc.Mat.Option.SPD, True)
     return A
-
-
-def _blocks(K: BlockMatrix, first: int, last: int, number: Ints, held: Mask) -> tuple[Rows, Rows, Array]:
-    """Return the blocks of some rows as (indptr, columns, blocks), without what is held."""
-    at = slice(K.indptr[first], K.indptr[last])
-    used = number[K.indices[at]] >= 0
-    rows = first + block_rows(K.indptr[first : last + 1])[used]
-    nodes, blocks = K.indices[at][used], K.data[at][used]
-    touched = np.flatnonzero(held[rows].any(axis=1) | held[nodes].any(axis=1))
-    i, j = rows[touched], nodes[touched]
-    free = ~held[i][:, :, None] & ~held[j][:, None, :]
-    blocks[touched] *= free | ((i == j)[:, None, None] & np.eye(3, dtype=bool))
-    pointers = np.concatenate([[0], np.cumsum(np.bincount(rows - first, minlength=last - first))])
-    return pointers.astype(np.int32), number[nodes].astype(np.int32), blocks
 
 
 def add_rigid_modes(A: Any, K: SharedStiffness) -> None:

@@ -1,4 +1,7 @@
-"""PetscSystem: K u = f of elements under constraints, which rank 0 has and all ranks solve by PETSc."""
+"""K u = f of elements, solved by all ranks with PETSc.
+
+PetscSystem: under constraints, rank 0 has all of it.  PartSystem: each rank has a part of the mesh.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +19,7 @@ from kratos_lite.distributed.communicator import Alone
 from kratos_lite.distributed.cut import Cut, Part
 from kratos_lite.distributed.equations import Equations, Method
 from kratos_lite.distributed.krylov import plan_of
+from kratos_lite.distributed.partition import Partition
 from kratos_lite.distributed.petsc import parsed
 from kratos_lite.elements.formulations import bulk_over_shear
 from kratos_lite.errors import SolveError
@@ -24,7 +28,7 @@ from kratos_lite.solvers.constraint_map import ConstraintMap
 from kratos_lite.solvers.iteration import MAX_ITERATIONS
 from kratos_lite.solvers.linear_solver import Solution
 from kratos_lite.solvers.plan import MUMPS_FALLBACK, Plan
-from kratos_lite.typing import Array, Ints, Progress
+from kratos_lite.typing import Array, Ints, Mask, Progress
 
 PATIENCE = 5 * MAX_ITERATIONS
 """Iterations where nothing else is left, as ν near 0.5 needs many."""
@@ -186,6 +190,65 @@ class PetscSolver:
         if self._key >= 0:
             key, self._key = self._key, -1
             self._ranks.run(_destroy, key)
+
+
+class PartSystem:
+    """K u = f + reactions of a mesh in parts; all ranks make it and call each method.
+
+    Parameters
+    ----------
+    points : (n, 3) m, of the part.
+    groups : its elements.
+    partition : how the parts hang together.
+    held : (n, 3) bool, what is prescribed, the same in all parts that have a node.
+    solver, tolerance, options, progress : as for a `PetscSystem`.
+
+    Attributes
+    ----------
+    unknowns : of all parts.
+    warnings : what is to be said, in words.
+    """
+
+    def __init__(
+        self,
+        points: Array,
+        groups: Sequence[ElementGroup],
+        partition: Partition,
+        held: Mask,
+        solver: str,
+        tolerance: float,
+        options: str | None,
+        progress: Progress | None,
+    ) -> None:
+        self._points, self._partition, self._held = points, partition, held
+        self._elastic = [replace(group, prestress=None) for group in groups]
+        ranks, self._tolerance = partition.ranks, tolerance
+        given = parsed(options)
+        part = partition.equations(points, self._elastic, held)
+        self._rows = part.own
+        self.unknowns = ranks.sum(int((~held[part.own]).sum()))
+        ratio = ranks.max(max((bulk_over_shear(group.material.C) for group in groups), default=0.0))
+        self.plan = plan_of(solver, self.unknowns, ratio, given)
+        self._equations = Equations(ranks, part, Method(self.plan.method, given, False, PATIENCE), progress)
+        self.warnings: list[str] = []
+
+    def solve(self, forces: Array, prescribed: Array) -> tuple[Array, Solution]:
+        """Return the displacements (n, 3) under nodal forces, and how they were found."""
+        partition = self._partition
+        load = forces - partition.add(internal_load(self._points, self._elastic, prescribed))
+        b = np.where(self._held, 0.0, load)[self._rows]
+        x, name, iterations, error, failure = self._equations.solve(b, self._tolerance)
+        if failure:
+            raise SolveError(f"{failure}; {CURE if self.plan.iterates else CURE_OF_FACTORS}")
+        self.warnings = unused_words(self._equations.unused_options())
+        u = prescribed.copy()
+        u[self._rows] += x
+        u = np.asarray(partition.fetch(u))
+        return u, Solution(u, name, self.plan.reason, iterations, error)
+
+    def destroy(self) -> None:
+        """Release matrix and solver."""
+        self._equations.destroy()
 
 
 def unused_words(options: Sequence[str]) -> list[str]:
