@@ -201,7 +201,7 @@ class QuantityLevel(Level):
         if self.quantity.motion(result).any():
             size += float(np.abs(result.reactions).sum())
         found = self.found
-        if self.before is not None and 0 < max(abs(found.value), found.absolute) < ROUNDING * size:
+        if self.before is not None and 0 < max(abs(found.value), abs(found.signed)) < ROUNDING * size:
             raise ModelError(
                 f"{self.quantity} is 0 but for rounding, {found.value:.1e} {found.unit}, so that it has no "
                 "relative error; ask for that of another quantity or of the energy norm"

@@ -6,7 +6,7 @@ from meshes import joined
 from rounding import round_off
 
 import kratos_lite as kl
-from kratos_lite.assembly.sparsity_pattern import Pattern, PatternCache
+from kratos_lite.assembly.sparsity_pattern import PatternCache
 from kratos_lite.materials import MATERIALS
 from kratos_lite.solvers import constrained_system as system
 from kratos_lite.solvers.constraint_map import rigid_modes
@@ -40,13 +40,6 @@ def test_any_number_of_elements_may_share_a_node_pair(n):
     model.add(kl.Gravity((0, 0, -9.81)))
     sparse, full = model.solve("direct").u, model.solve("dense").u
     assert np.abs(sparse - full).max() < (1e-12 + round_off(model)) * np.abs(full).max()
-
-
-def test_pattern_without_a_pair_is_refused():
-    pattern = Pattern(4, [np.array([[0, 1], [1, 2]], dtype=np.int32)])
-    keys = np.repeat(np.arange(4), np.diff(pattern.indptr)) * 4 + pattern.indices
-    with pytest.raises(AssertionError, match="misses a pair"):
-        pattern._find(keys, np.array([[0, 3]], dtype=np.int32))
 
 
 def test_pattern_is_kept_until_the_connectivity_changes():
