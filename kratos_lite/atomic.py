@@ -8,6 +8,7 @@ import os
 import stat
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -63,6 +64,29 @@ def write_whole(path: str | Path, data: bytes | Callable[[BinaryIO], None]) -> N
             file.write(data)
 
 
+WAITING: ContextVar[list[tuple[Path, Path]] | None] = ContextVar("waiting", default=None)
+"""Written files, and those whose places they take together at the end of `all_or_none`."""
+
+
+@contextmanager
+def all_or_none() -> Iterator[None]:
+    """Let all files that are written in a ``with`` statement take their places at its end, or none."""
+    written: list[tuple[Path, Path]] = []
+    token = WAITING.set(written)
+    try:
+        yield
+        for temporary, target in written:
+            try:
+                os.replace(temporary, target)
+            except OSError as error:
+                raise InputError(_text(target, error)) from error
+    finally:
+        WAITING.reset(token)
+        for temporary, _ in written:
+            with suppress(OSError):  # those that have taken their places are no longer there
+                temporary.unlink()
+
+
 @contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
     """Give an empty temporary file, with the ending of `path`, that replaces `path` on success.
@@ -83,7 +107,11 @@ def replacing(path: str | Path) -> Iterator[Path]:
             yield temporary
             with open(temporary, "r+b") as file:
                 os.fsync(file.fileno())
-            os.replace(temporary, target)
+            waiting = WAITING.get()
+            if waiting is None:
+                os.replace(temporary, target)
+            else:
+                waiting.append((temporary, target))
         except BaseException:
             with suppress(OSError):
                 temporary.unlink()

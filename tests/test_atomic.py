@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from kratos_lite.atomic import replacing, write_whole
+from kratos_lite.atomic import all_or_none, replacing, write_whole
 from kratos_lite.errors import InputError
 
 
@@ -109,3 +109,23 @@ def test_replacing_keeps_the_ending_that_other_writers_go_by(old):
         temporary.write_bytes(b"new")
         assert old.read_bytes() == b"old"
     assert old.read_bytes() == b"new"
+
+
+def test_files_of_one_run_take_their_places_together_or_not_at_all(old):
+    new = old.with_name("result.json")
+    with all_or_none():
+        write_whole(new, b"new")
+        write_whole(old, b"one")
+        assert not new.exists()
+        assert old.read_bytes() == b"old"
+    assert (new.read_bytes(), old.read_bytes()) == (b"new", b"one")
+
+    def both():
+        with all_or_none():
+            write_whole(new, b"later")
+            write_whole(old, lambda _: _full())
+
+    with pytest.raises(InputError, match="free some space"):
+        both()
+    assert (new.read_bytes(), old.read_bytes()) == (b"new", b"one")
+    assert sorted(old.parent.iterdir()) == [new, old]

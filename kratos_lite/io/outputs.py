@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from kratos_lite.analysis.result import Result
+from kratos_lite.atomic import all_or_none
 from kratos_lite.errors import InputError
 from kratos_lite.io.case import Case, Outputs
 from kratos_lite.io.formats import ELEM_SET, ending
@@ -44,15 +45,16 @@ def check_outputs(case: Case) -> None:
 
 
 def write_at_end(outputs: Outputs, result: Result, *, in_time: bool) -> None:
-    """Write what the end of a model gives: its summary and, at rest, results and picture."""
-    if outputs.json is not None:
-        write_result(outputs.json, result)
-    if in_time:
-        return
-    for path in outputs.results:
-        write_result(path, result, outputs.mode)
-    if outputs.picture is not None:
-        write_picture(outputs.picture, result)
+    """Write what the end of a model gives, all or nothing: its summary and, at rest, results and picture."""
+    with all_or_none():
+        if outputs.json is not None:
+            write_result(outputs.json, result)
+        if in_time:
+            return
+        for path in outputs.results:
+            write_result(path, result, outputs.mode)
+        if outputs.picture is not None:
+            write_picture(outputs.picture, result)
 
 
 def check_targets(read: Iterable[Path], targets: Iterable[str], *, new_folders: bool = False) -> None:
