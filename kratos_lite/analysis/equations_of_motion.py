@@ -48,6 +48,7 @@ class EquationsOfMotion:
         free: bool = True,
         steady: bool = False,
         massless: bool = False,
+        solver: str = "direct",
         progress: Progress | None = None,
     ) -> None:
         self.model, self._steady = model, steady
@@ -66,7 +67,8 @@ class EquationsOfMotion:
             model.mesh.points,
             self.groups,
             model.supports.constraint_map,
-            solver="direct",
+            solver=solver,
+            hanging=model.mesh.hanging,
             patterns=model.patterns,
             progress=progress,
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,8 @@ from kratos_lite.errors import InputError
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers import direct
 from kratos_lite.solvers.constraint_map import rigid_modes
-from kratos_lite.solvers.eigen import modes
+from kratos_lite.solvers.eigen import Problem, dense_modes, is_small
+from kratos_lite.solvers.linear_solver import LinearSolver
 from kratos_lite.solvers.plan import DENSE_MODES
 from kratos_lite.solvers.quadratic_eigen import Pencil, neutral_motions
 from kratos_lite.typing import Array, Complexes, Progress
@@ -29,12 +31,56 @@ def natural_modes(
     """Return frequencies (count,) in rad/s and shapes (count, n, 3) of K φ = ω² M φ; see `Model.modes`."""
     phase = Phases(progress)
     with phase("check"):
-        equations = EquationsOfMotion(model, lumped=lumped, progress=progress)
+        e = EquationsOfMotion(model, lumped=lumped, solver="auto", progress=progress)
+    constraints, n = e.system.constraint_map, len(e.system.constraint_map.free)
     with phase("assemble"):
-        K, M = (reduced(equations, A) for A in (equations.K, equations.matrix(0.0, 1.0, 0.0, 0.0)))
+        small = is_small(n, count)
+        solver, M = e.system.equations, e.mass.scalar
     with phase("modes"):
-        omega, shapes = modes(K, M, count, progress)
-    return omega, expanded(equations, shapes)
+        if small:
+            K, M = solver.reduced_matrix, constraints.reduce_matrix(e.mass.matrix())
+            omega, shapes = dense_modes(K if isinstance(K, np.ndarray) else K.toarray(), M.toarray(), count)
+        else:
+            omega, shapes = _by_iteration(e, solver, count, progress)
+    return omega, expanded(e, shapes)
+
+
+def _by_iteration(
+    e: EquationsOfMotion, solver: LinearSolver, count: int, progress: Progress | None
+) -> tuple[Array, Array]:
+    """Return ω (count,) and shapes (q, count): the rigid motions that are free, then the lowest others."""
+    constraints, R = e.system.constraint_map, _free_motions(e)
+    further = count - R.shape[1]
+    if further <= 0:
+        return np.zeros(count), R[:, :count]
+    held = constraints.holding(e.free_motions.held[e.system.nodes])
+    kept = np.searchsorted(constraints.free, held.free)
+    solver = replace(solver, constraint_map=held)
+
+    def precondition(r: Array) -> Array:
+        out = np.zeros_like(r)
+        out[kept] = solver.precondition(r[kept])
+        return out
+
+    def times_K(q: Array) -> Array:
+        return constraints.reduce(e.system.K @ constraints.transform(q))
+
+    def times_M(q: Array) -> Array:
+        return constraints.reduce(e.mass.times(constraints.transform(q)))
+
+    norms = solver.norm, float(abs(e.mass.scalar).sum(axis=1).max())
+    known = (R, times_M(R)) if R.shape[1] else None
+    problem = Problem(len(constraints.free), times_K, times_M, precondition, norms, known, progress)
+    squares, shapes = problem.lowest(further)
+    return np.sqrt(np.append(np.zeros(R.shape[1]), squares)), np.hstack([R, shapes])
+
+
+def _free_motions(e: EquationsOfMotion) -> Array:
+    """Return the rigid motions (q, k) that supports leave to each part, φ^T M φ = 1."""
+    constraints = e.system.constraint_map
+    R = e.free_motions.basis()[e.system.nodes].reshape(e.size, -1)
+    L = np.linalg.cholesky(R.T @ e.mass.times(R))
+    return np.asarray(np.linalg.solve(L, R[constraints.free].T).T)
 
 
 def complex_modes(

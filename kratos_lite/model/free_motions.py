@@ -97,6 +97,13 @@ class FreeMotions:
         components = self._by_part(_products(tested, values))[self.part]
         return values - (taken @ components[..., None])[..., 0]
 
+    def basis(self) -> Array:
+        """Return the free motions of all parts (n, 3, k), those of each part 0 elsewhere."""
+        if not self.any:
+            return np.zeros((*self.mesh.points.shape, 0))
+        parts, numbers = np.nonzero(np.arange(self.counts.max()) < self.counts[:, None])
+        return self._pair[0][..., numbers] * (self.part[:, None] == parts)[:, None]
+
     @cached_property
     def held(self) -> Mask:
         """Components (n, 3), one for each free motion, that hold these firmly.

@@ -121,10 +121,11 @@ class ConstrainedSystem:
     @cached_property
     def norm(self) -> float:
         """The largest row sum of |K|."""
-        return self._equations.norm
+        return self.equations.norm
 
     @cached_property
-    def _equations(self) -> LinearSolver:
+    def equations(self) -> LinearSolver:
+        """What solves them."""
         groups = getattr(self.K, "groups", self.groups)  # those of a split matrix have other materials
         level = partial(_p_coarse_level, self.points, groups, self._hanging)
         return LinearSolver(self.K, self.constraint_map, self.points, self.plan, level)
@@ -139,7 +140,7 @@ class ConstrainedSystem:
         """Return the displacements (n, 3) under nodal forces (n, 3), and the Solution."""
         tolerance = self.tolerance if tolerance is None else tolerance
         near = None if start is None else self.gather(start)
-        solution = self._equations.solve(self.gather(forces), tolerance, self.progress, prescribed, near)
+        solution = self.equations.solve(self.gather(forces), tolerance, self.progress, prescribed, near)
         return self.scatter(solution.x), solution
 
     def residual(self, u: Array, forces: Array) -> Array:

@@ -40,6 +40,8 @@ DIRECTIONS = 80
 """Iterations after which they start anew from the residual: their directions are kept until then."""
 REDUCED = 1e-10
 """Fraction of the residual at which they start anew, as rounding allows no more."""
+ROUGH = 0.03
+"""Relative residual of a rough solution."""
 MAX_ITERATIONS = 400
 """Iterations after which it does not converge."""
 DEGREE = 3
@@ -65,6 +67,10 @@ class DisplacementPressure:
             D, S = K.D, self._schur.S
             vectors = self._schur.scale, K.bulk, K.kept, size, INNER, INNER_MAX
             self._kernel = self._cycle.with_pressures(_arrays(D), _arrays(S), *vectors)
+
+    def precondition(self, r: Array) -> Array:
+        """Return about K⁻¹ r: a rough solution."""
+        return self.solve(r, ROUGH, 0.0, None)[0]
 
     def solve(
         self,

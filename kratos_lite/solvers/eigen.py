@@ -1,11 +1,18 @@
-"""Modes: natural frequencies and shapes of K φ = ω² M φ.
+"""Modes: the lowest eigenvalues λ and vectors x of K x = λ M x, both symmetric, M positive definite.
 
-Small problems are solved whole (LAPACK), larger ones by Lanczos with shift and invert (ARPACK).
+Small problems are solved whole (LAPACK).  Of larger ones a block of vectors comes down to the lowest
+energies: each step takes the best of the span of the vectors X, their last step P, and what an approximate
+inverse of K (a cycle of multigrid, or factors) makes of their residuals, W.
+
+Sources: Knyazev, SIAM J. Sci. Comput. 23 (2001) 517-541 (LOBPCG); Hetmaniuk & Lehoucq, J. Comput. Phys. 218
+(2006) 324-332 (its basis); Stathopoulos & Wu, SIAM J. Sci. Comput. 23 (2002) 2165-2182 (dependent vectors).
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -18,14 +25,30 @@ from kratos_lite.validation import whole_number
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-SHIFTS = (1.0, 1e-2, 1e-4, 1e-6)
-"""Factors on the first shift that are tried."""
-RESTARTS = 40
-"""Restarts of Lanczos after which a lower shift is tried."""
+Operator: TypeAlias = Callable[[Array], Array]
+"""Takes vectors (n, k) to vectors (n, k)."""
+Done: TypeAlias = Callable[[Array, Array], bool]
+"""Says from eigenvalues and their relative errors whether they will do."""
+TOLERANCE = 1e-9
+"""Relative error of an eigenvalue; that of its vector is the root of it."""
+GUARDS = 2
+"""Vectors beyond those wanted, and one more for every six of these: what is next to the last comes along."""
+STEPS = 200
+"""Steps after which the iteration does not converge."""
+PATIENCE = 40
+"""Steps without a smaller error after which it does not either."""
+DEPENDENT = 1e-11
+"""Squared size of what a vector adds to the span of others, as a fraction, up to which it is rounding."""
+SECOND, NEAR = 2, 1e-3
+"""Vectors of the second start, and the error up to which its eigenvalues tell whether one was missed."""
 RESIDUAL = 1e-6
 """Fraction of its terms that an equation may miss."""
-ROUNDING = 1e-13
-"""Fraction of the norms of its matrices that it may miss."""
+EPS, ROUNDING = 1e-15, 1e-12
+"""Fraction of the norms of its matrices that it may miss, and where an iteration comes no nearer."""
+RESTARTS = 40
+"""Restarts of Lanczos or Arnoldi after which another shift is tried."""
+ROWS = 1 << 15
+"""Rows of vectors that are combined at once: they stay in the cache."""
 
 
 def modes(
@@ -33,18 +56,28 @@ def modes(
 ) -> tuple[Array, Array]:
     """Return the lowest ω (count,) in rad/s, ascending, and their shapes (n, count) with φ^T M φ = 1."""
     n = K.shape[0]
+    if is_small(n, count):
+        return dense_modes(K.toarray(), M.toarray(), count)
+    shift = 1e-2 * first_shift(K, M)  # motions that nothing holds have λ = 0
+    A = (K + shift * M).tocsr()
+    norms = float(abs(A).sum(axis=1).max()), float(abs(M).sum(axis=1).max())
+    problem = Problem(n, A.__matmul__, M.__matmul__, direct.factorize(A).apply, norms, progress=progress)
+    squares, shapes = problem.lowest(count)
+    return np.sqrt(np.maximum(squares - shift, 0.0)), shapes
+
+
+def is_small(n: int, count: int) -> bool:
+    """Return whether a problem is solved whole; InputError unless it has so many modes."""
     if whole_number(count, "count") > n:
         raise InputError(f"this body has 1 … {n} modes; got {count}")
-    if n <= DENSE_MODES or count > n // 4:
-        squares, shapes = _dense(K.toarray(), M.toarray(), count)
-    else:
-        squares, shapes = _by_iteration(K, M, count, progress)
-    check_residuals([(np.ones(count), K), (-squares, M)], shapes)
-    return np.sqrt(np.maximum(squares, 0.0)), shapes
+    return n <= DENSE_MODES or count > n // 4
 
 
-def _dense(K: Array, M: Array, count: int) -> tuple[Array, Array]:
-    """Return the lowest modes by LAPACK, which finds none where the mass is not positive in its rounding."""
+def dense_modes(K: Array, M: Array, count: int) -> tuple[Array, Array]:
+    """Return the lowest ω (count,) and shapes (n, count) by LAPACK.
+
+    It finds none where the mass is not positive in its rounding.
+    """
     from scipy.linalg import LinAlgError, eigh
 
     try:
@@ -56,41 +89,142 @@ def _dense(K: Array, M: Array, count: int) -> tuple[Array, Array]:
             f"{count} modes cannot be found: stiffness or mass is not positive within rounding; look for "
             "lengths or constants in wrong units, and for very thin elements"
         )
-    return squares, shapes
+    check_residuals([(np.ones(count), K), (-squares, M)], shapes)
+    return np.sqrt(np.maximum(squares, 0.0)), shapes
 
 
-def _by_iteration(K: Any, M: Any, count: int, progress: Progress | None) -> tuple[Array, Array]:
-    """Return the lowest modes by Lanczos on (K + s M)^-1 M, with a shift s that makes K definite.
+@dataclass(frozen=True)
+class Problem:
+    """K x = λ M x of n components, K positive beside the span of known vectors, where λ is 0."""
 
-    Frequencies far below the shift are hard to tell apart: then it comes down.
-    """
-    from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
+    n: int
+    K: Operator
+    M: Operator
+    precondition: Operator  # about K⁻¹
+    norms: tuple[float, float]  # largest row sums of |K| and |M|
+    known: tuple[Array, Array] | None = None  # R (n, k) with R^T M R = 1, and M R
+    progress: Progress | None = None
 
-    n, done, cycle = K.shape[0], 0, max(2 * count + 1, 20)
+    def lowest(self, count: int) -> tuple[Array, Array]:
+        """Return the lowest λ (count,) beside the known ones, ascending, and x (n, count) with x^T M x = 1.
 
-    def solve(b: Array) -> Array:
-        nonlocal done
-        done += 1
-        if progress:
-            progress("modes", done / (done + cycle))  # nobody knows how many cycles it takes
-        return factors.solve(b)
+        After them a few vectors at random look for one that was missed.
+        """
+        smallest = 1.0
 
-    start = np.random.default_rng(0).standard_normal(n)  # the same vector gives the same modes each time
-    inverse = LinearOperator((n, n), matvec=solve, dtype=np.float64)
-    for factor in SHIFTS:
-        shift = factor * first_shift(K, M)
-        if progress:
-            progress("factorize", 0.0)
-        factors = direct.factorize((K + shift * M).tocsr())
-        if progress:
-            progress("factorize", 1.0)
-        try:
-            squares, shapes = eigsh(K, count, M, sigma=-shift, OPinv=inverse, v0=start, maxiter=RESTARTS)
-        except ArpackNoConvergence:
-            continue
-        order = np.argsort(squares)
-        return squares[order], shapes[:, order]
-    raise not_converged(count)
+        def converged(squares: Array, errors: Array) -> bool:
+            nonlocal smallest
+            smallest = min(smallest, max(float(errors[:count].max()), TOLERANCE))
+            if self.progress:
+                self.progress("modes", 0.99 * float(np.log(smallest) / np.log(TOLERANCE)))
+            return smallest <= TOLERANCE
+
+        X = self.precondition(self.M(self._random(count + GUARDS + count // 6)))
+        while True:
+            squares, X, MX = self._descend(X, converged)
+            last = squares[count - 1]
+            R, MR = self.known or (X[:, :0], MX[:, :0])
+            known = np.hstack([R, X[:, :count]]), np.hstack([MR, MX[:, :count]])
+            second = replace(self, known=known, progress=None)
+            start = self.precondition(self.M(self._random(SECOND)))
+
+            def decided(squares: Array, errors: Array) -> bool:
+                lower = squares[0] * (1 - errors[0])
+                return bool(squares[0] < last or lower > last or errors[0] <= NEAR)  # noqa: B023
+
+            others, Y, _ = second._descend(start, decided)
+            if others[0] > (1 - TOLERANCE) * last:
+                self._check(squares[:count], X[:, :count])
+                return squares[:count], X[:, :count]
+            X = np.hstack([X, Y])
+
+    def _descend(self, X: Array, done: Done) -> tuple[Array, Array, Array]:
+        """Return λ, x and M x of as many vectors as X has, from these, when `done`."""
+        m, (W, MW) = X.shape[1], self._independent(X)
+        while W.shape[1] < m:  # thin bodies: one cycle leaves little but their softest motions
+            W, MW = self._independent(np.hstack([W, self._random(m - W.shape[1])]))
+        S, KS, MS = (np.empty((self.n, 3 * m)) for _ in range(3))
+        squares, errors = np.full(m, np.inf), np.full(m, np.inf)
+        used, allowed, best, best_at = 0, EPS, np.inf, 0
+        for step in range(STEPS):
+            new = slice(used, used + W.shape[1])
+            S[:, new], MS[:, new], KS[:, new] = W, MW, self.K(W)
+            used, before = new.stop, squares
+            A, G = (S[:, :used].T @ V[:, :used] for V in (KS, MS))
+            squares, C = _ritz(A, G, m)
+            active = np.flatnonzero((errors > TOLERANCE) | (squares < (1 - TOLERANCE) * before))
+            last = C[:, active]
+            last[:m] = 0.0
+            last -= C @ (C.T @ (G @ last))
+            both = np.hstack([C, last @ _orthonormal(last.T @ G @ last)]) if step else C
+            for V in (S, KS, MS):
+                _combine(V, used, both)
+            residual = KS[:, active] - squares[active] * MS[:, active]
+            W = self.precondition(residual)
+            gaps = np.clip(1 - squares[active] / squares[-1], NEAR, 1.0)  # beyond which others mix in
+            errors[active] = self._errors(residual, W, S[:, active], squares[active], allowed) / gaps
+            if done(squares, errors):
+                return squares, S[:, :m].copy(), MS[:, :m].copy()
+            if np.log(errors + EPS).sum() < best:
+                best, best_at = float(np.log(errors + EPS).sum()), step
+            elif step - best_at > PATIENCE:
+                if allowed == ROUNDING:
+                    break
+                allowed, best_at = ROUNDING, step
+            used = both.shape[1]
+            W, MW = self._independent(W[:, errors[active] > TOLERANCE], S[:, :used], MS[:, :used])
+        raise not_converged(m)
+
+    def _independent(self, W: Array, *basis: Array) -> tuple[Array, Array]:
+        """Return vectors W without what is known or a basis S, given with M S, orthonormal in M, and M W."""
+        spans = [span for span in (self.known, basis) if span]
+        for _ in range(2):
+            for S, MS in spans:
+                W = W - S @ (MS.T @ W)
+            W = W / np.linalg.norm(W, axis=0)
+        MW = self.M(W)
+        Q = _orthonormal(W.T @ MW)
+        return W @ Q, MW @ Q
+
+    def _random(self, count: int) -> Array:
+        """Return vectors (n, count), the same each time."""
+        return np.random.default_rng(count).standard_normal((self.n, count))
+
+    def _check(self, squares: Array, X: Array) -> None:
+        """Raise SolveError unless the energies of vectors are what they should be: x^T K x = λ, x^T M x = 1."""
+        energies, sizes = (np.einsum("ij,ij->j", X, A(X)) for A in (self.K, self.M))
+        off = np.maximum(np.abs(energies - squares) / squares, np.abs(sizes - 1))
+        allowed = RESIDUAL + ROUNDING * self.norms[0] * (X**2).sum(axis=0) / squares
+        check(off, allowed)
+
+    def _errors(self, residual: Array, W: Array, X: Array, squares: Array, allowed: float) -> Array:
+        """Return the relative errors of λ: r^T K⁻¹ r / λ, or 0 where the residual is rounding."""
+        norm_K, norm_M = self.norms
+        rounding = allowed * (norm_K + squares * norm_M) * np.linalg.norm(X, axis=0)
+        energies = np.abs(np.einsum("ij,ij->j", residual, W)) / np.abs(squares)
+        return np.where(np.linalg.norm(residual, axis=0) <= rounding, 0.0, energies)
+
+
+def _orthonormal(G: Array) -> Array:
+    """Return combinations (n, k) that are orthonormal in G, without those that are rounding."""
+    scale = 1 / np.sqrt(np.maximum(np.diag(G), np.finfo(float).tiny))
+    sizes, U = np.linalg.eigh(scale[:, None] * G * scale)
+    keep = sizes > DEPENDENT
+    return scale[:, None] * (U[:, keep] / np.sqrt(sizes[keep]))
+
+
+def _ritz(A: Array, G: Array, count: int) -> tuple[Array, Array]:
+    """Return the lowest λ of A c = λ G c, and c (n, count)."""
+    Q = _orthonormal(G)
+    values, C = np.linalg.eigh(Q.T @ A @ Q)
+    return values[:count], Q @ C[:, :count]
+
+
+def _combine(V: Array, used: int, C: Array) -> None:
+    """Put combinations of the first vectors of V (n, ...) in their places."""
+    for start in range(0, len(V), ROWS):
+        rows = V[start : start + ROWS]
+        rows[:, : C.shape[1]] = rows[:, :used] @ C
 
 
 def first_shift(K: Any, M: Any) -> float:
@@ -112,11 +246,16 @@ def check_residuals(terms: list[tuple[Any, Any]], shapes: Any) -> None:
     norms = sum(np.abs(factor) * float(abs(A).sum(axis=0).max()) for factor, A in terms)
     residual = np.linalg.norm(sum(parts), axis=0)
     size = sum(np.linalg.norm(part, axis=0) for part in parts)
-    allowed = RESIDUAL * size + ROUNDING * norms * np.linalg.norm(shapes, axis=0)
-    if not (residual <= allowed).all():  # nor if it is NaN
-        worst = int(np.argmax(np.nan_to_num(residual / allowed, nan=np.inf)))
+    allowed = RESIDUAL * size + 0.1 * ROUNDING * norms * np.linalg.norm(shapes, axis=0)
+    check(residual / size, allowed / size)
+
+
+def check(errors: Array, allowed: Array) -> None:
+    """Raise SolveError where relative errors of modes (n,) exceed what is allowed."""
+    if not (errors <= allowed).all():  # nor if one is NaN
+        worst = int(np.argmax(np.nan_to_num(errors / allowed, nan=np.inf)))
         raise SolveError(
-            f"mode {worst + 1} misses its equation by {residual[worst] / size[worst]:.1e} of its "
+            f"mode {worst + 1} misses its equation by {errors[worst]:.1e} of its "
             "terms, which is more than rounding explains; ask for another number of modes, and look for very "
             "thin elements, a large stiffness contrast or nearly free parts"
         )

@@ -75,6 +75,16 @@ class LinearSolver:
         solution = self._solve(b, tolerance, progress) if len(b) else self._solution(b, 0, 0.0)
         return replace(solution, x=self.constraint_map.expand(solution.x, c))
 
+    def precondition(self, r: Array) -> Array:
+        """Return about K⁻¹ r of free degrees of freedom (q, k): a cycle of multigrid, or a solution."""
+        if not self.plan.iterates:
+            return self.factors.apply(r)
+        out, free, forces = np.empty_like(r), self.constraint_map.free, np.zeros(len(self.constraint_map.c))
+        for column in range(r.shape[1]):
+            forces[free] = r[:, column]
+            out[:, column] = self._multigrid.precondition(forces)[free]
+        return out
+
     def _solution(self, x: Array, iterations: int, error: float, plan: Plan | None = None) -> Solution:
         plan = self.plan if plan is None else plan
         return Solution(x, plan.method, plan.reason, iterations, error)
@@ -119,7 +129,7 @@ class LinearSolver:
             solution, plan = self._iterate(b, tolerance, progress, continued)
             if plan.iterates:
                 return solution
-        q, A = self._prepared("factors", "factorize", progress).solve(b), self._matrix
+        q, A = self._prepared("factors", "factorize", progress).solve(b), self.reduced_matrix
         return self._solution(q, 0, backward_error(b - A @ q, matrix_norm(A), q, b), plan)
 
     def _prepared(self, name: str, phase: str, progress: Progress | None) -> Any:
@@ -132,7 +142,7 @@ class LinearSolver:
         return prepared
 
     @cached_property
-    def _matrix(self) -> Any:
+    def reduced_matrix(self) -> Any:
         """The reduced matrix: a full array for the method ``dense``, else CSR."""
         T, free = self.constraint_map.T, self.constraint_map.free
         if self.plan.method != "dense":
@@ -143,8 +153,8 @@ class LinearSolver:
     def factors(self) -> direct.Factorization:
         """The reduced matrix factorized."""
         if self.plan.method == "dense":
-            return direct.factorize_dense(self._matrix)
-        return direct.factorize(self._matrix, self.symmetric)
+            return direct.factorize_dense(self.reduced_matrix)
+        return direct.factorize(self.reduced_matrix, self.symmetric)
 
     @cached_property
     def _blocks(self) -> Any:

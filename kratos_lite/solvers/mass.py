@@ -59,9 +59,10 @@ class Mass:
         return np.asarray(self.scalar @ np.ones(len(self._points)))
 
     def times(self, v: Array) -> Array:
-        """Return M v of nodal vectors (3n,)."""
-        nodal = v.reshape(-1, 3)
-        return np.asarray(self.nodal[:, None] * nodal if self.lumped else self.scalar @ nodal).ravel()
+        """Return M v of nodal vectors (3n,) or columns of them (3n, k)."""
+        nodal = v.reshape(len(self.nodal), -1)
+        product = self.nodal[:, None] * nodal if self.lumped else self.scalar @ nodal
+        return np.asarray(product).reshape(v.shape)
 
     def solve(self, b: Array) -> Array:
         """Return M^-1 b of nodal vectors (3n,) or columns of them (3n, k)."""

@@ -42,6 +42,9 @@ class Solver(Protocol):
 
     levels: list[int]
 
+    def precondition(self, r: Array) -> Array:
+        """Return about A⁻¹ r (3n,)."""
+
     def solve(
         self, b: Array, tolerance: float, norm: float, progress: Progress | None, go_on: GoOn | None = None
     ) -> tuple[Array, int, bool]:

@@ -64,7 +64,7 @@ def test_smoothing_is_that_of_the_matrix(kind, material):
     product, K, r = both(model)
     free = np.zeros(len(r), dtype=bool)
     free[system.constraint_map.free] = True
-    linear = system._equations.p_coarse_level()
+    linear = system.equations.p_coarse_level()
     r[~free] = 0.0
     z = [multigrid(A, free, model.mesh.points, linear).precondition(r) for A in (product, K)]
     assert np.abs(z[0] - z[1]).max() < 1e-4 * np.abs(z[1]).max()  # in single precision

@@ -59,7 +59,7 @@ def skew(n=200):
 @pytest.mark.parametrize("backend", SPARSE)
 def test_backends_solve_a_stiffness_matrix(backend, monkeypatch):
     monkeypatch.setattr(direct, "BACKENDS", (backend,))
-    A = block()._matrix
+    A = block().reduced_matrix
     b = right_side(A.shape[0])
     factors = direct.factorize(A)
     assert factors.method == backend.__name__
@@ -77,7 +77,7 @@ def test_backends_solve_a_matrix_that_is_not_symmetric(backend, monkeypatch):
 
 
 def test_dense_factors_solve_both_kinds():
-    for A in (block()._matrix.toarray(), skew()):
+    for A in (block().reduced_matrix.toarray(), skew()):
         b = right_side(len(A))
         factors = direct.factorize_dense(A)
         assert factors.method == "dense"
@@ -168,7 +168,7 @@ def test_a_system_that_nobody_needs_is_gone_with_its_factors():
     mesh, supports = model.mesh, model.supports.constraint_map
     system = ConstrainedSystem(mesh.points, model.element_groups(), supports, solver="direct")
     system.solve(np.ones((mesh.n_nodes, 3)))
-    factors = weakref.ref(system._equations.factors)
+    factors = weakref.ref(system.equations.factors)
     gc.disable()
     try:
         del system

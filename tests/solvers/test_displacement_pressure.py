@@ -57,7 +57,7 @@ def both_ways(system):
     """Solve by the kernels, then without them."""
     forces = np.random.default_rng(0).standard_normal(system.points.shape)
     compiled = system.solve(forces, tolerance=1e-8)
-    system._equations._multigrid._kernel = None
+    system.equations._multigrid._kernel = None
     return compiled, system.solve(forces, tolerance=1e-8)
 
 
@@ -370,7 +370,7 @@ def test_both_start_anew_from_what_is_left(monkeypatch):
 
 @compiled
 def test_the_kernel_refuses_what_does_not_fit():
-    equations = system_of(body("EnhancedStrain3D8N", cells=3))._equations
+    equations = system_of(body("EnhancedStrain3D8N", cells=3)).equations
     solver = equations._multigrid
     D, S = (displacement_pressure._arrays(A) for A in (equations.K.D, solver._schur.S))
     vectors = [solver._schur.scale, equations.K.bulk, equations.K.kept, solver._weight]

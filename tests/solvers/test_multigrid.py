@@ -260,7 +260,7 @@ def test_the_origin_does_not_matter(path):
 @pytest.mark.parametrize(("kind", "n"), [("8N", 10), ("8N", 16), ("20N", 4)])
 def test_iterations_do_not_grow_with_the_mesh(path, kind, n):
     system, b = equations(clamped(box((1, 1, 1), (n, n, n), kind)))
-    solver = system._equations._multigrid
+    solver = system.equations._multigrid
     x, iterations, converged = solver.solve(b, 1e-10, system.norm, None)
     assert converged
     assert iterations <= 25
@@ -308,7 +308,7 @@ def equations(model):
 def solver_of(model):
     """Return a solver, its right side and the norm of its matrix."""
     system, b = equations(model)
-    return system._equations._multigrid, b, system.norm
+    return system.equations._multigrid, b, system.norm
 
 
 CYCLES = ["clamped 8N", "clamped 10N", "clamped 20N", "partly fixed", "bodies", "bar", "contrast"]
