@@ -19,15 +19,19 @@ from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.linear_solver import LinearSolver
 from kratos_lite.solvers.mass import Mass
-from kratos_lite.solvers.plan import Plan, repeated
+from kratos_lite.solvers.plan import Plan, stepped
 from kratos_lite.typing import Array, Mask, Progress
 from kratos_lite.validation import finite
 
 if TYPE_CHECKING:
-    pass
+    from kratos_lite.solvers.coarse_level import PCoarseLevel
 
-Solve: TypeAlias = Callable[[Array, Array], Array]
-"""Takes nodal forces and prescribed displacements (3a,), returns displacements (3a,)."""
+Solve: TypeAlias = Callable[[Array, Array, "Array | None"], Array]
+"""Takes nodal forces, prescribed displacements and a start (3a,) or None, returns displacements (3a,)."""
+
+
+STEP_TOLERANCE, OF_START = 1e-10, 1e-6
+"""Relative residual of a step, and as a fraction of that of its start, which misses as much as a step does."""
 
 
 class EquationsOfMotion:
@@ -208,9 +212,8 @@ class EquationsOfMotion:
 
     def matrix(self, time: float, m: float, c: float, k: float) -> BlockMatrix:
         """Return m M + c C + k K at a time, (3a, 3a)."""
-        K = self.K
-        A = BlockMatrix((k + c * self.rayleigh[1]) * K.data, K.indices, K.indptr)
-        scalar = m * self.mass.data
+        A = self._elastic(m, 0.0, k + c * self.rayleigh[1])
+        scalar = np.zeros(len(A.data))
         for factor, made in ((c, self.damping_terms), (k, self.stiffness_terms)):
             if factor and (terms := made(time)) is not None:
                 scalar = scalar + factor * terms
@@ -219,11 +222,19 @@ class EquationsOfMotion:
             A.data += c * self.dashpots.data
         return A
 
+    def _elastic(self, m: float, c: float, k: float) -> BlockMatrix:
+        """Return m M + c C + k K without what a motion adds, (3a, 3a)."""
+        K, (alpha, beta) = self.K, self.rayleigh
+        A = BlockMatrix((k + c * beta) * K.data, K.indices, K.indptr)
+        A.add_scalar((m + c * alpha) * self.mass.data)
+        return A
+
     def solver(self, time: float, m: float, c: float, k: float) -> Solve:
         """Return what solves (m M + c C + k K) u = f + reactions; kept as long as the matrix is the same."""
         key = m, c, k, *self.rates(time)
         if self._kept is None or self._kept[0] != key:
-            self._kept = key, self._solver(self.matrix(time, m, c, k), self.is_symmetric(time, c))
+            near = None if self.is_symmetric(time, c) else self._elastic(m, c, k)
+            self._kept = key, self._solver(self.matrix(time, m, c, k), near, m, k)
         return self._kept[1]
 
     def rates(self, time: float) -> tuple[float, float]:
@@ -249,16 +260,28 @@ class EquationsOfMotion:
         damped = bool(self.terms and self.terms.motion.damping)
         return not (acceleration or (rate and (c or damped)))
 
-    def _solver(self, A: BlockMatrix, symmetric: bool) -> Solve:
-        constraints = self.system.constraint_map
-        plan = repeated("auto", len(constraints.free), symmetric)
-        equations = LinearSolver(A, constraints, self.system.points, plan, symmetric=symmetric)
-        return partial(_solved, equations, self.system.progress)
+    def _solver(self, A: BlockMatrix, near: BlockMatrix | None, m: float, k: float) -> Solve:
+        """Return what solves A x = f; `near` is what it has beside skew parts, if it is not symmetric."""
+        system, constraints = self.system, self.system.constraint_map
+        plan, level = stepped(len(constraints.free)), partial(self._p_coarse_level, m, k)
+        make = partial(LinearSolver, constraint_map=constraints, points=system.points, plan=plan)
+        if near is None or not plan.iterates:
+            equations = make(A, p_coarse_level=level, symmetric=near is None)
+        else:
+            equations = make(A, symmetric=False, near=make(near, p_coarse_level=level))
+        return partial(_solved, equations, system.progress)
+
+    def _p_coarse_level(self, m: float, k: float) -> PCoarseLevel | None:
+        make = self.system.equations.p_coarse_level
+        level = make() if make else None
+        return level and level.with_mass(k, m * self.mass.nodal)
 
 
-def _solved(equations: LinearSolver, progress: Progress | None, f: Array, prescribed: Array) -> Array:
+def _solved(
+    equations: LinearSolver, progress: Progress | None, f: Array, prescribed: Array, start: Array | None
+) -> Array:
     """Return displacements (3a,); no lambda, as an analysis can be pickled."""
-    return equations.solve(f, 1e-13, progress, prescribed).x
+    return equations.solve(f, STEP_TOLERANCE, progress, prescribed, start, OF_START).x
 
 
 def _checked_rayleigh(rayleigh: tuple[float, float]) -> tuple[float, float]:

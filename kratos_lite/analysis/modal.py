@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -50,9 +51,9 @@ def _by_iteration(
 ) -> tuple[Array, Array]:
     """Return ω (count,) and shapes (q, count): the rigid motions that are free, then the lowest others."""
     constraints, R = e.system.constraint_map, _free_motions(e)
-    further = count - R.shape[1]
+    further = count - len(R)
     if further <= 0:
-        return np.zeros(count), R[:, :count]
+        return np.zeros(count), R[:count].T
     held = constraints.holding(e.free_motions.held[e.system.nodes])
     kept = np.searchsorted(constraints.free, held.free)
     solver = replace(solver, constraint_map=held)
@@ -62,25 +63,22 @@ def _by_iteration(
         out[kept] = solver.precondition(r[kept])
         return out
 
-    def times_K(q: Array) -> Array:
-        return constraints.reduce(e.system.K @ constraints.transform(q))
+    def reduced_product(times: Callable[[Array], Array]) -> Callable[[Array], Array]:
+        return lambda q: constraints.reduce(times(np.stack([constraints.transform(x) for x in q])).T).T
 
-    def times_M(q: Array) -> Array:
-        return constraints.reduce(e.mass.times(constraints.transform(q)))
-
+    times_K, times_M = reduced_product(solver.times), reduced_product(e.mass.times)
     norms = solver.norm, float(abs(e.mass.scalar).sum(axis=1).max())
-    known = (R, times_M(R)) if R.shape[1] else None
+    known = (R, times_M(R)) if len(R) else None
     problem = Problem(len(constraints.free), times_K, times_M, precondition, norms, known, progress)
     squares, shapes = problem.lowest(further)
-    return np.sqrt(np.append(np.zeros(R.shape[1]), squares)), np.hstack([R, shapes])
+    return np.sqrt(np.append(np.zeros(len(R)), squares)), np.vstack([R, shapes]).T
 
 
 def _free_motions(e: EquationsOfMotion) -> Array:
-    """Return the rigid motions (q, k) that supports leave to each part, φ^T M φ = 1."""
-    constraints = e.system.constraint_map
-    R = e.free_motions.basis()[e.system.nodes].reshape(e.size, -1)
-    L = np.linalg.cholesky(R.T @ e.mass.times(R))
-    return np.asarray(np.linalg.solve(L, R[constraints.free].T).T)
+    """Return the rigid motions (k, q) that supports leave to each part, φ^T M φ = 1."""
+    R = np.ascontiguousarray(e.free_motions.basis()[e.system.nodes].reshape(e.size, -1).T)
+    L = np.linalg.cholesky(R @ e.mass.times(R).T)
+    return np.linalg.solve(L, R[:, e.system.constraint_map.free])
 
 
 def complex_modes(

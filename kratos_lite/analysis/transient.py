@@ -148,7 +148,7 @@ class TransientAnalysis:
         """Return a of M a = f - C v - K u + reactions, with the acceleration of what is prescribed."""
         e, time = self.equations, self.time
         force = e.load(time) - e.times_damping(self.v, time) - e.times_stiffness(self.u, time)
-        return e.solver(time, 1.0, 0.0, 0.0)(force, prescribed)
+        return e.mass.solve_constrained(force, e.system.constraint_map, prescribed)
 
     # ---- steps -----------------------------------------------------------------------------------
 

@@ -43,9 +43,13 @@ class BlockMatrix:
 
     def __matmul__(self, x: Array) -> Array:
         """Return A x of a vector (3n,)."""
+        return self.times(x) if x.ndim == 1 else self.scipy() @ x
+
+    def times(self, x: Array) -> Array:
+        """Return A x of a vector (3n,), or of several (k, 3n), which read the matrix together."""
         compiled = kernels("sparse")
-        if compiled is None or x.ndim != 1:
-            return self.scipy() @ x
+        if compiled is None:
+            return np.asarray((self.scipy() @ x.T).T)
         x = np.ascontiguousarray(x, dtype=float)
         return compiled.multiply(self.indptr, self.indices, self.data, x)
 

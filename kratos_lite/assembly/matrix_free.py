@@ -67,9 +67,7 @@ class MatrixFree:
         return 3 * len(self.points), 3 * len(self.points)
 
     def __matmul__(self, x: Array) -> Array:
-        """Return K x of a vector (3n,) or columns (3n, k)."""
-        if x.ndim == 2:
-            return np.stack([self @ column for column in x.T], axis=1)
+        """Return K x of a vector (3n,)."""
         return self.product.times(np.ascontiguousarray(x, dtype=float), self.tied)
 
     def norm(self) -> float:

@@ -23,37 +23,73 @@ struct BlockMatrix : Graph {
     uint32_t columns;
 };
 
-// y = A x for some rows of blocks; false at an index that is no column.  Four lanes hold the products of one
-// column of a block, so that a row of blocks costs three multiply-adds each and one sum at its end.
+// y = A x of `count` vectors for some rows of blocks; false at an index that is no column.  Four lanes hold the
+// products of one column of a block, so that a row of blocks costs three multiply-adds each and one sum at its end.
+template <int count>
 KL_INLINE bool multiply_rows(const BlockMatrix& A, const double* from, double* y, int64_t first, int64_t last) {
     typedef vec<double, 4> Vec;
+    const int64_t in = 3 * int64_t{A.columns}, out = 3 * A.rows;
     for (int64_t i = first; i < last; ++i) {
-        Vec s0 = {}, s1 = {}, s2 = {};
+        Vec s[count][3] = {};
         for (int32_t k = A.indptr[i]; k < A.indptr[i + 1]; ++k) {
             const double* a = A.data + 9 * static_cast<int64_t>(k);
             const uint32_t j = static_cast<uint32_t>(A.indices[k]);
             if (j >= A.columns) return false;
-            const double* x = from + 3 * static_cast<int64_t>(j);
-            const Vec v = {x[0], x[1], x[2], 0};
             const Vec a2 = {a[6], a[7], a[8], 0};  // the fourth lane would lie beyond the block
-            s0 += *reinterpret_cast<const Vec*>(a) * v;
-            s1 += *reinterpret_cast<const Vec*>(a + 3) * v;
-            s2 += a2 * v;
+            for (int v = 0; v < count; ++v) {
+                const double* x = from + v * in + 3 * static_cast<int64_t>(j);
+                const Vec at = {x[0], x[1], x[2], 0};
+                s[v][0] += *reinterpret_cast<const Vec*>(a) * at;
+                s[v][1] += *reinterpret_cast<const Vec*>(a + 3) * at;
+                s[v][2] += a2 * at;
+            }
         }
-        y[3 * i] = s0[0] + s0[1] + s0[2];
-        y[3 * i + 1] = s1[0] + s1[1] + s1[2];
-        y[3 * i + 2] = s2[0] + s2[1] + s2[2];
+        for (int v = 0; v < count; ++v)
+            for (int c = 0; c < 3; ++c) y[v * out + 3 * i + c] = s[v][c][0] + s[v][c][1] + s[v][c][2];
     }
     return true;
 }
 
-inline void multiply(const BlockMatrix& A, const double* x, double* y) {
-    parallel_ranges(A.rows, ROW_GRAIN, [&](int64_t first, int64_t last) {
-        dispatch<double>([=](auto) KL_INLINE_LAMBDA {
-            if (!multiply_rows(A, x, y, first, last))
-                throw std::invalid_argument("an index is no column of the matrix");
+// The same of a matrix with one number for all three components.
+template <int count>
+KL_INLINE bool multiply_scalar_rows(const BlockMatrix& A, const double* from, double* y, int64_t first, int64_t last) {
+    typedef vec<double, 4> Vec;
+    const int64_t in = 3 * int64_t{A.columns}, out = 3 * A.rows;
+    for (int64_t i = first; i < last; ++i) {
+        Vec s[count] = {};
+        for (int32_t k = A.indptr[i]; k < A.indptr[i + 1]; ++k) {
+            const uint32_t j = static_cast<uint32_t>(A.indices[k]);
+            if (j >= A.columns) return false;
+            for (int v = 0; v < count; ++v) {
+                const double* x = from + v * in + 3 * static_cast<int64_t>(j);
+                s[v] += A.data[k] * Vec{x[0], x[1], x[2], 0};
+            }
+        }
+        for (int v = 0; v < count; ++v)
+            for (int c = 0; c < 3; ++c) y[v * out + 3 * i + c] = s[v][c];
+    }
+    return true;
+}
+
+// y = A x of one vector, or of `count` ones, each behind the other; four read the matrix once.
+inline void multiply(const BlockMatrix& A, const double* x, double* y, int64_t count = 1, bool scalar = false) {
+    constexpr int TOGETHER = 4;
+    while (count > 0) {
+        const bool many = count >= TOGETHER;
+        parallel_ranges(A.rows, ROW_GRAIN, [&](int64_t first, int64_t last) {
+            dispatch<double>([=](auto) KL_INLINE_LAMBDA {
+                const bool fits = scalar ? many ? multiply_scalar_rows<TOGETHER>(A, x, y, first, last)
+                                                : multiply_scalar_rows<1>(A, x, y, first, last)
+                                  : many ? multiply_rows<TOGETHER>(A, x, y, first, last)
+                                         : multiply_rows<1>(A, x, y, first, last);
+                if (!fits) throw std::invalid_argument("an index is no column of the matrix");
+            });
         });
-    });
+        const int done = many ? TOGETHER : 1;
+        count -= done;
+        x += done * 3 * int64_t{A.columns};
+        y += done * 3 * A.rows;
+    }
 }
 
 // The largest sum of |A| over a row.

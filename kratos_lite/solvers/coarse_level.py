@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -46,6 +46,18 @@ class PCoarseLevel:
     def K(self) -> BlockMatrix:
         """The stiffness matrix (3m, 3m) of the linear elements on the corner nodes."""
         return self.assemble()
+
+    def with_mass(self, k: float, nodal: Array) -> PCoarseLevel:
+        """Return the level of k K + M, with masses of all nodes (n,) lumped at the corners."""
+        fine = np.repeat(np.arange(len(self.indptr) - 1), np.diff(self.indptr))
+        lumped: Array = np.bincount(self.indices, self.weights * nodal[fine], len(self.nodes)).astype(float)
+
+        def assemble() -> BlockMatrix:
+            A = BlockMatrix(k * self.K.data, self.K.indices, self.K.indptr)
+            A.add_scalar(lumped, A.diagonal_blocks())
+            return A
+
+        return replace(self, assemble=assemble)
 
 
 SAMPLE = 2000

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 Operator: TypeAlias = Callable[[Array], Array]
-"""Takes vectors (n, k) to vectors (n, k)."""
+"""Takes vectors (k, n) to vectors (k, n)."""
 Done: TypeAlias = Callable[[Array, Array], bool]
 """Says from eigenvalues and their relative errors whether they will do."""
 TOLERANCE = 1e-9
@@ -41,14 +41,16 @@ DEPENDENT = 1e-11
 """Squared size of what a vector adds to the span of others, as a fraction, up to which it is rounding."""
 SECOND, NEAR = 2, 1e-3
 """Vectors of the second start, and the error up to which its eigenvalues tell whether one was missed."""
+CANCELLED = 0.01
+"""Length that a vector of length 1 has left without the span of others, below which rounding tells."""
 RESIDUAL = 1e-6
 """Fraction of its terms that an equation may miss."""
 EPS, ROUNDING = 1e-15, 1e-12
 """Fraction of the norms of its matrices that it may miss, and where an iteration comes no nearer."""
 RESTARTS = 40
 """Restarts of Lanczos or Arnoldi after which another shift is tried."""
-ROWS = 1 << 15
-"""Rows of vectors that are combined at once: they stay in the cache."""
+COLUMNS = 1 << 14
+"""Components of vectors that are combined at once: they stay in the cache."""
 
 
 def modes(
@@ -61,9 +63,10 @@ def modes(
     shift = 1e-2 * first_shift(K, M)  # motions that nothing holds have λ = 0
     A = (K + shift * M).tocsr()
     norms = float(abs(A).sum(axis=1).max()), float(abs(M).sum(axis=1).max())
-    problem = Problem(n, A.__matmul__, M.__matmul__, direct.factorize(A).apply, norms, progress=progress)
+    solve = direct.factorize(A).apply
+    problem = Problem(n, lambda X: (A @ X.T).T, lambda X: (M @ X.T).T, solve, norms, progress=progress)
     squares, shapes = problem.lowest(count)
-    return np.sqrt(np.maximum(squares - shift, 0.0)), shapes
+    return np.sqrt(np.maximum(squares - shift, 0.0)), shapes.T
 
 
 def is_small(n: int, count: int) -> bool:
@@ -95,18 +98,21 @@ def dense_modes(K: Array, M: Array, count: int) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class Problem:
-    """K x = λ M x of n components, K positive beside the span of known vectors, where λ is 0."""
+    """K x = λ M x of n components, K positive beside the span of known vectors, where λ is 0.
+
+    Vectors are rows of arrays (k, n).
+    """
 
     n: int
     K: Operator
     M: Operator
-    precondition: Operator  # about K⁻¹
+    precondition: Callable[[Array], Array]  # about K⁻¹, of one vector (n,)
     norms: tuple[float, float]  # largest row sums of |K| and |M|
-    known: tuple[Array, Array] | None = None  # R (n, k) with R^T M R = 1, and M R
+    known: tuple[Array, Array] | None = None  # R (k, n) with R M R^T = 1, and R M
     progress: Progress | None = None
 
     def lowest(self, count: int) -> tuple[Array, Array]:
-        """Return the lowest λ (count,) beside the known ones, ascending, and x (n, count) with x^T M x = 1.
+        """Return the lowest λ (count,) beside the known ones, ascending, and x (count, n) with x M x^T = 1.
 
         After them a few vectors at random look for one that was missed.
         """
@@ -119,52 +125,58 @@ class Problem:
                 self.progress("modes", 0.99 * float(np.log(smallest) / np.log(TOLERANCE)))
             return smallest <= TOLERANCE
 
-        X = self.precondition(self.M(self._random(count + GUARDS + count // 6)))
+        X = self._start(count + GUARDS + count // 6)
         while True:
             squares, X, MX = self._descend(X, converged)
             last = squares[count - 1]
-            R, MR = self.known or (X[:, :0], MX[:, :0])
-            known = np.hstack([R, X[:, :count]]), np.hstack([MR, MX[:, :count]])
-            second = replace(self, known=known, progress=None)
-            start = self.precondition(self.M(self._random(SECOND)))
+            R, MR = self.known or (X[:0], MX[:0])
+            known = np.vstack([R, X[:count]]), np.vstack([MR, MX[:count]])
 
             def decided(squares: Array, errors: Array) -> bool:
-                lower = squares[0] * (1 - errors[0])
+                lower = squares[0] - errors[0] * abs(squares[0])
                 return bool(squares[0] < last or lower > last or errors[0] <= NEAR)  # noqa: B023
 
-            others, Y, _ = second._descend(start, decided)
-            if others[0] > (1 - TOLERANCE) * last:
-                self._check(squares[:count], X[:, :count])
-                return squares[:count], X[:, :count]
-            X = np.hstack([X, Y])
+            others, Y, _ = replace(self, known=known)._descend(self._start(SECOND), decided)
+            if others[0] > last - TOLERANCE * abs(last):
+                self._check(squares[:count], X[:count])
+                return squares[:count], X[:count]
+            X = np.vstack([X, Y])
+
+    def _start(self, count: int) -> Array:
+        """Return vectors (count, n) in which low modes are large, the same each time."""
+        return self._preconditioned(self.M(_random(count, self.n)))
+
+    def _preconditioned(self, X: Array) -> Array:
+        return np.stack([self.precondition(x) for x in X])
 
     def _descend(self, X: Array, done: Done) -> tuple[Array, Array, Array]:
         """Return λ, x and M x of as many vectors as X has, from these, when `done`."""
-        m, (W, MW) = X.shape[1], self._independent(X)
-        while W.shape[1] < m:  # thin bodies: one cycle leaves little but their softest motions
-            W, MW = self._independent(np.hstack([W, self._random(m - W.shape[1])]))
-        S, KS, MS = (np.empty((self.n, 3 * m)) for _ in range(3))
+        m, (W, MW) = len(X), self._independent(X)
+        while len(W) < m:  # thin bodies: one cycle leaves little but their softest motions
+            W, MW = self._independent(np.vstack([W, _random(m - len(W), self.n)]))
+        S, KS, MS = (np.empty((3 * m, self.n)) for _ in range(3))
         squares, errors = np.full(m, np.inf), np.full(m, np.inf)
         used, allowed, best, best_at = 0, EPS, np.inf, 0
         for step in range(STEPS):
-            new = slice(used, used + W.shape[1])
-            S[:, new], MS[:, new], KS[:, new] = W, MW, self.K(W)
+            new = slice(used, used + len(W))
+            S[new], MS[new], KS[new] = W, MW, self.K(W)
             used, before = new.stop, squares
-            A, G = (S[:, :used].T @ V[:, :used] for V in (KS, MS))
+            A, G = (S[:used] @ V[:used].T for V in (KS, MS))
             squares, C = _ritz(A, G, m)
-            active = np.flatnonzero((errors > TOLERANCE) | (squares < (1 - TOLERANCE) * before))
+            active = np.flatnonzero((errors > TOLERANCE) | (squares < before - TOLERANCE * np.abs(squares)))
             last = C[:, active]
             last[:m] = 0.0
             last -= C @ (C.T @ (G @ last))
             both = np.hstack([C, last @ _orthonormal(last.T @ G @ last)]) if step else C
             for V in (S, KS, MS):
-                _combine(V, used, both)
-            residual = KS[:, active] - squares[active] * MS[:, active]
-            W = self.precondition(residual)
-            gaps = np.clip(1 - squares[active] / squares[-1], NEAR, 1.0)  # beyond which others mix in
-            errors[active] = self._errors(residual, W, S[:, active], squares[active], allowed) / gaps
+                _combine(V, both)
+            residual = KS[active] - squares[active, None] * MS[active]
+            W = self._preconditioned(residual)
+            gaps = (squares[-1] - squares[active]) / np.abs(squares[-1])  # beyond which others mix in
+            errors[active] = self._errors(residual, W, S[active], squares[active], allowed)
+            errors[active] /= np.clip(gaps, NEAR, 1.0)
             if done(squares, errors):
-                return squares, S[:, :m].copy(), MS[:, :m].copy()
+                return squares, S[:m], MS[:m]
             if np.log(errors + EPS).sum() < best:
                 best, best_at = float(np.log(errors + EPS).sum()), step
             elif step - best_at > PATIENCE:
@@ -172,37 +184,43 @@ class Problem:
                     break
                 allowed, best_at = ROUNDING, step
             used = both.shape[1]
-            W, MW = self._independent(W[:, errors[active] > TOLERANCE], S[:, :used], MS[:, :used])
+            W, MW = self._independent(W[errors[active] > TOLERANCE], S[:used], MS[:used])
         raise not_converged(m)
 
     def _independent(self, W: Array, *basis: Array) -> tuple[Array, Array]:
-        """Return vectors W without what is known or a basis S, given with M S, orthonormal in M, and M W."""
+        """Return vectors W without what is known or a basis S, given with S M, orthonormal in M, and W M."""
         spans = [span for span in (self.known, basis) if span]
-        for _ in range(2):
+        cancelled = True
+        while cancelled:  # again where much has gone: what is left is rounded, then
+            W = W / np.maximum(_lengths(W), np.finfo(float).tiny)[:, None]
             for S, MS in spans:
-                W = W - S @ (MS.T @ W)
-            W = W / np.linalg.norm(W, axis=0)
+                W -= (W @ MS.T) @ S
+            cancelled = bool((_lengths(W) < CANCELLED).any())
         MW = self.M(W)
-        Q = _orthonormal(W.T @ MW)
-        return W @ Q, MW @ Q
-
-    def _random(self, count: int) -> Array:
-        """Return vectors (n, count), the same each time."""
-        return np.random.default_rng(count).standard_normal((self.n, count))
+        Q = _orthonormal(W @ MW.T).T
+        return Q @ W, Q @ MW
 
     def _check(self, squares: Array, X: Array) -> None:
-        """Raise SolveError unless the energies of vectors are what they should be: x^T K x = λ, x^T M x = 1."""
-        energies, sizes = (np.einsum("ij,ij->j", X, A(X)) for A in (self.K, self.M))
-        off = np.maximum(np.abs(energies - squares) / squares, np.abs(sizes - 1))
-        allowed = RESIDUAL + ROUNDING * self.norms[0] * (X**2).sum(axis=0) / squares
-        check(off, allowed)
+        """Raise SolveError unless the energies of vectors are as they should be: x K x^T = λ, x M x^T = 1."""
+        energies, sizes = (np.einsum("ij,ij->i", X, A(X)) for A in (self.K, self.M))
+        off = np.maximum(np.abs(energies - squares) / np.abs(squares), np.abs(sizes - 1))
+        check(off, RESIDUAL + ROUNDING * self.norms[0] * _lengths(X) ** 2 / np.abs(squares))
 
     def _errors(self, residual: Array, W: Array, X: Array, squares: Array, allowed: float) -> Array:
-        """Return the relative errors of λ: r^T K⁻¹ r / λ, or 0 where the residual is rounding."""
+        """Return the relative errors of λ: r K⁻¹ r^T / λ, or 0 where the residual is rounding."""
         norm_K, norm_M = self.norms
-        rounding = allowed * (norm_K + squares * norm_M) * np.linalg.norm(X, axis=0)
-        energies = np.abs(np.einsum("ij,ij->j", residual, W)) / np.abs(squares)
-        return np.where(np.linalg.norm(residual, axis=0) <= rounding, 0.0, energies)
+        rounding = allowed * (norm_K + squares * norm_M) * _lengths(X)
+        energies = np.abs(np.einsum("ij,ij->i", residual, W)) / np.abs(squares)
+        return np.where(_lengths(residual) <= rounding, 0.0, energies)
+
+
+def _random(count: int, n: int) -> Array:
+    """Return vectors (count, n), the same each time."""
+    return np.random.default_rng(count).standard_normal((count, n))
+
+
+def _lengths(X: Array) -> Array:
+    return np.sqrt(np.einsum("ij,ij->i", X, X))
 
 
 def _orthonormal(G: Array) -> Array:
@@ -210,7 +228,7 @@ def _orthonormal(G: Array) -> Array:
     scale = 1 / np.sqrt(np.maximum(np.diag(G), np.finfo(float).tiny))
     sizes, U = np.linalg.eigh(scale[:, None] * G * scale)
     keep = sizes > DEPENDENT
-    return scale[:, None] * (U[:, keep] / np.sqrt(sizes[keep]))
+    return np.asarray(scale[:, None] * (U[:, keep] / np.sqrt(sizes[keep])))
 
 
 def _ritz(A: Array, G: Array, count: int) -> tuple[Array, Array]:
@@ -220,11 +238,12 @@ def _ritz(A: Array, G: Array, count: int) -> tuple[Array, Array]:
     return values[:count], Q @ C[:, :count]
 
 
-def _combine(V: Array, used: int, C: Array) -> None:
-    """Put combinations of the first vectors of V (n, ...) in their places."""
-    for start in range(0, len(V), ROWS):
-        rows = V[start : start + ROWS]
-        rows[:, : C.shape[1]] = rows[:, :used] @ C
+def _combine(V: Array, C: Array) -> None:
+    """Put combinations C (k, m) of the first k vectors of V in the places of the first m."""
+    k, m = C.shape
+    for start in range(0, V.shape[1], COLUMNS):
+        some = slice(start, start + COLUMNS)
+        V[:m, some] = C.T @ V[:k, some]
 
 
 def first_shift(K: Any, M: Any) -> float:

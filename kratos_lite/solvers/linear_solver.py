@@ -11,6 +11,7 @@ import numpy as np
 
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.matrix_free import MatrixFree
+from kratos_lite.errors import SolveError
 from kratos_lite.solvers import direct
 from kratos_lite.solvers.constraint_map import ConstraintMap
 from kratos_lite.solvers.iteration import ConvergenceForecast
@@ -20,6 +21,9 @@ from kratos_lite.typing import Array, Ints, Progress
 if TYPE_CHECKING:
     from kratos_lite.solvers.coarse_level import PCoarseLevel
     from kratos_lite.solvers.multigrid import Solver
+
+RESTART, MAX_RESTARTS = 30, 20
+"""Iterations of GMRES after which it starts anew, and how often."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +49,8 @@ class LinearSolver:
     points: Array  # (n, 3) m, from which multigrid knows the rigid modes
     plan: Plan  # how it is solved
     p_coarse_level: Callable[[], PCoarseLevel | None] | None = None
-    symmetric: bool = True  # positive definite, too; otherwise the plan is ``dense`` or ``direct``
+    symmetric: bool = True  # positive definite, too
+    near: LinearSolver | None = None  # of a matrix that is, and not far from K, where K is not
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what is pickled: what a method has prepared lives outside of Python, and is made anew."""
@@ -58,11 +63,13 @@ class LinearSolver:
         progress: Progress | None = None,
         prescribed: Array | None = None,
         start: Array | None = None,
+        reduction: float = 1.0,
     ) -> Solution:
         """Return the displacements (3n,) under nodal forces f (3n,) as a Solution.
 
         `prescribed` displacements (3n,) take the place of c of the constraint map.  An iteration begins at
-        `start` (3n,), of which the free components count, if that is nearer than 0.
+        `start` (3n,), of which the free components count, if that is nearer than 0; then it ends not before
+        the residual of the start is reduced to a fraction.
         """
         c = self.constraint_map.c if prescribed is None else prescribed
         b = self.constraint_map.reduce(f - self.K @ c)
@@ -71,19 +78,21 @@ class LinearSolver:
             start = self.constraint_map.expand((start - c)[self.constraint_map.free], c)
             residual, size = self.constraint_map.reduce(f - self.K @ start), float(np.linalg.norm(b))
             if np.linalg.norm(residual) <= size:
-                return self._continue(f, start, residual, size, tolerance, progress)
+                return self._continue(f, start, residual, size, (tolerance, reduction), progress)
         solution = self._solve(b, tolerance, progress) if len(b) else self._solution(b, 0, 0.0)
         return replace(solution, x=self.constraint_map.expand(solution.x, c))
 
+    def times(self, u: Array) -> Array:
+        """Return K u of several vectors (k, N)."""
+        return self.K.times(u) if isinstance(self.K, BlockMatrix) else np.stack([self.K @ each for each in u])
+
     def precondition(self, r: Array) -> Array:
-        """Return about K⁻¹ r of free degrees of freedom (q, k): a cycle of multigrid, or a solution."""
+        """Return about K⁻¹ r of free degrees of freedom (q,): a cycle of multigrid, or a solution."""
         if not self.plan.iterates:
             return self.factors.apply(r)
-        out, free, forces = np.empty_like(r), self.constraint_map.free, np.zeros(len(self.constraint_map.c))
-        for column in range(r.shape[1]):
-            forces[free] = r[:, column]
-            out[:, column] = self._multigrid.precondition(forces)[free]
-        return out
+        forces = np.zeros(len(self.constraint_map.c))
+        forces[self.constraint_map.free] = r
+        return self._multigrid.precondition(forces)[self.constraint_map.free]
 
     def _solution(self, x: Array, iterations: int, error: float, plan: Plan | None = None) -> Solution:
         plan = self.plan if plan is None else plan
@@ -107,12 +116,15 @@ class LinearSolver:
         start: Array,
         residual: Array,
         size: float,
-        tolerance: float,
+        limits: tuple[float, float],
         progress: Progress | None,
     ) -> Solution:
-        """Solve for the residual of the displacements `start` under a load of norm `size`."""
+        """Solve for the residual of the displacements `start` under a load of norm `size`.
+
+        `limits` are fractions of this norm, and of that of the residual.
+        """
         norm, rounding = float(np.linalg.norm(residual)), 2 * float(np.finfo(float).eps)
-        aim = max(tolerance * size, rounding * (self.norm * float(np.linalg.norm(start)) + size))
+        aim = max(min(limits[0] * size, limits[1] * norm), rounding * (self.norm * float(np.linalg.norm(start)) + size))
         if norm > aim:
             change = self._solve(residual, aim / norm, progress, continued=True)
         else:
@@ -205,12 +217,36 @@ class LinearSolver:
         rhs[free] = b
         aim = tolerance if continued else tolerance_of(tolerance, len(b))
         forecast = ConvergenceForecast(tolerance) if is_quick_to_factorize(len(b)) else None
+        if self.near is not None:
+            return self._minimal_residual(b, aim, self.near), self.plan
         multigrid = self._prepared("_multigrid", "set up", progress)
         x, iterations, converged = multigrid.solve(rhs, aim, self._norm, progress, forecast)
         error = backward_error(b - (self._blocks @ x)[free], self._norm, x, b)
         slow = forecast is not None and forecast.stopped
         plan = self.plan if converged else after(iterations, tolerance, len(b), slow)
         return self._solution(x[free], iterations, error), plan
+
+    def _minimal_residual(self, b: Array, tolerance: float, near: LinearSolver) -> Solution:
+        """Solve equations that are not symmetric by GMRES, with the multigrid of a matrix near to theirs."""
+        from scipy.sparse.linalg import LinearOperator, gmres
+
+        constraints, iterations = self.constraint_map, 0
+
+        def times(q: Array) -> Array:
+            nonlocal iterations
+            iterations += 1
+            return constraints.reduce(self.K @ constraints.transform(q))
+
+        A, M = (LinearOperator((len(b), len(b)), matvec=f, dtype=float) for f in (times, near.precondition))
+        x, failed = gmres(A, b, rtol=tolerance, atol=0.0, restart=RESTART, maxiter=MAX_RESTARTS, M=M)
+        if failed:
+            raise SolveError(
+                f"the equations of a motion were not solved to {tolerance:g} in {iterations} iterations; "
+                "take smaller steps"
+            )
+        u = constraints.transform(x)
+        error = backward_error(b - constraints.reduce(self.K @ u), self.norm, u, b)
+        return self._solution(x, iterations, error)
 
 
 def constrained(K: BlockMatrix, T: Any, free: Ints) -> BlockMatrix:

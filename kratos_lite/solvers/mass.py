@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -13,11 +13,27 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.mass_and_convection import inertia_matrices
 from kratos_lite.assembly.sparsity_pattern import Pattern
+from kratos_lite.errors import SolveError
+from kratos_lite.native import kernels
 from kratos_lite.solvers import direct
+from kratos_lite.solvers.constraint_map import ConstraintMap
+from kratos_lite.solvers.iteration import conjugate_gradients
 from kratos_lite.typing import Array
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
+
+TOLERANCE = 1e-14
+"""Relative residual of accelerations."""
+
+
+class _Product(NamedTuple):
+    """A matrix by what it makes of a vector."""
+
+    times: Callable[[Array], Array]
+
+    def __matmul__(self, x: Array) -> Array:
+        return self.times(x)
 
 
 class Mass:
@@ -59,16 +75,32 @@ class Mass:
         return np.asarray(self.scalar @ np.ones(len(self._points)))
 
     def times(self, v: Array) -> Array:
-        """Return M v of nodal vectors (3n,) or columns of them (3n, k)."""
-        nodal = v.reshape(len(self.nodal), -1)
-        product = self.nodal[:, None] * nodal if self.lumped else self.scalar @ nodal
-        return np.asarray(product).reshape(v.shape)
+        """Return M v of a nodal vector (3n,), or of several (k, 3n), which read the matrix together."""
+        M, compiled = self.scalar, kernels("sparse")
+        vectors = np.ascontiguousarray(v).reshape(-1, 3 * len(self._points))
+        if compiled is not None:
+            return compiled.multiply(M.indptr, M.indices, M.data, vectors).reshape(v.shape)
+        nodal = np.moveaxis(vectors.reshape(len(vectors), -1, 3), 0, 2)
+        product = (M @ nodal.reshape(len(nodal), -1)).reshape(nodal.shape)
+        return np.moveaxis(product, 2, 0).reshape(v.shape)
 
     def solve(self, b: Array) -> Array:
         """Return M^-1 b of nodal vectors (3n,) or columns of them (3n, k)."""
         nodal = b.reshape(len(self.nodal), -1)
         x = nodal / self.nodal[:, None] if self.lumped else self._factors.solve(nodal)
         return np.asarray(x).reshape(b.shape)
+
+    def solve_constrained(self, f: Array, constraint_map: ConstraintMap, c: Array) -> Array:
+        """Return x = T q + c with T^T (M x - f) = 0, (3n,), by conjugate gradients: M is well-conditioned."""
+        diagonal = self.scalar.diagonal().repeat(3)
+        T = constraint_map.T
+        D = diagonal[constraint_map.free] if T is None else T.multiply(T).T @ diagonal
+        b = constraint_map.reduce(f - self.times(c))
+        A = _Product(lambda q: constraint_map.reduce(self.times(constraint_map.transform(q))))
+        q, _, converged = conjugate_gradients(A, b, lambda r: r / D, TOLERANCE, 0.0)
+        if not converged:
+            raise SolveError("accelerations cannot be found: the mass is not positive within rounding")
+        return constraint_map.expand(q, c)
 
     def add_to(self, A: BlockMatrix) -> None:
         """Add the mass matrix to a matrix of blocks on the same pattern."""

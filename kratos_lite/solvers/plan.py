@@ -166,6 +166,13 @@ def repeated(solver: str, unknowns: int, symmetric: bool) -> Plan:
     return Plan("amg", f"{unknowns} unknowns > {REPEATED_LIMIT}: multigrid takes least memory")
 
 
+def stepped(unknowns: int) -> Plan:
+    """Return how to solve the equations of a step in time, whose matrix serves many times."""
+    if unknowns <= STEPPED_LIMIT:
+        return Plan("direct", f"{unknowns} unknowns ≤ {STEPPED_LIMIT}: factors are fastest over many steps")
+    return Plan("amg", f"{unknowns} unknowns > {STEPPED_LIMIT}: few iterations from the last state")
+
+
 def of_band(unknowns: int, width: int, height: int) -> Plan:
     """Return how to factorize a matrix in a band of a width, stored in so many rows: ``band`` or ``sparse``.
 
