@@ -31,7 +31,7 @@ Solve: TypeAlias = Callable[[Array, Array, "Array | None"], Array]
 
 
 STEP_TOLERANCE, OF_START = 1e-10, 1e-6
-"""Relative residual of a step, and as a fraction of that of its start, which misses as much as a step does."""
+"""Relative residual of a step, and as a fraction of that of its start, which misses as much as steps do."""
 
 
 class EquationsOfMotion:
@@ -213,11 +213,9 @@ class EquationsOfMotion:
     def matrix(self, time: float, m: float, c: float, k: float) -> BlockMatrix:
         """Return m M + c C + k K at a time, (3a, 3a)."""
         A = self._elastic(m, 0.0, k + c * self.rayleigh[1])
-        scalar = np.zeros(len(A.data))
         for factor, made in ((c, self.damping_terms), (k, self.stiffness_terms)):
             if factor and (terms := made(time)) is not None:
-                scalar = scalar + factor * terms
-        A.add_scalar(scalar)
+                A.add_scalar(factor * terms)
         if c and self.dashpots is not None:
             A.data += c * self.dashpots.data
         return A
@@ -226,7 +224,8 @@ class EquationsOfMotion:
         """Return m M + c C + k K without what a motion adds, (3a, 3a)."""
         K, (alpha, beta) = self.K, self.rayleigh
         A = BlockMatrix((k + c * beta) * K.data, K.indices, K.indptr)
-        A.add_scalar((m + c * alpha) * self.mass.data)
+        if mass := m + c * alpha:
+            A.add_scalar(mass * self.mass.data)
         return A
 
     def solver(self, time: float, m: float, c: float, k: float) -> Solve:

@@ -57,24 +57,29 @@ def matrices_of(
     t, n = number(time, "the time"), model.mesh.n_nodes
     e = EquationsOfMotion(model, lumped=flag(lumped, "lumped"), rayleigh=rayleigh, massless=True)
     dofs = (3 * e.system.nodes[:, None] + np.arange(3)).ravel()
-    free, used = dofs[e.system.constraint_map.free], len(dofs)
-    spread = csr_array((np.ones(used), (dofs, np.arange(used))), shape=(3 * n, used))
 
-    def whole(A: Any) -> csr_array[Any, Any]:
-        """Return a matrix (3a, 3a) on all degrees of freedom."""
-        made = csr_array(spread @ csr_array(A) @ spread.T)
+    def whole(A: Any, square: bool = True) -> csr_array[Any, Any]:
+        """Return a matrix (3a, ...) with the rows, and columns if it is square, of all degrees of freedom."""
+        A = A.tocsr()
+        indptr = np.zeros(3 * n + 1, dtype=A.indptr.dtype)
+        indptr[dofs + 1] = np.diff(A.indptr)
+        indices = dofs.astype(A.indices.dtype)[A.indices] if square else A.indices
+        shape = 3 * n, 3 * n if square else A.shape[1]
+        made = csr_array((A.data, indices, np.cumsum(indptr)), shape=shape)
         made.eliminate_zeros()
         made.sort_indices()
         return made
 
+    still = e.terms is None
+    C = csr_array((e.size, e.size)) if still and not any(e.rayleigh) else e.matrix(t, 0.0, 1.0, 0.0).scipy()
     return Matrices(
-        K=whole(e.matrix(t, 0.0, 0.0, 1.0).scipy()),
+        K=whole((e.K if still else e.matrix(t, 0.0, 0.0, 1.0)).scipy()),
         M=whole(e.mass.matrix()),
-        C=whole(e.matrix(t, 0.0, 1.0, 0.0).scipy()),
-        f=np.asarray(spread @ e.load(t)),
-        T=csr_array(spread @ e.system.constraint_map.transform_matrix()),
-        c=np.asarray(spread @ e.prescribed(t)),
-        free=free,
+        C=whole(C),
+        f=e.system.scatter(e.load(t)).ravel().copy(),
+        T=whole(e.system.constraint_map.transform_matrix(), square=False),
+        c=e.system.scatter(e.prescribed(t)).ravel().copy(),
+        free=dofs[e.system.constraint_map.free],
     )
 
 

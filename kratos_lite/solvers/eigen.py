@@ -110,6 +110,7 @@ class Problem:
     norms: tuple[float, float]  # largest row sums of |K| and |M|
     known: tuple[Array, Array] | None = None  # R (k, n) with R M R^T = 1, and R M
     progress: Progress | None = None
+    power: int = 1  # of λ in its error; 2 where `precondition` is about M⁻¹
 
     def lowest(self, count: int) -> tuple[Array, Array]:
         """Return the lowest λ (count,) beside the known ones, ascending, and x (count, n) with x M x^T = 1.
@@ -207,10 +208,10 @@ class Problem:
         check(off, RESIDUAL + ROUNDING * self.norms[0] * _lengths(X) ** 2 / np.abs(squares))
 
     def _errors(self, residual: Array, W: Array, X: Array, squares: Array, allowed: float) -> Array:
-        """Return the relative errors of λ: r K⁻¹ r^T / λ, or 0 where the residual is rounding."""
+        """Return the relative errors of λ, r K⁻¹ r^T / λ or r M⁻¹ r^T / λ²; 0 where r is rounding."""
         norm_K, norm_M = self.norms
         rounding = allowed * (norm_K + squares * norm_M) * _lengths(X)
-        energies = np.abs(np.einsum("ij,ij->i", residual, W)) / np.abs(squares)
+        energies = np.abs(np.einsum("ij,ij->i", residual, W)) / np.abs(squares) ** self.power
         return np.where(_lengths(residual) <= rounding, 0.0, energies)
 
 

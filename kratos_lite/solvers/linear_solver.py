@@ -123,8 +123,9 @@ class LinearSolver:
 
         `limits` are fractions of this norm, and of that of the residual.
         """
-        norm, rounding = float(np.linalg.norm(residual)), 2 * float(np.finfo(float).eps)
-        aim = max(min(limits[0] * size, limits[1] * norm), rounding * (self.norm * float(np.linalg.norm(start)) + size))
+        norm = float(np.linalg.norm(residual))
+        rounding = 2 * float(np.finfo(float).eps) * (self.norm * float(np.linalg.norm(start)) + size)
+        aim = max(min(limits[0] * size, limits[1] * norm), rounding)
         if norm > aim:
             change = self._solve(residual, aim / norm, progress, continued=True)
         else:
