@@ -12,7 +12,7 @@ import numpy as np
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.matrix_free import MatrixFree
 from kratos_lite.solvers import direct
-from kratos_lite.solvers.constraint_map import ConstraintMap
+from kratos_lite.solvers.constraints import ConstraintMap
 from kratos_lite.solvers.iteration import ConvergenceForecast
 from kratos_lite.solvers.plan import Plan, after, is_quick_to_factorize, tolerance_of
 from kratos_lite.typing import Array, Ints, Progress

@@ -20,7 +20,7 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.matrix_free import MatrixFree
 from kratos_lite.native import kernels
 from kratos_lite.solvers.coarse_level import PCoarseLevel
-from kratos_lite.solvers.constraint_map import rigid_modes
+from kratos_lite.solvers.constraints import rigid_modes
 from kratos_lite.solvers.direct import one_thread
 from kratos_lite.solvers.iteration import MAX_ITERATIONS, FractionDone, GoOn, conjugate_gradients
 from kratos_lite.solvers.plate_level import bending_modes, is_very_thin, plate_axes, plate_level

@@ -449,7 +449,7 @@ MUTATIONS = [
         CONSTRAINTS,
     ),
     Mutation(
-        "solvers/constraint_map.py",
+        "solvers/constraints.py",
         "R[:, 0, 4], R[:, 2, 4] = z, -x",
         "R[:, 0, 4], R[:, 2, 4] = z, x",
         SIGNS,

@@ -11,7 +11,7 @@ from kratos_lite.mesh import Block
 from kratos_lite.native import kernels
 from kratos_lite.solvers import coarse_level, plan
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
-from kratos_lite.solvers.constraint_map import rigid_modes
+from kratos_lite.solvers.constraints import rigid_modes
 from kratos_lite.solvers.multigrid import Compiled
 from kratos_lite.solvers.plate_level import bending_modes, plate_axes, plate_level
 

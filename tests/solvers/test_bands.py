@@ -10,7 +10,7 @@ from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import assemble_stiffness
 from kratos_lite.errors import SolveError
 from kratos_lite.solvers import plan
-from kratos_lite.solvers.banded import Factorizer
+from kratos_lite.solvers.direct import Factorizer
 from kratos_lite.solvers.mass import Mass
 
 MATERIAL = kl.Isotropic3D(2e6, 0.26, 7800.0)
