@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,7 +22,6 @@ from kratos_lite.typing import Array, Ints, Mask, Progress
 
 if TYPE_CHECKING:
     from kratos_lite.mesh.hanging import HangingNodes
-    from kratos_lite.solvers.coarse_level import PCoarseLevel
 
 NO_MATRIX = "the stiffness matrix, as its products are computed element by element"
 """What is skipped with linear elements inside the quadratic ones."""
@@ -123,8 +122,9 @@ class ConstrainedSystem:
     @cached_property
     def _equations(self) -> LinearSolver:
         groups = getattr(self.K, "groups", self.groups)  # those of a split matrix have other materials
-        level = partial(_p_coarse_level, self.points, groups, self._hanging)
-        return LinearSolver(self.K, self.constraint_map, self.points, self.plan, level)
+        return LinearSolver(
+            self.K, self.constraint_map, self.points, self.plan, groups=groups, hanging=self._hanging
+        )
 
     def solve(
         self,
@@ -188,15 +188,6 @@ def renumber(n_nodes: int, groups: Sequence[ElementGroup]) -> tuple[Ints, list[E
         return nodes, list(groups)
     local = (np.cumsum(used) - 1).astype(np.int32)
     return nodes, [replace(group, nodes=local[group.nodes]) for group in groups]
-
-
-def _p_coarse_level(
-    points: Array, groups: Sequence[ElementGroup], hanging: HangingNodes | None
-) -> PCoarseLevel | None:
-    """Return the coarse level, whose module small models do not import."""
-    from kratos_lite.solvers.coarse_level import p_coarse_level
-
-    return p_coarse_level(points, groups, hanging)
 
 
 def select(groups: Sequence[ElementGroup], moving: Mask) -> list[ElementGroup]:

@@ -22,9 +22,9 @@ from kratos_lite.native import kernels
 from kratos_lite.solvers.coarse_level import PCoarseLevel
 from kratos_lite.solvers.constraints import rigid_modes
 from kratos_lite.solvers.direct import one_thread
-from kratos_lite.solvers.iteration import MAX_ITERATIONS, FractionDone, GoOn, conjugate_gradients
+from kratos_lite.solvers.iteration import MAX_ITERATIONS, GoOn, conjugate_gradients
 from kratos_lite.solvers.plate_level import bending_modes, is_very_thin, plate_axes, plate_level
-from kratos_lite.typing import Array, Mask, Progress
+from kratos_lite.typing import Array, Mask
 
 DEGREE = 2
 """Degree of the Chebyshev smoother: 1 … 3 cost the same in all."""
@@ -43,11 +43,11 @@ class Solver(Protocol):
     levels: list[int]
 
     def solve(
-        self, b: Array, tolerance: float, norm: float, progress: Progress | None, go_on: GoOn | None = None
+        self, b: Array, tolerance: float, norm: float, each: GoOn | None = None
     ) -> tuple[Array, int, bool]:
         """Return x, iterations and success; b and x (3n,) are zero at fixed components.
 
-        After each iteration `go_on` is called with the residual as a fraction of |b|; False stops.
+        After each iteration `each` is called with the residual as a fraction of |b|; False stops.
         """
 
 
@@ -140,14 +140,10 @@ class Compiled:
         return self._module.Pressures(self._kernel, *matrices)
 
     def solve(
-        self, b: Array, tolerance: float, norm: float, progress: Progress | None, go_on: GoOn | None = None
+        self, b: Array, tolerance: float, norm: float, each: GoOn | None = None
     ) -> tuple[Array, int, bool]:
         """Return x, iterations and success."""
-        each = FractionDone(tolerance, progress, go_on)
-        x, iterations, converged = self._kernel.solve(b, tolerance, norm, MAX_ITERATIONS, each)
-        if converged:
-            each.finish()
-        return x, iterations, converged
+        return self._kernel.solve(b, tolerance, norm, MAX_ITERATIONS, each)
 
 
 def _closer(points: Array, normal: Array) -> Array:
@@ -176,13 +172,11 @@ class Pyamg:
         return self._cycle @ r
 
     def solve(
-        self, b: Array, tolerance: float, norm: float, progress: Progress | None, go_on: GoOn | None = None
+        self, b: Array, tolerance: float, norm: float, each: GoOn | None = None
     ) -> tuple[Array, int, bool]:
         """Return x, iterations and success."""
         with one_thread():
-            return conjugate_gradients(
-                self._A, b, self.precondition, tolerance, norm, progress=progress, go_on=go_on
-            )
+            return conjugate_gradients(self._A, b, self.precondition, tolerance, norm, each)
 
 
 FORWARD = ("block_gauss_seidel", {"sweep": "forward"})

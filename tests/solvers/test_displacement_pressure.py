@@ -350,21 +350,21 @@ def test_without_kernels(monkeypatch):
 
 @compiled
 @pytest.mark.parametrize("element", ["EnhancedStrain3D8N", "BBar3D10N", "BBar3D20N", "both"])
-def test_kernels_and_numpy_take_the_same_steps(element):
+def test_kernels_and_scipy_reach_the_same(element):
     system = system_of(fixed(two_meshes() if element == "both" else body(element, cells=3).mesh))
     (compiled, found), (plain, expected) = both_ways(system)
-    assert found.iterations == expected.iterations > 10
-    close(compiled, plain, 1e-9)
+    assert 10 < found.iterations <= expected.iterations <= 1.2 * found.iterations
+    close(compiled, plain, 1e-7)
 
 
 @compiled
-def test_both_start_anew_from_what_is_left(monkeypatch):
+def test_both_start_anew_from_the_residual(monkeypatch):
     monkeypatch.setattr(displacement_pressure, "DIRECTIONS", 12)
     system = system_of(body("BBar3D20N", cells=3))
     (compiled, found), (plain, expected) = both_ways(system)
     assert found.method == expected.method == "displacement-pressure"
     assert found.iterations > 30
-    assert abs(found.iterations - expected.iterations) <= 2
+    assert expected.iterations > 30
     close(compiled, plain, 1e-7)
 
 
@@ -372,8 +372,8 @@ def test_both_start_anew_from_what_is_left(monkeypatch):
 def test_the_kernel_refuses_what_does_not_fit():
     equations = system_of(body("EnhancedStrain3D8N", cells=3))._equations
     solver = equations._multigrid
-    D, S = (displacement_pressure._arrays(A) for A in (equations.K.D, solver._schur.S))
-    vectors = [solver._schur.scale, equations.K.bulk, equations.K.kept, solver._weight]
+    D, S = (displacement_pressure._arrays(A) for A in (equations.K.D, solver._S))
+    vectors = [solver._scale, equations.K.bulk, equations.K.kept, solver._weight]
 
     def made(D=D, S=S, vectors=vectors):
         return solver._cycle.with_pressures(D, S, *vectors, 0.1, 10)
