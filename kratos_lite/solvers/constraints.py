@@ -92,36 +92,35 @@ class Constraints:
 def eliminate(
     constraints: Constraints, fixed: Mask, values: Array, name: Callable[[int], str]
 ) -> Constraints:
-    """Express every dependent dof by free ones; ModelError for circles and dofs constrained twice."""
+    """Express every dependent dof by free ones; ModelError for circles and dofs constrained twice.
+
+    With u_d = W u + P u_d + k, each pass doubles the length of the chains of dependents that W and k hold.
+    """
     dependents, count = constraints.dependents, len(constraints)
+    if not count:
+        return constraints
+    from scipy.sparse import csr_array, diags_array
+    from scipy.sparse.csgraph import connected_components
+
     _check(dependents, fixed.ravel(), name)
-    place = np.full(fixed.size, -1)
-    place[dependents] = np.arange(count)
-    owner, dof, weight = constraints.owner, constraints.independents, constraints.weights
-    constants, held = constraints.constants.copy(), fixed.flat[dof]
-    np.add.at(constants, owner[held], weight[held] * values.flat[dof[held]])
-    owner, dof, weight = _summed(owner[~held], dof[~held], weight[~held])
-    for _ in range(count.bit_length() + 1):  # each pass halves the chains of dependents
-        chained = place[dof] >= 0
-        if not chained.any():
-            break
-        start = np.searchsorted(owner, np.arange(count + 1))
-        inner = place[dof[chained]]
-        sizes = np.diff(start)[inner]
-        entries = np.repeat(start[inner] - np.cumsum(sizes) + sizes, sizes) + np.arange(sizes.sum())
-        change = np.zeros(count)
-        np.add.at(change, owner[chained], weight[chained] * constants[inner])
-        constants += change
-        owner, dof, weight = _summed(
-            np.concatenate([owner[~chained], np.repeat(owner[chained], sizes)]),
-            np.concatenate([dof[~chained], dof[entries]]),
-            np.concatenate([weight[~chained], np.repeat(weight[chained], sizes) * weight[entries]]),
-        )
-    else:
-        at = _on_circle(constraints, place)
+    entries = constraints.weights, constraints.independents, constraints.start
+    W: Any = csr_array(entries, shape=(count, fixed.size))
+    P: Any = W[:, dependents]
+    components = connected_components(P, connection="strong")[1]
+    on_circle = (np.bincount(components)[components] > 1) | (P.diagonal() != 0)
+    if on_circle.any():
+        at = int(dependents[on_circle.argmax()])
         raise ModelError(f"the constraints of {name(at)} form a cycle; remove one of them")
-    start = np.searchsorted(owner, np.arange(count + 1))
-    return Constraints(dependents, start, dof, weight, constants, np.zeros(count, dtype=bool))
+    constants = constraints.constants + W @ np.where(fixed, values, 0.0).ravel()
+    is_free = ~fixed.ravel()
+    is_free[dependents] = False
+    W = W @ diags_array(1.0 * is_free)
+    W.eliminate_zeros()
+    while P.nnz:
+        constants, W, P = constants + P @ constants, W + P @ W, P @ P
+    W.sort_indices()
+    start, dofs = W.indptr.astype(np.int64), W.indices.astype(np.int64)
+    return Constraints(dependents, start, dofs, W.data, constants, np.zeros(count, dtype=bool))
 
 
 def _check(dependents: Ints, fixed: Mask, name: Callable[[int], str]) -> None:
@@ -133,30 +132,6 @@ def _check(dependents: Ints, fixed: Mask, name: Callable[[int], str]) -> None:
     if fixed[dependents].any():
         both = int(dependents[fixed[dependents].argmax()])
         raise ModelError(f"{name(both)} is both fixed and dependent by a constraint; do one of the two")
-
-
-def _summed(owner: Ints, dof: Ints, weight: Array) -> tuple[Ints, Ints, Array]:
-    """Return entries in order, those of the same constraint and dof as one."""
-    if not len(owner):
-        return owner, dof, weight
-    order = np.lexsort((dof, owner))
-    owner, dof = owner[order], dof[order]
-    first = np.flatnonzero(np.append(True, (np.diff(owner) != 0) | (np.diff(dof) != 0)))
-    return owner[first], dof[first], np.add.reduceat(weight[order], first)
-
-
-def _on_circle(constraints: Constraints, place: Ints) -> int:
-    """Return a dof that depends on itself: follow those that never end at free ones."""
-    ahead: dict[int, list[int]] = {}
-    for owner, at in zip(constraints.owner.tolist(), place[constraints.independents].tolist(), strict=True):
-        if at >= 0:
-            ahead.setdefault(owner, []).append(at)
-    while any(set(after) - set(ahead) for after in ahead.values()):
-        ahead = {one: kept for one, after in ahead.items() if (kept := [a for a in after if a in ahead])}
-    at = next(iter(ahead))
-    for _ in ahead:
-        at = ahead[at][0]
-    return int(constraints.dependents[at])
 
 
 @dataclass(eq=False)

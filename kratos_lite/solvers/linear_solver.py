@@ -213,8 +213,7 @@ def on_all(T: Any, free: Ints) -> Any:
     """Return T (N, q) with its columns in the places of the free components, (N, N)."""
     from scipy.sparse import csr_array
 
-    q = len(free)
-    return T @ csr_array((np.ones(q), (np.arange(q), free)), shape=(q, T.shape[0]))
+    return csr_array((T.data, free[T.indices], T.indptr), shape=(T.shape[0], T.shape[0]))
 
 
 def backward_error(residual: Array, norm: float, x: Array, b: Array) -> float:
