@@ -5,13 +5,13 @@ import pytest
 from computing import compiled, most, same_on_all_threads
 from meshes import joined
 from rounding import close, round_off
+from systems import system_of
 
 import kratos_lite as kl
 from kratos_lite.assembly.stiffness import assemble_dense
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.solvers import block_inverse as block_inverse_module
 from kratos_lite.solvers import dilatation, displacement_pressure, multigrid, plan
-from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.dilatation import SplitMatrix
 
 CELLS = {
@@ -24,6 +24,7 @@ CELLS = {
     "BBar3D27N": 3,
 }
 LIMIT = most(45, 85)
+GRAVITY = kl.Gravity((3.0, 4.0, -9.0))  # in no special direction
 STEEL = kl.Isotropic3D(E=2e11, nu=0.3, density=7850.0)
 
 
@@ -32,12 +33,12 @@ def rubber(nu=0.4999, E=3e6):
 
 
 def body(element, material=None, cells=None, size=(1.0, 0.9, 1.1), face="z-"):
-    """Return a box under its own weight, which acts in no special direction, clamped at a side."""
+    """Return a box under its own weight, clamped at a side."""
     n = cells or CELLS[element]
     cells = n if isinstance(n, tuple) else (n, n, n)
     model = kl.Model(kl.box(size, cells, element), material or rubber())
     model.fix(face)
-    model.add(kl.Gravity((3.0, 4.0, -9.0)))
+    model.add(GRAVITY)
     return model
 
 
@@ -47,10 +48,8 @@ def two_meshes():
     return joined(parts[0], parts[1].replace(points=parts[1].points + np.array([2.0, 0.0, 0.0])))
 
 
-def system_of(model):
-    return ConstrainedSystem(
-        model.mesh.points, model.element_groups(), model.supports.constraint_map, solver="amg"
-    )
+def amg_system(model):
+    return system_of(model, solver="amg")
 
 
 def both_ways(system):
@@ -74,12 +73,12 @@ def moved(mesh, by=0.05):
     return kl.Mesh(X + change, mesh.blocks)
 
 
-def check(model, limit, rtol=1e-8):
+def check(model, limit, rtol=1e-8, **options):
     """Solve by pressures in few iterations, and compare with a factorization of the same matrix.
 
     Both are off by rounding times the condition of K, which ν makes large.
     """
-    found, exact = model.solve("amg"), model.solve("direct")
+    found, exact = model.solve("amg", **options), model.solve("direct")
     assert found.report.solver == "displacement-pressure", found.report.reason
     assert found.report.iterations <= limit
     close(found.u, exact.u, rtol + round_off(model))
@@ -98,11 +97,7 @@ def to_the_tolerance(monkeypatch):
 @pytest.mark.parametrize("nu", [0.4902, 0.499, 0.4999, 0.499999])
 @pytest.mark.parametrize("element", CELLS)
 def test_iterations_do_not_grow_towards_incompressibility(element, nu):
-    model = body(element, rubber(nu))
-    found = model.solve("amg", tolerance=1e-8)
-    assert found.report.solver == "displacement-pressure", found.report.reason
-    assert found.report.iterations <= LIMIT
-    close(found.u, model.solve("direct").u, 1e-7 + round_off(model))
+    check(body(element, rubber(nu)), LIMIT, 1e-7, tolerance=1e-8)
 
 
 @pytest.mark.parametrize(("element", "sizes"), [("EnhancedStrain3D8N", (8, 14)), ("BBar3D27N", (3, 7))])
@@ -127,14 +122,10 @@ def confined(element):
     return model
 
 
-def distorted(element):
-    return fixed(moved(body(element).mesh))
-
-
 def fixed(mesh):
     model = kl.Model(mesh, rubber())
     model.fix(mesh.points[:, 2] == 0)
-    model.add(kl.Gravity((3.0, 4.0, -9.0)))
+    model.add(GRAVITY)
     return model
 
 
@@ -152,7 +143,7 @@ def long(element):
     [
         (beam, MIXED, most(60, 75)),
         (confined, MIXED, 60),
-        (distorted, ("EnhancedStrain3D8N", "BBar3D20N"), most(45, 70)),
+        (lambda element: fixed(moved(body(element).mesh)), ("EnhancedStrain3D8N", "BBar3D20N"), most(45, 70)),
         (flat, FLAT, most(45, 260)),
         (long, ("BBar3D8N", "BBar3D20N", "BBar3D27N"), most(45, 160)),
         (lambda element: fixed(two_meshes()), ("both",), 55),
@@ -166,18 +157,10 @@ def test_bodies_take_few_iterations(make, elements, limit):
         check(make(element), limit)
 
 
-def test_lines_across_flat_quadratic_cells():
-    system = system_of(body("BBar3D20N", cells=4, size=(1.0, 1.0, 0.04)))
-    group, _ = block_inverse_module._groups(system.K.A, system.K.A.rows(), system.points)
-    for one in set(group):
-        assert np.ptp(system.points[group == one, :2], axis=0).max() < 1e-12
-    assert set(np.bincount(group)) == {5, 9}
-
-
 @pytest.mark.parametrize(("element", "axis"), [("BBar3D27N", 0), ("BBar3D27N", 2), ("BBar3D15N", 2)])
 def test_means_of_pressures_around_halves_of_long_edges(element, axis):
     size = tuple(8.0 if a == axis else 1.0 for a in range(3))
-    K = system_of(body(element, cells=2, size=size)).K
+    K = amg_system(body(element, cells=2, size=size)).K
     points = kl.box(size, (2, 2, 2), element).points
     z, u, linear = points[:, axis], np.zeros_like(points), np.zeros_like(points)
     u[:, axis], linear[:, axis] = z, z**2 / 2  # dilatations 1 and z
@@ -196,7 +179,7 @@ def test_means_of_pressures_around_halves_of_long_edges(element, axis):
 
 
 def test_means_of_pressures_around_nodes():
-    K = system_of(body("BBar3D27N", cells=2, size=(1.0, 1.0, 1.0))).K
+    K = amg_system(body("BBar3D27N", cells=2, size=(1.0, 1.0, 1.0))).K
     one = K.means.matrix.T @ (K.D @ kl.box((1.0, 1.0, 1.0), (2, 2, 2), "BBar3D27N").points.ravel() / 3)
     assert np.count_nonzero(one) == 27
     assert (K.means.ends[:, 0] == K.means.ends[:, 1]).all()
@@ -252,59 +235,53 @@ def test_few_unknowns_are_factorized(element, cells, method):
 
 
 @pytest.mark.parametrize("element", CELLS)
-def test_the_split_matrix_is_the_stiffness(element):
-    cells = (2, 2, 1)
-    model = kl.Model(moved(kl.box((1.0, 1.0, 1.0), cells, element)), rubber())
+def test_the_split_matrix_is_the_stiffness_and_what_remains_that_of_an_ordinary_material(element):
+    model = kl.Model(moved(kl.box((1.0, 1.0, 1.0), (2, 2, 1), element)), rubber(0.4999))
     model.fix("z-")
-    system, groups = system_of(model), model.element_groups()
-    exact = assemble_dense(model.mesh.points, groups)
-    assert isinstance(system.K, SplitMatrix)
-    x = np.random.default_rng(0).standard_normal(len(exact))
-    size = np.abs(exact).sum(axis=1).max()
-    np.testing.assert_allclose(system.K @ x, exact @ x, rtol=0, atol=1e-13 * size)
-    np.testing.assert_allclose(system.K.scipy().toarray(), exact, rtol=0, atol=1e-13 * size)
-    assert size * (1 - 1e-12) <= system.K.norm() <= 2 * size
-
-
-@pytest.mark.parametrize("element", CELLS)
-def test_what_is_left_is_that_of_an_ordinary_material(element):
-    model = kl.Model(moved(kl.box((1.0, 1.0, 1.0), (2, 2, 1), element)), rubber(0.49999))
-    A = system_of(model).K.A.scipy().toarray()
-    shear = 3e6 / (2 * 1.49999)
-    ordinary = assemble_dense(
-        model.mesh.points, kl.Model(model.mesh, kl.Isotropic3D(E=2.5 * shear, nu=0.25)).element_groups()
+    K, shear = amg_system(model).K, 3e6 / (2 * 1.4999)
+    assert isinstance(K, SplitMatrix)
+    exact, soft = (
+        assemble_dense(model.mesh.points, kl.Model(model.mesh, material).element_groups())
+        for material in (rubber(0.4999), kl.Isotropic3D(E=2.5 * shear, nu=0.25))
     )
+    x, size = np.random.default_rng(0).standard_normal(len(exact)), np.abs(exact).sum(axis=1).max()
+    np.testing.assert_allclose(K @ x, exact @ x, rtol=0, atol=1e-13 * size)
+    np.testing.assert_allclose(K.scipy().toarray(), exact, rtol=0, atol=1e-13 * size)
+    assert size * (1 - 1e-12) <= K.norm() <= 2 * size
+    A = K.A.scipy().toarray()
     if element.startswith("BBar") and element != "BBar3D10N":  # the others depend on the material
-        close(A, ordinary, 1e-9)
+        close(A, soft, 1e-9)
     values = np.linalg.eigvalsh(A)
     assert values[0] > -1e-9 * values[-1]
-    assert values[-1] < 3 * np.linalg.eigvalsh(ordinary)[-1]
+    assert values[-1] < 3 * np.linalg.eigvalsh(soft)[-1]
 
 
-@pytest.mark.parametrize("size", [(1.0, 1.0, 1.0), (1.0, 1.0, 0.05)])
-def test_inverse_within_groups_of_nodes(size):
-    system = system_of(body("EnhancedStrain3D8N", cells=4, size=size))
-    A, free = system.K.A, np.ones(375, dtype=bool)
-    free[: 3 * 25 : 2] = False
+@pytest.mark.parametrize(
+    ("element", "height", "longest", "sizes"),
+    [
+        ("EnhancedStrain3D8N", 1.0, 40, {1}),
+        ("EnhancedStrain3D8N", 0.05, 40, {5}),
+        ("EnhancedStrain3D8N", 0.05, 4, {1}),  # larger groups are taken as single nodes
+        ("BBar3D20N", 0.04, 40, {5, 9}),
+    ],
+)
+def test_inverse_within_lines_across_flat_cells(element, height, longest, sizes, monkeypatch):
+    monkeypatch.setattr(block_inverse_module, "LONGEST", longest)
+    system = amg_system(body(element, cells=4, size=(1.0, 1.0, height)))
+    A, D, kept, n = system.K.A, system.K.D, system.K.kept, len(system.points)
+    free = np.ones(3 * n, dtype=bool)
+    free[:75:2] = False
     group, place = block_inverse_module._groups(A, A.rows(), system.points)
-    assert np.bincount(group).max() == (1 if size[2] == 1.0 else 5)
-    assert all(sorted(place[group == one]) == list(range((group == one).sum())) for one in set(group))
-    D, kept = system.K.D, system.K.kept
-    full, exact = A.scipy().toarray() - D.T @ (kept[:, None] * D.toarray()), np.zeros((375, 375))
-    for one in set(group):
-        dofs = (3 * np.flatnonzero(group == one)[:, None] + np.arange(3)).ravel()
+    assert set(np.bincount(group)) == sizes
+    full, exact = A.scipy().toarray() - D.T @ (kept[:, None] * D.toarray()), np.zeros((3 * n, 3 * n))
+    for number in set(group):
+        nodes = np.flatnonzero(group == number)
+        assert np.ptp(system.points[nodes, :2], axis=0).max() < 1e-12
+        assert sorted(place[nodes]) == list(range(len(nodes)))
+        dofs = (3 * nodes[:, None] + np.arange(3)).ravel()
         dofs = dofs[free[dofs]]
         exact[np.ix_(dofs, dofs)] = np.linalg.inv(full[np.ix_(dofs, dofs)])
-    found = block_inverse_module.block_inverse(A, free, system.points, D, kept).toarray()
-    close(found, exact, 1e-11)
-
-
-def test_large_groups_are_single_nodes(monkeypatch):
-    monkeypatch.setattr(block_inverse_module, "LONGEST", 4)
-    system = system_of(body("EnhancedStrain3D8N", cells=4, size=(1.0, 1.0, 0.05)))
-    group, place = block_inverse_module._groups(system.K.A, system.K.A.rows(), system.points)
-    assert np.bincount(group).max() == 1
-    assert not place.any()
+    close(block_inverse_module.block_inverse(A, free, system.points, D, kept).toarray(), exact, 1e-11)
 
 
 def test_an_element_of_a_user_with_a_strain_of_its_own_has_no_pressures():
@@ -351,7 +328,7 @@ def test_without_kernels(monkeypatch):
 @compiled
 @pytest.mark.parametrize("element", ["EnhancedStrain3D8N", "BBar3D10N", "BBar3D20N", "both"])
 def test_kernels_and_scipy_reach_the_same(element):
-    system = system_of(fixed(two_meshes() if element == "both" else body(element, cells=3).mesh))
+    system = amg_system(fixed(two_meshes() if element == "both" else body(element, cells=3).mesh))
     (compiled, found), (plain, expected) = both_ways(system)
     assert 10 < found.iterations <= expected.iterations <= 1.2 * found.iterations
     close(compiled, plain, 1e-7)
@@ -360,7 +337,7 @@ def test_kernels_and_scipy_reach_the_same(element):
 @compiled
 def test_both_start_anew_from_the_residual(monkeypatch):
     monkeypatch.setattr(displacement_pressure, "DIRECTIONS", 12)
-    system = system_of(body("BBar3D20N", cells=3))
+    system = amg_system(body("BBar3D20N", cells=3))
     (compiled, found), (plain, expected) = both_ways(system)
     assert found.method == expected.method == "displacement-pressure"
     assert found.iterations > 30
@@ -370,7 +347,7 @@ def test_both_start_anew_from_the_residual(monkeypatch):
 
 @compiled
 def test_the_kernel_refuses_what_does_not_fit():
-    equations = system_of(body("EnhancedStrain3D8N", cells=3))._equations
+    equations = amg_system(body("EnhancedStrain3D8N", cells=3))._equations
     solver = equations._multigrid
     D, S = (displacement_pressure._arrays(A) for A in (equations.K.D, solver._S))
     vectors = [solver._scale, equations.K.bulk, equations.K.kept, solver._weight]
@@ -400,7 +377,7 @@ def test_results_do_not_depend_on_the_number_of_threads():
 
 
 def test_no_load_has_no_displacement():
-    system = system_of(body("EnhancedStrain3D8N", cells=4))
+    system = amg_system(body("EnhancedStrain3D8N", cells=4))
     u, solution = system.solve(np.zeros((125, 3)))
     assert not u.any()
     assert solution.iterations == 0
