@@ -19,11 +19,7 @@ def block_rows(indptr: Rows) -> Ints:
 
 
 class BlockMatrix:
-    """A square matrix (3n, 3n) of 3x3 blocks in rows (BSR), columns sorted within a row.
-
-    It needs no sparse library as long as it is only multiplied; `scipy` gives the same matrix, on
-    the same memory, to those that factorize or slice.
-    """
+    """A square matrix (3n, 3n) of 3x3 blocks in rows (BSR), columns sorted within a row."""
 
     def __init__(self, data: Array, indices: Rows, indptr: Rows) -> None:
         self.data, self.indices, self.indptr = data, indices, indptr

@@ -235,10 +235,7 @@ def _interpolation(submeshes: Sequence[_Submesh], number: Rows) -> tuple[Rows, R
 def _continuous(
     level: PCoarseLevel, groups: Sequence[ElementGroup], number: Rows, hanging: HangingNodes
 ) -> PCoarseLevel:
-    """Return the level of continuous fields: corners in the middle of larger edges and faces follow these.
-
-    Without it the linear elements of both sides come apart there, and iterations grow fivefold.
-    """
+    """Return the level of continuous fields: corners in the middle of larger edges and faces follow these."""
     from scipy.sparse import csr_array
 
     n = len(number)

@@ -96,10 +96,7 @@ class ConstrainedSystem:
 
     @cached_property
     def K(self) -> Any:
-        """The stiffness matrix (3a, 3a) in N/m: a BlockMatrix, or a full array for the method ``dense``.
-
-        It is a MatrixFree where the plan needs no matrix, and a SplitMatrix for ``displacement-pressure``.
-        """
+        """The stiffness matrix (3a, 3a) in N/m: a BlockMatrix, or a full array for the method ``dense``."""
         if self.plan.method == "dense":
             return assemble_dense(self.points, self.groups)
         if not self.plan.matrix_free:

@@ -209,10 +209,7 @@ def _lu(band: Array, width: int, dofs: Ints) -> Callable[[Array], Array]:
 
 
 def _numbering(pattern: Pattern, rows: Ints) -> tuple[Ints, int]:
-    """Return the nodes (n,) in the order with the least band, and its width in nodes.
-
-    The orders are that of the mesh, reverse Cuthill–McKee, and layers from one end of the body.
-    """
+    """Return the nodes (n,) in the order with the least band, and its width in nodes."""
     graph, order = cuthill_mckee(pattern)
     orders = [np.arange(pattern.n_nodes), order, _layers(graph, order)]
     widths = [nodal_width(pattern, rows, order) for order in orders]
@@ -238,11 +235,7 @@ def nodal_width(pattern: Pattern, rows: Ints, order: Ints) -> int:
 
 
 def _layers(graph: csr_array, order: Ints) -> Ints:
-    """Return the nodes by their distance from the end farthest from the last node of an order.
-
-    Within a layer they follow the mean place of their neighbors in the layer before.  The first layers
-    of Cuthill–McKee start from one corner and are wider than those of a long body.
-    """
+    """Return the nodes by their distance from the end farthest from the last node of an order."""
     from scipy.sparse.csgraph import dijkstra
 
     distance = dijkstra(graph, indices=order[-1], unweighted=True)
@@ -290,8 +283,7 @@ def _controller() -> Any:
 def one_thread() -> AbstractContextManager[Any]:
     """Keep dense algebra to one thread within a ``with`` block, where threadpoolctl is installed.
 
-    Idle threads that wait actively for the next small product take three quarters of the time, and more if
-    other processes want the cores; and sums of several threads may differ from one run to the next.
+    Threads that wait for the next small product take time from others, and their sums may differ each time.
     """
     controller = _controller()
     if controller is None:

@@ -1,4 +1,4 @@
-"""Displacements and a pressure in each nearly incompressible element, found together.
+"""Displacements and a pressure in each nearly incompressible element, solved for together.
 
 With p = κ D u the equations (A + Dᵀ κ D) u = b are
 

@@ -66,10 +66,7 @@ def _dense(K: Array, M: Array, count: int) -> tuple[Array, Array]:
 
 
 def _by_iteration(K: Any, M: Any, count: int, progress: Progress | None) -> tuple[Array, Array]:
-    """Return the lowest modes by Lanczos on (K + s M)^-1 M, with a shift s that makes K definite.
-
-    Frequencies far below the shift are hard to tell apart: then it comes down.
-    """
+    """Return the lowest modes by Lanczos on (K + s M)^-1 M, with a shift s that makes K definite."""
     from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
     n, done, cycle = K.shape[0], 0, max(2 * count + 1, 20)

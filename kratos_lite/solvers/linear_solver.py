@@ -134,10 +134,7 @@ class LinearSolver:
 
     @cached_property
     def _blocks(self) -> Any:
-        """The matrix on all components, constraints worked in, of which only the free ones count.
-
-        It is a BlockMatrix, a MatrixFree or a SplitMatrix, as K is.
-        """
+        """The matrix on all components, constraints worked in, of which only the free ones count."""
         T, free = self.constraint_map.T, self.constraint_map.free
         if T is None:
             return self.K

@@ -21,10 +21,7 @@ if TYPE_CHECKING:
 
 
 class Mass:
-    """The mass matrix of elements: consistent, or lumped at the nodes.
-
-    It is built when it is first needed: a body at rest has none.
-    """
+    """The mass matrix of elements: consistent, or lumped at the nodes."""
 
     def __init__(
         self,

@@ -66,11 +66,7 @@ def multigrid(
 
 
 class Compiled:
-    """The hierarchy of the kernels.  It keeps the memory of A, which must not change.
-
-    Where A is a product alone, its matrix is made for aggregation and forgotten; with linear elements below
-    it is not made at all.
-    """
+    """The hierarchy of the kernels.  It keeps the memory of A, which must not change."""
 
     def __init__(
         self,
@@ -222,10 +218,7 @@ def above_linear(A: BlockMatrix, free: Mask, points: Array, linear: PCoarseLevel
 
 
 def uncoupled(A: BlockMatrix, free: Mask) -> BlockMatrix:
-    """Return a copy of A with the rows and columns of components that are not free cleared.
-
-    Their diagonal entries stay, so that the matrix keeps its scale.
-    """
+    """Return a copy of A with the rows and columns of components that are not free cleared."""
     mask = free.reshape(-1, 3)
     data = A.data * mask[A.rows()][:, :, None] * mask[A.indices][:, None, :]
     diagonal = A.diagonal_blocks()
