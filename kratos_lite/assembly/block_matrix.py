@@ -64,11 +64,7 @@ class BlockMatrix:
         compiled = kernels("sparse")
         if compiled is not None:
             return float(compiled.norm(self.indptr, self.data))
-        if not len(self.indices):
-            return 0.0
-        sums = np.abs(self.data).sum(axis=2)
-        starts = self.indptr[:-1][np.diff(self.indptr) > 0]
-        return float(np.add.reduceat(sums, starts, axis=0).max(initial=0.0))
+        return float(np.asarray(abs(self.scipy()).sum(axis=1)).max(initial=0.0))
 
     def add_scalar(self, m: Array, at: Ints | None = None) -> None:
         """Add numbers to the diagonals of blocks: A += m 1, in place."""
