@@ -15,7 +15,6 @@ class Mutation(NamedTuple):
 ELEMENTS = "tests/testing/test_registered.py"
 STIFFNESS = "tests/assembly/test_stiffness.py"
 GAUSS = "tests/assembly/test_gauss_point_fields.py"
-CONDENSED = "tests/assembly/test_condensed_kernels.py"
 STRAIN = "tests/assembly/test_finite_strain.py"
 TRANSIENT = "tests/analysis/test_transient.py"
 SIGNS = "tests/analysis/test_signs_and_orders.py"
@@ -542,15 +541,15 @@ MUTATIONS = [
         "diagonal[a] += N[a] * det;",
         MASS + " -k scaled_diagonal",
     ),
-    Mutation("native/condensed.hpp", "gamma[a][h] -= share", "gamma[a][h] += share", CONDENSED),
-    Mutation("native/condensed.hpp", "row[n] -= row[j]", "row[n] += row[j]", CONDENSED),
+    Mutation("native/condensed.hpp", "gamma[a][h] -= share", "gamma[a][h] += share", GAUSS),
+    Mutation("native/condensed.hpp", "row[n] -= row[j]", "row[n] += row[j]", GAUSS),
     Mutation(
         "native/gauss_kernels.hpp",
         "deviate<V>(w.addition.share, trace[q], s.stress)",
         "deviate<V>(1.0, trace[q], s.stress)",
-        CONDENSED,
+        GAUSS,
     ),
-    Mutation("native/stiffness.cpp", "- (i == j) * k / 2;", "- (i == j) * k;", CONDENSED),
+    Mutation("native/stiffness.cpp", "- (i == j) * k / 2;", "- (i == j) * k;", GAUSS),
     Mutation(
         "assembly/gauss_point_fields.py",
         "return forces + element.internal_force(stress, C)",
@@ -622,7 +621,7 @@ MUTATIONS = [
         "assembly/recovery.py",
         '0.5 if shape.cell == "tetrahedron"',
         '0.4 if shape.cell == "tetrahedron"',
-        "tests/assembly/test_recovery.py -k nodes_have_their_share",
+        "tests/assembly/test_recovery.py -k nodes_have_their_fraction",
     ),
     Mutation("analysis/quantities.py", "nodes[:, : group.element.shape.corners]", "nodes[:, :2]", QUANTITIES),
     Mutation(
