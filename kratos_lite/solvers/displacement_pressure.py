@@ -24,12 +24,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kratos_lite.solvers import multigrid
+from kratos_lite.native import kernels
 from kratos_lite.solvers.block_inverse import block_inverse
 from kratos_lite.solvers.coarse_level import PCoarseLevel
 from kratos_lite.solvers.dilatation import SplitMatrix
-from kratos_lite.solvers.direct import one_thread
 from kratos_lite.solvers.iteration import GoOn
+from kratos_lite.solvers.multigrid import Compiled
 from kratos_lite.typing import Array, Mask, Rows
 
 if TYPE_CHECKING:
@@ -48,83 +48,23 @@ INNER, INNER_MAX = 0.1, 120
 
 
 class DisplacementPressure:
-    """What solves K u = b for one right side after another, where K is split."""
+    """What solves K u = b for one right side after another, where K is split; it needs the kernels."""
 
     def __init__(self, K: SplitMatrix, free: Mask, points: Array, linear: PCoarseLevel | None = None) -> None:
-        self._K, self._fixed = K, ~free
-        self._cycle = multigrid.multigrid(K.A, free, points, linear, DEGREE)
+        self._cycle = Compiled(kernels("multigrid"), K.A, free, points, linear, DEGREE)
         self.levels: list[int] = self._cycle.levels
         inverse = block_inverse(K.A, free, points, K.D, K.kept)
         # residuals are measured by the energy that they stand for
         self._weight = np.sqrt(np.concatenate([inverse.diagonal(), K.modulus]))
         self._S, self._scale = _pressure_operator(K, inverse, free)
-        self._kernel = None
-        if isinstance(self._cycle, multigrid.Compiled):
-            vectors = self._scale, K.bulk, K.kept, self._weight, INNER, INNER_MAX
-            self._kernel = self._cycle.with_pressures(_arrays(K.D), _arrays(self._S), *vectors)
+        vectors = self._scale, K.bulk, K.kept, self._weight, INNER, INNER_MAX
+        self._kernel = self._cycle.with_pressures(_arrays(K.D), _arrays(self._S), *vectors)
 
     def solve(
         self, b: Array, tolerance: float, norm: float, each: GoOn | None = None
     ) -> tuple[Array, int, bool]:
         """Return u, iterations and success."""
-        if self._kernel is not None:
-            limits = MAX_ITERATIONS, DIRECTIONS, REDUCED
-            return self._kernel.solve(b, tolerance, norm, *limits, each)
-        with one_thread():
-            return self._solve(b, tolerance, norm, each)
-
-    def _solve(self, b: Array, tolerance: float, norm: float, each: GoOn | None) -> tuple[Array, int, bool]:
-        """Solve without kernels, by the flexible minimal residuals of SciPy."""
-        from scipy.sparse.linalg import LinearOperator, gcrotmk
-
-        n, iterations, residual = len(b), 0, float("inf")
-        weight = self._weight
-        inverse = np.divide(1.0, weight, out=np.zeros_like(weight), where=weight > 0)
-
-        def precondition(r: Array) -> Array:
-            nonlocal iterations
-            iterations += 1
-            return self._precondition(inverse * r)
-
-        shape = (len(weight), len(weight))
-        A = LinearOperator(shape, matvec=lambda x: weight * self._product(x), dtype=np.float64)
-        M = LinearOperator(shape, matvec=precondition, dtype=np.float64)
-        rhs, x, size = (
-            np.append(weight[:n] * b, np.zeros(len(weight) - n)),
-            0 * weight,
-            float(np.linalg.norm(b)),
-        )
-        aim = tolerance * float(np.linalg.norm(rhs))
-        while iterations < MAX_ITERATIONS:
-            x, _ = gcrotmk(A, rhs, x, rtol=0.0, atol=aim, maxiter=1, M=M, m=DIRECTIONS)
-            before, residual = residual, float(np.linalg.norm(self._forces(b, x[:n])))
-            rounding = 2 * np.finfo(float).eps * (norm * float(np.linalg.norm(x[:n])) + size)
-            limit = max(float(rounding), tolerance * size)
-            if residual <= limit:
-                return x[:n], iterations, True
-            if residual > before / 2 or (each is not None and not each(residual / size)):
-                break
-            aim *= min(limit / residual, 0.5)
-        return x[:n], iterations, False
-
-    def _forces(self, b: Array, u: Array) -> Array:
-        """Return b - K u on free components: u has not quite the pressures of the iteration."""
-        return np.where(self._fixed, 0.0, b - self._K @ u)
-
-    def _product(self, x: Array) -> Array:
-        """Return the product of the matrix of displacements and pressures with both."""
-        K, n = self._K, len(self._fixed)
-        u, p = x[:n], x[n:]
-        return np.concatenate([np.where(self._fixed, 0.0, K.A @ u + K.D.T @ p), K.D @ u - p / K.bulk])
-
-    def _precondition(self, r: Array) -> Array:
-        from scipy.sparse.linalg import cg
-
-        n = len(self._fixed)
-        p = -self._scale * cg(self._S, self._scale * r[n:], rtol=INNER**0.5, maxiter=INNER_MAX)[0]
-        p -= self._K.kept * r[n:]
-        forces = np.where(self._fixed, 0.0, r[:n] - self._K.D.T @ p)
-        return np.concatenate([self._cycle.precondition(forces), p])
+        return self._kernel.solve(b, tolerance, norm, MAX_ITERATIONS, DIRECTIONS, REDUCED, each)
 
 
 def _arrays(A: bsr_array) -> tuple[Rows, Rows, Array]:

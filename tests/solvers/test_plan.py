@@ -50,6 +50,9 @@ def facts(unknowns, **known):
         (30_000, {"bulk_over_shear": (3001.0, 3001.0)}, "direct"),
         (30_000, {"bulk_over_shear": (3001.0, 3000.0)}, "displacement-pressure"),
         (150_001, {"bulk_over_shear": (0.0, 3001.0)}, "amg"),
+        # without kernels no pressures
+        (30_000, {"bulk_over_shear": (51.0, 0.0), "compiled": False}, "direct"),
+        (150_001, {"bulk_over_shear": (51.0, 0.0), "compiled": False}, "amg"),
     ],
 )
 def test_method_follows_from_facts(unknowns, known, method):
