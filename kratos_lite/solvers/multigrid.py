@@ -52,17 +52,12 @@ class Solver(Protocol):
 
 
 def multigrid(
-    A: BlockMatrix | MatrixFree,
-    free: Mask,
-    points: Array,
-    linear: PCoarseLevel | None = None,
-    degree: int = DEGREE,
+    A: BlockMatrix | MatrixFree, free: Mask, points: Array, linear: PCoarseLevel | None = None
 ) -> Compiled | Pyamg:
     """Return the solver of A on its free components (3n,)."""
-    compiled = kernels("multigrid")
-    if compiled is None:
+    if kernels("multigrid") is None:
         return Pyamg(A.assembled() if isinstance(A, MatrixFree) else A, free, points, linear)
-    return Compiled(compiled, A, free, points, linear, degree)
+    return Compiled(A, free, points, linear)
 
 
 class Compiled:
@@ -70,7 +65,6 @@ class Compiled:
 
     def __init__(
         self,
-        module: Any,
         A: BlockMatrix | MatrixFree,
         free: Mask,
         points: Array,
@@ -80,12 +74,13 @@ class Compiled:
         axes = None if isinstance(A, MatrixFree) else plate_axes(points, free)
         thin = 0 if axes is None else 2 if is_very_thin(points, axes) else 1
         places = np.ascontiguousarray(points if axes is None else _closer(points, axes[:, 0]), dtype=float)
-        self._module, fixed = module, (~free).astype(np.uint8)
+        self._module: Any = kernels("multigrid")
+        fixed = (~free).astype(np.uint8)
         settings = fixed, places, degree, RATIO, STRENGTH
         if isinstance(A, MatrixFree):
-            self._kernel = module.Multigrid(A.product, *settings)
+            self._kernel = self._module.Multigrid(A.product, *settings)
         else:
-            self._kernel = module.Multigrid(self._matrix(A), *settings, thin)
+            self._kernel = self._module.Multigrid(self._matrix(A), *settings, thin)
         lines = self._kernel.labels()
         plate = plate_level(points, free, axes, lines, linear) if linear is not None and len(lines) else None
         if plate is not None:

@@ -671,9 +671,9 @@ MUTATIONS = [
             ("BAND_NUMBERS = 50_000_000", "BAND_NUMBERS = 60_000_000"),
             ("PATIENCE, PATIENCE_FROM = 400", "PATIENCE, PATIENCE_FROM = 401"),
             ("return min(tolerance, ROUND_OFF)", "return min(tolerance, tolerance)"),
-            ("plain > LOCKED and is", "plain > LOCKED or is"),
+            ("(plain > LOCKED or not", "(plain > 0 or not"),
             ("max(mixed, plain) > NEAR_HALF", "mixed > NEAR_HALF"),
-            ("if mixed > NEAR_HALF:", "if max(mixed, plain) > NEAR_HALF:"),
+            ("if mixed > NEAR_HALF and", "if max(mixed, plain) > NEAR_HALF and"),
         )
     ),
 ]

@@ -10,7 +10,6 @@ from systems import system_of
 import kratos_lite as kl
 from kratos_lite.assembly.stiffness import assemble_dense
 from kratos_lite.elements import ELEMENTS
-from kratos_lite.solvers import block_inverse as block_inverse_module
 from kratos_lite.solvers import dilatation, displacement_pressure, plan
 from kratos_lite.solvers.dilatation import SplitMatrix
 
@@ -257,12 +256,12 @@ def test_the_split_matrix_is_the_stiffness_and_what_remains_that_of_an_ordinary_
     ],
 )
 def test_inverse_within_lines_across_flat_cells(element, height, longest, sizes, monkeypatch):
-    monkeypatch.setattr(block_inverse_module, "LONGEST", longest)
+    monkeypatch.setattr(displacement_pressure, "LONGEST", longest)
     system = amg_system(body(element, cells=4, size=(1.0, 1.0, height)))
     A, D, kept, n = system.K.A, system.K.D, system.K.kept, len(system.points)
     free = np.ones(3 * n, dtype=bool)
     free[:75:2] = False
-    group, place = block_inverse_module._groups(A, A.rows(), system.points)
+    group, place = displacement_pressure._groups(A, A.rows(), system.points)
     assert set(np.bincount(group)) == sizes
     full, exact = A.scipy().toarray() - D.T @ (kept[:, None] * D.toarray()), np.zeros((3 * n, 3 * n))
     for number in set(group):
@@ -272,7 +271,7 @@ def test_inverse_within_lines_across_flat_cells(element, height, longest, sizes,
         dofs = (3 * nodes[:, None] + np.arange(3)).ravel()
         dofs = dofs[free[dofs]]
         exact[np.ix_(dofs, dofs)] = np.linalg.inv(full[np.ix_(dofs, dofs)])
-    close(block_inverse_module.block_inverse(A, free, system.points, D, kept).toarray(), exact, 1e-11)
+    close(displacement_pressure.block_inverse(A, free, system.points, D, kept).toarray(), exact, 1e-11)
 
 
 def test_an_element_of_a_user_with_a_strain_of_its_own_has_no_pressures():

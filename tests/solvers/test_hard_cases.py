@@ -9,7 +9,6 @@ from systems import parts_of, stiffness_of, system_of
 import kratos_lite as kl
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.mesh import Block
-from kratos_lite.native import kernels
 from kratos_lite.solvers import plan
 from kratos_lite.solvers.coarse_level import p_coarse_level
 from kratos_lite.solvers.constraints import rigid_modes
@@ -51,7 +50,7 @@ def hierarchy(model):
     system = system_of(model)
     free, linear = system.constraint_map.is_free, p_coarse_level(system.points, system.groups)
     b = np.random.default_rng(1).standard_normal(len(free)) * free
-    return Compiled(kernels("multigrid"), system.K, free, system.points, linear), b
+    return Compiled(system.K, free, system.points, linear), b
 
 
 def iterations(model, load=None):
