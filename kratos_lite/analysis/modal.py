@@ -14,11 +14,15 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.errors import InputError
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers import direct
+<<<<<<< HEAD
 from kratos_lite.solvers.constraint_map import rigid_modes
 from kratos_lite.solvers.eigen import Problem, dense_modes, is_small
 from kratos_lite.solvers.linear_solver import LinearSolver
+=======
+from kratos_lite.solvers.constraints import rigid_modes
+from kratos_lite.solvers.eigen import Pencil, modes, neutral_motions
+>>>>>>> slv
 from kratos_lite.solvers.plan import DENSE_MODES
-from kratos_lite.solvers.quadratic_eigen import Pencil, neutral_motions
 from kratos_lite.typing import Array, Complexes, Progress
 from kratos_lite.validation import instance, whole_number
 

@@ -16,7 +16,7 @@ from kratos_lite.model import checks
 from kratos_lite.model.loads import Load, ScaledLoad
 from kratos_lite.model.loads.nodal import NodalForces, PointLoad
 from kratos_lite.model.structure import Structure
-from kratos_lite.solvers.constraint_map import rigid_modes
+from kratos_lite.solvers.constraints import rigid_modes
 from kratos_lite.typing import Array, Mask, Progress
 
 FREE = 1e-12

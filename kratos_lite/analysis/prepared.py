@@ -23,7 +23,7 @@ from kratos_lite.typing import Array, Ints, Mask, Progress
 from kratos_lite.validation import choice
 
 if TYPE_CHECKING:
-    from kratos_lite.solvers.constraint_map import ConstraintMap
+    from kratos_lite.solvers.constraints import ConstraintMap
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,11 +19,7 @@ def block_rows(indptr: Rows) -> Ints:
 
 
 class BlockMatrix:
-    """A square matrix (3n, 3n) of 3x3 blocks in rows (BSR), columns sorted within a row.
-
-    It needs no sparse library as long as it is only multiplied; `scipy` gives the same matrix, on
-    the same memory, to those that factorize or slice.
-    """
+    """A square matrix (3n, 3n) of 3x3 blocks in rows (BSR), columns sorted within a row."""
 
     def __init__(self, data: Array, indices: Rows, indptr: Rows) -> None:
         self.data, self.indices, self.indptr = data, indices, indptr
@@ -72,11 +68,7 @@ class BlockMatrix:
         compiled = kernels("sparse")
         if compiled is not None:
             return float(compiled.norm(self.indptr, self.data))
-        if not len(self.indices):
-            return 0.0
-        sums = np.abs(self.data).sum(axis=2)
-        starts = self.indptr[:-1][np.diff(self.indptr) > 0]
-        return float(np.add.reduceat(sums, starts, axis=0).max(initial=0.0))
+        return float(np.asarray(abs(self.scipy()).sum(axis=1)).max(initial=0.0))
 
     def add_scalar(self, m: Array, at: Ints | None = None) -> None:
         """Add numbers to the diagonals of blocks: A += m 1, in place."""

@@ -71,10 +71,7 @@ def body_force(points: Array, group: ElementGroup, b: Array) -> Array:
 def body_force_by_function(
     points: Array, group: ElementGroup, b: Callable[[Array], Array], factors: int
 ) -> Array:
-    """Return ∫ N b dV of a group as nodal forces (n, 3) in N; b of places (m, 3) gives (m, 3) in N/m³.
-
-    b is taken at the points of a rule that is exact for `factors` shape functions.
-    """
+    """Return ∫ N b dV of a group as nodal forces (n, 3) in N; b of places (m, 3) gives (m, 3) in N/m³."""
     total = np.zeros_like(points)
     for part in by_mass_rule(points, group, factors):
         N, _ = tabulate(part.element.shape, part.rule)

@@ -52,10 +52,7 @@ class MatrixFree:
 
     @staticmethod
     def takes(group: ElementGroup) -> bool:
-        """Return whether the kernels know the stiffness of a group, and their product pays.
-
-        Of linear elements it does for hexahedra.
-        """
+        """Return whether the kernels know the stiffness of a group, and their product pays."""
         if compiled("multigrid", group.element) is None or group.strain_tables() is not None:
             return False
         shape = group.element.shape

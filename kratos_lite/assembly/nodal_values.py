@@ -42,11 +42,7 @@ def extrapolated(points: Array, group: ElementGroup, u: Array, *, stress: bool =
 def averages(
     points: Array, groups: Sequence[ElementGroup], u: Array, n_elements: int, *, stress: bool = True
 ) -> tuple[Array, Array]:
-    """Return stresses, or strains: means over the volume of each element (m, 6) and nodal (n, 6).
-
-    Nodal values are extrapolated in each element and averaged over the elements around each node.
-    One pass over the elements gives both.
-    """
+    """Return stresses, or strains: means over the volume of each element (m, 6) and nodal (n, 6)."""
     total, count = np.zeros((len(points), 6)), np.zeros(len(points))
     means = np.zeros((n_elements, 6))
     for group in groups:

@@ -184,10 +184,7 @@ class Recovery:
         self._last: tuple[Array, list[Array]] | None = None  # displacements, and C ε at nodes
 
     def nodal(self, u: Array, *, stress: bool = True) -> Array:
-        """Return recovered stresses with prestress in Pa, or strains, at nodes (n, 6).
-
-        Nodes of several materials have the mean of these; nodes without elements 0.
-        """
+        """Return recovered stresses with prestress in Pa, or strains, at nodes (n, 6)."""
         total, count = np.zeros((len(self.points), 6)), np.zeros(len(self.points))
         for region, values in self.by_region(u, stress=stress):
             total[region.nodes] += values

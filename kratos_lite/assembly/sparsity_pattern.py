@@ -1,7 +1,6 @@
 """Sparsity pattern: which blocks of a global matrix the elements fill, and where.
 
-It is made from the node graph, once for each connectivity.  Compiled, the places of a few elements are
-found as they are added; NumPy keeps the place of every entry of every element.
+It is made from the node graph, once for each connectivity.
 """
 
 from __future__ import annotations
@@ -38,20 +37,9 @@ class Pattern:
         return np.flatnonzero(self.rows() == self.indices)
 
     @cached_property
-    def positions(self) -> list[Rows]:
-        """Position of each node pair of each element, (m, k, k) of each number."""
-        keys = self.rows() * self.n_nodes + self.indices
-        return [self._find(keys, nodes) for nodes in self.connectivity]
-
-    def _find(self, keys: Ints, nodes: Rows) -> Rows:
-        m, k = nodes.shape
-        positions = np.zeros((m, k, k), dtype=np.int32)
-        step = max(1, 1_000_000 // (k * k))
-        for start in range(0, m, step):
-            n = nodes[start : start + step].astype(np.int64)
-            pairs = n[:, :, None] * self.n_nodes + n[:, None, :]
-            positions[start : start + step] = np.searchsorted(keys, pairs)
-        return positions
+    def _keys(self) -> Ints:
+        """A number for each block, ascending."""
+        return self.rows() * self.n_nodes + self.indices
 
     def add(self, data: Array, number: int, window: slice, matrices: Array) -> None:
         """Add matrices of some elements of a number: (m, k, k, 3, 3) to (nnz, 3, 3), (m, k, k) to (nnz,)."""
@@ -59,7 +47,9 @@ class Pattern:
             matrices = np.ascontiguousarray(matrices)
             module.add_matrices(self.connectivity[number][window], matrices, self.indptr, self.indices, data)
         else:
-            _add_blocks(data, self.positions[number][window], matrices)
+            n = self.connectivity[number][window].astype(np.int64)
+            places = np.searchsorted(self._keys, n[:, :, None] * self.n_nodes + n[:, None, :])
+            _add_blocks(data, places, matrices)
 
 
 def _pattern(n_nodes: int, connectivity: Sequence[Rows]) -> tuple[Rows, Rows]:
@@ -94,7 +84,7 @@ class PatternCache:
         return self._pattern
 
 
-def _add_blocks(data: Array, positions: Rows, matrices: Array) -> None:
+def _add_blocks(data: Array, positions: Ints, matrices: Array) -> None:
     """Add element matrices to node blocks `data`; see `Pattern.add`."""
     from scipy.sparse import csc_array
 

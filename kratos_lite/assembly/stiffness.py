@@ -6,7 +6,7 @@ chunks.  Neither all element matrices nor a triplet list of the whole model ever
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -30,35 +30,22 @@ def assemble_stiffness(
     points = as_double(points)
     done, total = 0, sum(len(group) for group in groups)
     for number, group in enumerate(groups):
-        kernels = compiled("stiffness", group.element)
-        add = _add_compiled if kernels else _add_computed
-        for count in add(data, points, group, pattern, number):
+        if module := compiled("stiffness", group.element):
+            nodes, _, dN, weights = group.tables()
+            law = group.kernel_arguments()[0], group.strain_tables()
+            module.add_stiffness(points, nodes, dN, weights, *law, pattern.indptr, pattern.indices, data)
+            counts: Iterable[int] = (len(group),)
+        else:
+
+            def stiffness(chunk: slice, group: ElementGroup = group) -> Array:
+                return group.at(points, chunk).stiffness_by_axis(group.material.C)
+
+            counts = add_in_parts(data, group, pattern, number, stiffness)
+        for count in counts:
             done += count
             if progress:
                 progress("assemble", done / total)
     return BlockMatrix(data, pattern.indices, pattern.indptr)
-
-
-def _add_compiled(
-    data: Array, points: Array, group: ElementGroup, pattern: Pattern, number: int
-) -> Iterator[int]:
-    """Add the stiffness of a group; yield the number of elements."""
-    nodes, _, dN, weights = group.tables()
-    law = group.kernel_arguments()[0], group.strain_tables()
-    module = compiled("stiffness", group.element)
-    module.add_stiffness(points, nodes, dN, weights, *law, pattern.indptr, pattern.indices, data)
-    yield len(group)
-
-
-def _add_computed(
-    data: Array, points: Array, group: ElementGroup, pattern: Pattern, number: int
-) -> Iterator[int]:
-    """Do the same in NumPy, in parts."""
-
-    def stiffness(chunk: slice) -> Array:
-        return group.at(points, chunk).stiffness_by_axis(group.material.C)
-
-    return add_in_parts(data, group, pattern, number, stiffness)
 
 
 def add_in_parts(

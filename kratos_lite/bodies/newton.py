@@ -9,7 +9,7 @@ import numpy as np
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.bodies.linear_algebra import Entries
 from kratos_lite.solvers import direct
-from kratos_lite.solvers.constraint_map import ConstraintMap
+from kratos_lite.solvers.constraints import ConstraintMap
 from kratos_lite.solvers.linear_solver import LinearSolver
 from kratos_lite.solvers.plan import Facts, choose
 from kratos_lite.typing import Array, Ints

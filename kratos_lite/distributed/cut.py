@@ -12,7 +12,7 @@ import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.mesh import Block, Faces
-from kratos_lite.solvers.constraint_map import ConstraintMap
+from kratos_lite.solvers.constraints import ConstraintMap
 from kratos_lite.typing import Array, Ints, Mask
 
 Dependents: TypeAlias = "tuple[Ints, Ints, Array]"

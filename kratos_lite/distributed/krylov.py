@@ -17,7 +17,7 @@ from kratos_lite.distributed.petsc import (
     set_options,
     unused,
 )
-from kratos_lite.solvers.iteration import MAX_ITERATIONS, FractionDone
+from kratos_lite.solvers.iteration import MAX_ITERATIONS, Monitor
 from kratos_lite.solvers.plan import Facts, Plan, over_ranks
 from kratos_lite.typing import Progress
 
@@ -114,7 +114,7 @@ class Krylov:
         self.prefix = f"{PREFIX}{next(NUMBERS)}_"
         self.options, self.given = {**chosen, **given}, dict(given)
         self._A, self._is_ready, self.most = A, False, most
-        self._fraction: FractionDone | None = None
+        self._monitor: Monitor | None = None
         with plain_errors():
             set_options(self.prefix, self.options)
             self.ksp = petsc().KSP().create(A.comm)
@@ -190,12 +190,12 @@ class Krylov:
             rtol=tolerance if "ksp_rtol" not in self.given else None,
             max_it=self.most if "ksp_max_it" not in self.given else None,
         )
-        self._fraction = FractionDone(tolerance, progress) if progress else None
+        self._monitor = Monitor(tolerance, progress) if progress else None
         self._size = 0.0
         with plain_errors():
             ksp.solve(b, x)
-        if self._fraction:
-            self._fraction.finish()
+        if self._monitor:
+            self._monitor.finish()
         return (0 if ksp.getType() == "preonly" else ksp.getIterationNumber()), self._failure()
 
     def _failure(self) -> str:
@@ -211,8 +211,8 @@ class Krylov:
     def _report(self, ksp: Any, iteration: int, residual: float) -> None:
         """Report progress."""
         self._size = self._size or residual
-        if self._fraction is not None and self._size > 0:
-            self._fraction(residual / self._size)
+        if self._monitor is not None and self._size > 0:
+            self._monitor(residual / self._size)
 
     def unused(self) -> list[str]:
         """Return the user's options that PETSc has not asked for."""

@@ -24,7 +24,7 @@ from kratos_lite.distributed.petsc import parsed
 from kratos_lite.elements.formulations import bulk_over_shear
 from kratos_lite.errors import SolveError
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
-from kratos_lite.solvers.constraint_map import ConstraintMap
+from kratos_lite.solvers.constraints import ConstraintMap
 from kratos_lite.solvers.iteration import MAX_ITERATIONS
 from kratos_lite.solvers.linear_solver import Solution
 from kratos_lite.solvers.plan import MUMPS_FALLBACK, Plan

@@ -23,7 +23,7 @@ from kratos_lite.distributed.ghosts import Ghosts
 from kratos_lite.distributed.multigrid import Level, Multigrid
 from kratos_lite.native import kernels
 from kratos_lite.solvers.coarse_level import has_corners, has_middle_nodes, is_stretched, p_coarse_level
-from kratos_lite.solvers.constraint_map import rigid_modes
+from kratos_lite.solvers.constraints import rigid_modes
 from kratos_lite.solvers.multigrid import multigrid
 from kratos_lite.solvers.plan import Facts, needs_no_matrix
 from kratos_lite.solvers.plate_level import plate_axes

@@ -213,10 +213,7 @@ def select(blocks: Sequence[Block], rows: Ints) -> list[Block]:
 
 
 def distinct(values: Ints) -> Ints:
-    """Return the different values in increasing order.
-
-    Unlike ``np.unique`` it does not import masked arrays, and it is quick where all are equal.
-    """
+    """Return the different values in increasing order."""
     if not len(values) or (values == values[0]).all():
         return values[:1]
     ordered: Ints = np.sort(values)
@@ -240,10 +237,7 @@ def ids_of(blocks: Iterable[Block]) -> Ints:
 
 
 def rows_of_ids(ids: Ints, wanted: ArrayLike, order: Ints | None = None) -> Ints:
-    """Return where each wanted id stands in `ids`; -1 where it does not.
-
-    Who asks often gives the `order` that sorts the ids.
-    """
+    """Return where each wanted id stands in `ids`; -1 where it does not."""
     wanted = np.asarray(wanted, dtype=np.int64)
     if not len(ids):
         return np.full(wanted.shape, -1, dtype=np.int64)

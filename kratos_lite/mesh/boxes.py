@@ -22,8 +22,7 @@ def is_solid(block: Block) -> bool:
 def cell_boxes(points: Array, block: Block) -> tuple[Array, Array]:
     """Return lowest and highest coordinates (m, 3) that enclose the cells of a block of solids.
 
-    A cell with straight edges lies among its corners.  A curved one deviates from it by at most
-    Σ |N_a| |D_a|, with D_a the distance of node a from its place in the straight cell.
+    A curved cell deviates from the straight one by at most Σ |N_a| |D_a|, D_a being the distance of node a.
     """
     shape = block.shape
     assert shape is not None
@@ -47,10 +46,7 @@ def _deviations(shape: type[Shape], X: Array) -> Array:
 
 
 def curvature(shape: type[Shape], X: Array) -> Array:
-    """Return how far the nodes of cells X (m, n, 3) lie from the straight cell, (m,), as fraction of an edge.
-
-    It is measured in reference coordinates, so stretching a cell does not change it; 0 for linear shapes.
-    """
+    """Return how far the nodes of cells X (m, n, 3) lie from straight ones, (m,), by reference places."""
     if len(shape.nodes) == shape.corners:
         return np.zeros(len(X))
     corners, edge = shape.nodes[: shape.corners], 2.0 if shape.cell == "hexahedron" else 1.0
@@ -60,12 +56,7 @@ def curvature(shape: type[Shape], X: Array) -> Array:
 
 
 class BoxTree:
-    """A tree of boxes: those near each other have a box around them, and so on up to one.
-
-    Parameters
-    ----------
-    low, high : (n, 3) float, m; corners of the boxes; one with low > high contains nothing.
-    """
+    """A tree of boxes from `low` to `high` (n, 3); near ones have a box around them, up to one."""
 
     def __init__(self, low: Array, high: Array) -> None:
         kept = np.flatnonzero((low <= high).all(axis=1))
@@ -99,10 +90,7 @@ def _filled(ends: Array, nowhere: float) -> Array:
 
 
 def _along_a_curve(points: Array) -> Ints:
-    """Return numbers (n,) that sort points so that those near each other stand together.
-
-    Source: Morton, A computer oriented geodetic data base (1966): the bits of the three coordinates in turn.
-    """
+    """Return numbers (n,) that sort points so that near ones stand together: Morton (1966), bits in turn."""
     if not len(points):
         return np.zeros(0, dtype=np.int64)
     low = points.min(axis=0)

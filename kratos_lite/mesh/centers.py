@@ -76,12 +76,7 @@ def raise_order(points: Array, corners: Ints, shape: type[Shape]) -> tuple[Array
 
 
 class Centers:
-    """Which node lies in the middle of which corners.
-
-    Parameters
-    ----------
-    blocks : elements; their nodes beyond the corners are known from the start.
-    """
+    """Which node lies in the middle of which corners."""
 
     def __init__(self, blocks: Iterable[Block] = ()) -> None:
         self._keys: Keys = np.zeros(0, dtype=np.uint64)
@@ -112,10 +107,7 @@ class Centers:
         return np.where(self._keys[at] == keys, self._nodes[at], -1)
 
     def make(self, keys: Keys, first: int) -> Ints:
-        """Give new nodes, from number `first` on, to keys (k,) that have none; return which key came first.
-
-        Numbers follow the order in which keys come.
-        """
+        """Give new nodes, from number `first` on, to keys (k,) that have none; return which they are."""
         missing = np.flatnonzero(self.find(keys) < 0)
         _, at = np.unique(keys[missing], return_index=True)
         new: Ints = missing[np.sort(at)]

@@ -15,10 +15,7 @@ SHORT = 1e-10
 
 
 def crossings(mesh: Mesh, a: Array, b: Array) -> Array:
-    """Return where on the line from a to b elements begin and end: 0 = t_0 < t_1 < … < t_k = 1.
-
-    Between two of them the line lies in one element, if no face curves out of it and back.
-    """
+    """Return where on the line from a to b elements begin and end: 0 = t_0 < t_1 < … < t_k = 1."""
     near = Mesh(
         mesh.points,
         select(mesh.blocks, _near(mesh, a, b)),

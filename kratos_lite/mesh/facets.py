@@ -16,11 +16,7 @@ STRAIGHT = 1e-3
 
 
 def facets(mesh: Mesh) -> tuple[int, float]:
-    """Return how many boundary faces seem to stand for a curved surface, and by how many degrees they turn.
-
-    These have straight edges and meet two neighbors or more at small angles; along a fold of flat surfaces
-    faces meet one.
-    """
+    """Return how many boundary faces seem to stand for a curved surface, and their turn in degrees."""
     one, other, angle, *_ = _folds(mesh)
     blocks = [block for block in mesh.boundary if block.shape is not None]
     straight = np.concatenate([np.zeros(0, dtype=bool), *[_straight(mesh, block) for block in blocks]])
@@ -39,11 +35,7 @@ def reentrant_nodes(mesh: Mesh) -> Mask:
 
 
 def _folds(mesh: Mesh) -> tuple[Ints, Ints, Array, Array, Ints]:
-    """Return the two boundary faces at each edge (k,), how they meet, and the nodes of the edge (k, 2).
-
-    They meet at an angle in degrees between their normals; the center of the second is outside the first by
-    a fraction of the distance between their centers.
-    """
+    """Return the two boundary faces at each edge (k,), how they meet, and the nodes of the edge (k, 2)."""
     edges, faces, ends, normals, centers = [], [NO_ROWS], [], [np.zeros((0, 3))], [np.zeros((0, 3))]
     for block in mesh.boundary:
         assert block.shape is not None

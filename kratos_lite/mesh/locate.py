@@ -85,10 +85,7 @@ class Located:
         return out.reshape((*self.rows.shape, *values.shape[1:]))
 
     def weights(self) -> csr_array[Any]:
-        """Return the shape functions as a sparse matrix W (m, n), one row per point.
-
-        W v are nodal values v (n, ...) at the points, W.T f are forces f (m, ...) at them as nodal forces.
-        """
+        """Return the shape functions as a sparse matrix W (m, n), one row per point."""
         from scipy.sparse import csr_array
 
         self.require()

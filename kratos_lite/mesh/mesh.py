@@ -160,11 +160,6 @@ class Mesh(Tabular):
         -------
         Mesh
 
-        Raises
-        ------
-        MeshError
-            As for a new mesh.
-
         Examples
         --------
         >>> from kratos_lite import box
@@ -218,12 +213,7 @@ class Mesh(Tabular):
         Returns
         -------
         (...) int
-            Rows of `points`; -1 where there is no such id.
-
-        Raises
-        ------
-        MeshError
-            Ids are no whole numbers.
+            -1 where there is no such id.
         """
         ids = whole_numbers(ids, "ids of nodes", error=MeshError)
         if self._is_counting:

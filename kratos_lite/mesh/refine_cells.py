@@ -62,14 +62,7 @@ def _joined(blocks: Sequence[Block]) -> Block:
 
 
 class CellRefiner:
-    """A refined mesh while it is made.
-
-    Parameters
-    ----------
-    mesh : the coarse mesh.
-    centers : its nodes that lie in the middle of edges, faces and cells.
-    target : gives name and shape of the pieces of a block.
-    """
+    """A refined mesh while it is made."""
 
     def __init__(self, mesh: Mesh, centers: Centers, target: Target) -> None:
         self.mesh, self.centers, self.target = mesh, centers, target

@@ -37,10 +37,7 @@ class RefinedMesh:
         return np.concatenate([values, np.add.reduceat(weighted, self.start[:-1])])
 
     def onto(self, geometry: Mapping[str, Callable[[Array], Array]]) -> RefinedMesh:
-        """Return the same with the new nodes of parts moved onto the true surfaces.
-
-        Hanging nodes stay on the edges and faces of those they depend on.
-        """
+        """Return the same with the new nodes of parts moved onto the true surfaces."""
         points, old = self.mesh.points.copy(), self.coarse.n_nodes
         for part, function in geometry.items():
             rows = self.mesh.nodes(part)
@@ -53,9 +50,8 @@ class RefinedMesh:
     def refined_nodes(self, rows: Ints) -> Ints:
         """Return the nodes of the finer mesh that belong to a set of nodes of the coarse one.
 
-        A set of nodes on the surface means the boundary faces of elements that have all their nodes in it;
-        new nodes inside these and on their edges belong to it.  A set with nodes that are on no such face
-        means the edges, faces and elements, too, that have all their nodes in it and one of these.
+        On the surface these are those of boundary faces with all nodes in the set; where nodes of the set are
+        on no such face, also those of edges, faces and elements with all nodes in it and one of these.
         """
         if not len(self.inside) or not len(rows):
             return rows

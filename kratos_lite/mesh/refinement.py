@@ -137,10 +137,7 @@ def _condition_cuts(mesh: Mesh, block: Block, cut: Keys, direction: Array | None
 
 
 def _closed(mesh: Mesh, centers: Centers, marked: Mask) -> Mask:
-    """Return the marked elements and those that must be cut with them.
-
-    An edge or face that is split already must not be split once more by a marked neighbor.
-    """
+    """Return the marked elements and those that must be cut with them."""
     parts, owners = _parts_of_split(mesh, centers)
     keys, element = _keys_by_element(mesh)
     marked = marked.copy()

@@ -89,10 +89,7 @@ def _of_pyramid(X: Array) -> tuple[Piece, ...]:
 
 @remembered
 def across(cell: str, axis: int) -> tuple[Piece, ...]:
-    """Return the pieces of a cell that is cut across all its axes but one: 4, or 2 of a face, 1 of a line.
-
-    Hexahedra and four-sided faces keep any axis, wedges that from triangle to triangle.
-    """
+    """Return the pieces of a cell that is cut across all its axes but one: 4, or 2 of a face, 1 of a line."""
     whole = pieces(cell)
     X = LINEAR[cell].nodes
     cells: dict[tuple[float, ...], Piece] = {}

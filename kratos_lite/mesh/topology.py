@@ -24,11 +24,7 @@ FEW_SETS = 100
 
 
 def equal_sets(groups: Sequence[Sets]) -> tuple[Ints, Ints]:
-    """Return pairs of sets of nodes that are equal in whatever order, as two arrays of set numbers.
-
-    Sets count through the groups, then the tuples of columns, then the cells.  Each set is paired
-    with the next one that is equal.
-    """
+    """Return pairs of equal sets of nodes, by number through groups, columns, cells; each with the next."""
     few = sum(len(cells) * len(columns) for cells, columns in groups) <= FEW_SETS
     compiled = None if few else kernels("mesh")
     if compiled is None:
@@ -80,19 +76,7 @@ def components(n: int, pairs: Ints) -> Ints:
 
 
 class Faces:
-    """All faces of all elements, and which of them coincide.
-
-    Faces count through the blocks, then the faces of the cell, then the cells.
-
-    Parameters
-    ----------
-    blocks : blocks of elements; one without a shape has no faces.
-    hanging : hanging nodes, whose large and small faces meet.
-
-    Attributes
-    ----------
-    one, other : pairs of faces that meet: with the same corners, then large and small ones.
-    """
+    """All faces of elements, through blocks, faces of a cell, cells; `one` and `other` meet."""
 
     def __init__(self, blocks: Sequence[Block], hanging: HangingNodes | None = None) -> None:
         self.blocks = list(blocks)

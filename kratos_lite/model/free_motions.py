@@ -22,7 +22,7 @@ from kratos_lite.errors import MAX_PROBLEMS, ModelError
 from kratos_lite.mesh import NO_ROWS, Mesh
 from kratos_lite.model.connected_bodies import Bodies
 from kratos_lite.model.supports import Supports
-from kratos_lite.solvers.constraint_map import rigid_modes
+from kratos_lite.solvers.constraints import rigid_modes
 from kratos_lite.typing import Array, Ints, Mask
 
 ROUND_OFF, OF_PLACES = 1e4, 10.0

@@ -19,7 +19,7 @@ from kratos_lite.model.connected_bodies import FEW, Bodies, bodies
 from kratos_lite.model.free_motions import FreeMotions
 from kratos_lite.model.supports import Supports
 from kratos_lite.solvers import direct
-from kratos_lite.solvers.constraint_map import rigid_modes
+from kratos_lite.solvers.constraints import rigid_modes
 from kratos_lite.typing import Array, Ints
 
 FREE = 1e-7

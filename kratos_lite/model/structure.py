@@ -31,7 +31,7 @@ from kratos_lite.model.rigid_body_modes import free_motions
 from kratos_lite.model.spurious_modes import check_spurious_modes
 from kratos_lite.model.supports import DirichletCondition, Supports, axis_numbers
 from kratos_lite.quadrature import Rule
-from kratos_lite.solvers.constraint_map import rigid_modes
+from kratos_lite.solvers.constraints import rigid_modes
 from kratos_lite.tabular import Tabular
 from kratos_lite.time_series import Factor
 from kratos_lite.typing import Array

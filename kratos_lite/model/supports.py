@@ -11,8 +11,7 @@ import numpy as np
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh, Where
 from kratos_lite.model.loads.base import key_of
-from kratos_lite.solvers.constraint_map import ConstraintMap, constraint_map
-from kratos_lite.solvers.constraints import Constraints, eliminate
+from kratos_lite.solvers.constraints import ConstraintMap, Constraints, constraint_map, eliminate
 from kratos_lite.time_series import function_of
 from kratos_lite.typing import Array, Ints, Mask
 from kratos_lite.validation import finite, short, whole_numbers

@@ -161,34 +161,25 @@ def _submeshes(points: Array, group: ElementGroup, corners: Ints, halved: bool) 
     shape = group.element.shape
     if _is_linear(shape):
         return [_Submesh(group, group.element, corners[None])]
-    element = LINEAR[shape.linear()]
-    halves = [_halves(shape, corners, axis) if halved else None for axis in range(3)]
-    if all(cells is None for cells in halves):
-        return [_Submesh(group, element, corners[None])]
-    sides = sides_of(element.shape, points[group.nodes[:, corners]])
-    order = np.sort(sides, axis=1)
-    long = order[:, 2] > LONG * order[:, 1]
-    if 2 * np.count_nonzero(long) < len(long):  # a few come apart from their neighbors, which takes more
-        return [_Submesh(group, element, corners[None])]
-    along = np.where(long, sides.argmax(axis=1), -1)
-    parts = []
-    for axis in (-1, 0, 1, 2):
-        chosen = along == axis
-        if not chosen.any():
-            continue
-        cells = None if axis < 0 else halves[axis]
-        parts.append(_Submesh(group.take(chosen), element, corners[None] if cells is None else cells))
-    return parts
+    element, along = LINEAR[shape.linear()], np.full(len(group), -1)
+    cells = [*(_halves(shape, corners, axis) for axis in range(3) if halved), corners[None]]
+    if any(len(ends) > 1 for ends in cells):
+        sides = sides_of(element.shape, points[group.nodes[:, corners]])
+        order = np.sort(sides, axis=1)
+        long = order[:, 2] > LONG * order[:, 1]
+        if 2 * np.count_nonzero(long) >= len(long):  # a few come apart from their neighbors, which takes more
+            along[long] = sides[long].argmax(axis=1)
+    return [_Submesh(group.take(along == axis), element, cells[axis]) for axis in np.unique(along)]
 
 
-def _halves(shape: type[Shape], corners: Ints, axis: int) -> Ints | None:
-    """Return the corners of the two halves of a cell along an axis, if it has nodes there."""
+def _halves(shape: type[Shape], corners: Ints, axis: int) -> Ints:
+    """Return the corners of the two halves of a cell along an axis; of the cell if it has no nodes there."""
     ends = shape.nodes[corners]
     middle = ends.copy()
     middle[:, axis] = (ends[:, axis].min() + ends[:, axis].max()) / 2
     same = np.abs(shape.nodes[None] - middle[:, None]).max(axis=2) < 1e-12
     if not same.any(axis=1).all():
-        return None
+        return corners[None]
     between, low = same.argmax(axis=1), ends[:, axis] < middle[:, axis]
     return np.array([np.where(low, corners, between), np.where(low, between, corners)])
 
@@ -247,10 +238,7 @@ def _interpolation(submeshes: Sequence[_Submesh], number: Rows) -> tuple[Rows, R
 def _continuous(
     level: PCoarseLevel, groups: Sequence[ElementGroup], number: Rows, hanging: HangingNodes
 ) -> PCoarseLevel:
-    """Return the level of continuous fields: corners in the middle of larger edges and faces follow these.
-
-    Without it the linear elements of both sides come apart there, and iterations grow fivefold.
-    """
+    """Return the level of continuous fields: corners in the middle of larger edges and faces follow these."""
     from scipy.sparse import csr_array
 
     n = len(number)
@@ -311,7 +299,7 @@ def apply_ties(level: PCoarseLevel, T: Any, free: Ints) -> PCoarseLevel:
     dependent.flat[free] = False
     is_dependent = np.asarray(dependent.any(axis=1))
     if not is_dependent[level.nodes].any():
-        return level  # as with hanging nodes, which the level has left out
+        return level  # as with hanging nodes, which the level omits
     chosen = is_dependent[entries.row // 3]
     row, column, data = entries.row[chosen], column[chosen], entries.data[chosen]
     by_axis = [

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,16 +14,14 @@ from kratos_lite.assembly.matrix_free import MatrixFree
 from kratos_lite.assembly.sparsity_pattern import Pattern, PatternCache
 from kratos_lite.assembly.stiffness import assemble_dense, assemble_stiffness
 from kratos_lite.elements.formulations import bulk_over_shear
-from kratos_lite.solvers.constraint_map import ConstraintMap
+from kratos_lite.solvers.constraints import ConstraintMap
+from kratos_lite.solvers.direct import cuthill_mckee, nodal_width
 from kratos_lite.solvers.linear_solver import LinearSolver, Solution
 from kratos_lite.solvers.plan import Facts, Plan, choose
-from kratos_lite.typing import Array, Ints, Progress
+from kratos_lite.typing import Array, Ints, Mask, Progress
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from kratos_lite.mesh.hanging import HangingNodes
-    from kratos_lite.solvers.coarse_level import PCoarseLevel
 
 NO_MATRIX = "the stiffness matrix, as its products are computed element by element"
 """What is skipped with linear elements inside the quadratic ones."""
@@ -75,8 +73,6 @@ class ConstrainedSystem:
         )
 
     def _bandwidth(self) -> float:
-        from kratos_lite.solvers.banded import cuthill_mckee, nodal_width  # rarely needed
-
         width = nodal_width(self.pattern, self.pattern.rows(), cuthill_mckee(self.pattern)[1])
         return width * len(self.constraint_map.free) / len(self.nodes)
 
@@ -100,10 +96,7 @@ class ConstrainedSystem:
 
     @cached_property
     def K(self) -> Any:
-        """The stiffness matrix (3a, 3a) in N/m: a BlockMatrix, or a full array for the method ``dense``.
-
-        It is a MatrixFree where the plan needs no matrix, and a SplitMatrix for ``displacement-pressure``.
-        """
+        """The stiffness matrix (3a, 3a) in N/m: a BlockMatrix, or a full array for the method ``dense``."""
         if self.plan.method == "dense":
             return assemble_dense(self.points, self.groups)
         if not self.plan.matrix_free:
@@ -127,8 +120,9 @@ class ConstrainedSystem:
     def equations(self) -> LinearSolver:
         """What solves them."""
         groups = getattr(self.K, "groups", self.groups)  # those of a split matrix have other materials
-        level = partial(_p_coarse_level, self.points, groups, self._hanging)
-        return LinearSolver(self.K, self.constraint_map, self.points, self.plan, level)
+        return LinearSolver(
+            self.K, self.constraint_map, self.points, self.plan, groups=groups, hanging=self._hanging
+        )
 
     def solve(
         self,
@@ -194,37 +188,7 @@ def renumber(n_nodes: int, groups: Sequence[ElementGroup]) -> tuple[Ints, list[E
     return nodes, [replace(group, nodes=local[group.nodes]) for group in groups]
 
 
-def _p_coarse_level(
-    points: Array, groups: Sequence[ElementGroup], hanging: HangingNodes | None
-) -> PCoarseLevel | None:
-    """Return the coarse level, whose module small models do not import."""
-    from kratos_lite.solvers.coarse_level import p_coarse_level
-
-    return p_coarse_level(points, groups, hanging)
-
-
-def select(groups: Sequence[ElementGroup], moving: NDArray[np.bool_]) -> list[ElementGroup]:
+def select(groups: Sequence[ElementGroup], moving: Mask) -> list[ElementGroup]:
     """Return the elements that have a node in `moving` (n,), group by group."""
-    if moving.all():
-        return list(groups)
-    chosen = []
-    for group in groups:
-        still = _without(group.nodes, moving)
-        if not len(still):
-            chosen.append(group)
-        elif len(still) < len(group):
-            keep = np.ones(len(group), dtype=bool)
-            keep[still] = False
-            stress = None if group.prestress is None else group.prestress[keep]
-            chosen.append(replace(group, nodes=group.nodes[keep], rows=group.rows[keep], prestress=stress))
-    return chosen
-
-
-def _without(nodes: NDArray[np.int32], moving: NDArray[np.bool_]) -> Ints:
-    """Return the cells (m, k) with no node in `moving`; most are ruled out by their first nodes."""
-    still = np.flatnonzero(~moving[nodes[:, 0]])
-    for column in range(1, nodes.shape[1]):
-        if not len(still):
-            break
-        still = still[~moving[nodes[still, column]]]
-    return still
+    moves = [np.asarray(moving[group.nodes].any(axis=1)) for group in groups]
+    return [group.take(chosen) for group, chosen in zip(groups, moves, strict=True) if chosen.any()]

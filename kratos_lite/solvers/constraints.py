@@ -1,15 +1,24 @@
-"""Multi-point constraints u[dependent] = Σ weight · u[independent] + constant, and their elimination."""
+"""Constraints of degrees of freedom, and the map u = T q + c from the free ones to all, by elimination.
+
+Multi-point constraints are u[dependent] = Σ weight · u[independent] + constant.  T^T K T q = T^T (f - K c)
+stays symmetric and holds them exactly, without a penalty.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kratos_lite.errors import ModelError
 from kratos_lite.typing import Array, Ints, Mask
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+    from scipy.sparse import csr_array
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,36 +92,35 @@ class Constraints:
 def eliminate(
     constraints: Constraints, fixed: Mask, values: Array, name: Callable[[int], str]
 ) -> Constraints:
-    """Express every dependent dof by free ones; ModelError for circles and dofs constrained twice."""
+    """Express every dependent dof by free ones; ModelError for circles and dofs constrained twice.
+
+    With u_d = W u + P u_d + k, each pass doubles the length of the chains of dependents that W and k hold.
+    """
     dependents, count = constraints.dependents, len(constraints)
+    if not count:
+        return constraints
+    from scipy.sparse import csr_array, diags_array
+    from scipy.sparse.csgraph import connected_components
+
     _check(dependents, fixed.ravel(), name)
-    place = np.full(fixed.size, -1)
-    place[dependents] = np.arange(count)
-    owner, dof, weight = constraints.owner, constraints.independents, constraints.weights
-    constants, held = constraints.constants.copy(), fixed.flat[dof]
-    np.add.at(constants, owner[held], weight[held] * values.flat[dof[held]])
-    owner, dof, weight = _summed(owner[~held], dof[~held], weight[~held])
-    for _ in range(count.bit_length() + 1):  # each pass halves the chains of dependents
-        chained = place[dof] >= 0
-        if not chained.any():
-            break
-        start = np.searchsorted(owner, np.arange(count + 1))
-        inner = place[dof[chained]]
-        sizes = np.diff(start)[inner]
-        entries = np.repeat(start[inner] - np.cumsum(sizes) + sizes, sizes) + np.arange(sizes.sum())
-        change = np.zeros(count)
-        np.add.at(change, owner[chained], weight[chained] * constants[inner])
-        constants += change
-        owner, dof, weight = _summed(
-            np.concatenate([owner[~chained], np.repeat(owner[chained], sizes)]),
-            np.concatenate([dof[~chained], dof[entries]]),
-            np.concatenate([weight[~chained], np.repeat(weight[chained], sizes) * weight[entries]]),
-        )
-    else:
-        at = _on_circle(constraints, place)
+    entries = constraints.weights, constraints.independents, constraints.start
+    W: Any = csr_array(entries, shape=(count, fixed.size))
+    P: Any = W[:, dependents]
+    components = connected_components(P, connection="strong")[1]
+    on_circle = (np.bincount(components)[components] > 1) | (P.diagonal() != 0)
+    if on_circle.any():
+        at = int(dependents[on_circle.argmax()])
         raise ModelError(f"the constraints of {name(at)} form a cycle; remove one of them")
-    start = np.searchsorted(owner, np.arange(count + 1))
-    return Constraints(dependents, start, dof, weight, constants, np.zeros(count, dtype=bool))
+    constants = constraints.constants + W @ np.where(fixed, values, 0.0).ravel()
+    is_free = ~fixed.ravel()
+    is_free[dependents] = False
+    W = W @ diags_array(1.0 * is_free)
+    W.eliminate_zeros()
+    while P.nnz:
+        constants, W, P = constants + P @ constants, W + P @ W, P @ P
+    W.sort_indices()
+    start, dofs = W.indptr.astype(np.int64), W.indices.astype(np.int64)
+    return Constraints(dependents, start, dofs, W.data, constants, np.zeros(count, dtype=bool))
 
 
 def _check(dependents: Ints, fixed: Mask, name: Callable[[int], str]) -> None:
@@ -126,25 +134,101 @@ def _check(dependents: Ints, fixed: Mask, name: Callable[[int], str]) -> None:
         raise ModelError(f"{name(both)} is both fixed and dependent by a constraint; do one of the two")
 
 
-def _summed(owner: Ints, dof: Ints, weight: Array) -> tuple[Ints, Ints, Array]:
-    """Return entries in order, those of the same constraint and dof as one."""
-    if not len(owner):
-        return owner, dof, weight
-    order = np.lexsort((dof, owner))
-    owner, dof = owner[order], dof[order]
-    first = np.flatnonzero(np.append(True, (np.diff(owner) != 0) | (np.diff(dof) != 0)))
-    return owner[first], dof[first], np.add.reduceat(weight[order], first)
+@dataclass(eq=False)
+class ConstraintMap:
+    """The map u = T q + c from the free degrees of freedom q to all."""
+
+    free: Ints  # (q,) int, the free degrees of freedom
+    c: Array  # (N,) float, the displacement at q = 0 in m
+    # (N, q) sparse; None without dependent dofs, where q is added to the free components of c
+    T: csr_array[Any, Any] | None = None
+
+    @property
+    def is_free(self) -> Mask:
+        """Which degrees of freedom (N,) are free."""
+        is_free = np.zeros(len(self.c), dtype=bool)
+        is_free[self.free] = True
+        return is_free
+
+    def holding(self, constrained: Mask) -> ConstraintMap:
+        """Return the map with some of the free ones (N,) constrained, too, where they are at q = 0."""
+        keep = ~constrained.ravel()[self.free]
+        if keep.all():
+            return self
+        return ConstraintMap(self.free[keep], self.c, None if self.T is None else self.T[:, keep])
+
+    def transform(self, q: NDArray[Any]) -> NDArray[Any]:
+        """Return T q, (N, ...), of the free degrees of freedom (q, ...): without what is prescribed."""
+        if self.T is not None:
+            return np.asarray(self.T @ q)
+        u = np.zeros((len(self.c), *q.shape[1:]), dtype=q.dtype)
+        u[self.free] = q
+        return u
+
+    def transform_matrix(self) -> csr_array[Any, Any]:
+        """Return T (N, q) as a sparse matrix, whether or not there are dependents."""
+        from scipy.sparse import csr_array
+
+        if self.T is not None:
+            return self.T
+        q = len(self.free)
+        return csr_array((np.ones(q), (self.free, np.arange(q))), shape=(len(self.c), q))
+
+    def expand(self, q: Array, c: Array | None = None) -> Array:
+        """Return all displacements T q + c, (N,); `c` replaces that of the map."""
+        u = self.transform(q)
+        u += self.c if c is None else c
+        return u
+
+    def reduce(self, r: Array) -> Array:
+        """Return T^T r of forces (N,)."""
+        return np.asarray(self.T.T @ r) if self.T is not None else r[self.free]
+
+    def reduce_matrix(self, A: Any) -> Any:
+        """Return T^T A T of a sparse matrix (N, N) as CSR."""
+        if self.T is not None:
+            return (self.T.T @ A @ self.T).tocsr()
+        return A if len(self.free) == A.shape[0] else A[self.free][:, self.free]
 
 
-def _on_circle(constraints: Constraints, place: Ints) -> int:
-    """Return a dof that depends on itself: follow those that never end at free ones."""
-    ahead: dict[int, list[int]] = {}
-    for owner, at in zip(constraints.owner.tolist(), place[constraints.independents].tolist(), strict=True):
-        if at >= 0:
-            ahead.setdefault(owner, []).append(at)
-    while any(set(after) - set(ahead) for after in ahead.values()):
-        ahead = {one: kept for one, after in ahead.items() if (kept := [a for a in after if a in ahead])}
-    at = next(iter(ahead))
-    for _ in ahead:
-        at = ahead[at][0]
-    return int(constraints.dependents[at])
+def constraint_map(fixed: Mask, values: Array, dependents: Constraints | None = None) -> ConstraintMap:
+    """Return the map of nodes with prescribed displacements and dependents.
+
+    Where all supports displace the nodes alike along an axis, c carries the free ones along: what remains to
+    be solved for is the strain alone, and its error does not grow with the displacement.
+    """
+    constrained, c = fixed.ravel(), values.ravel() * fixed.ravel()
+    if dependents is None:
+        for axis in range(3):
+            at_axis, along = constrained[axis::3], c[axis::3]
+            if at_axis.any() and np.ptp(along[at_axis]) == 0 and along[at_axis][0] != 0:
+                along[:] = along[at_axis][0]
+        return ConstraintMap(np.flatnonzero(~constrained), c)
+    is_free = ~constrained
+    is_free[dependents.dependents] = False
+    free = np.flatnonzero(is_free)
+    column = np.full(len(constrained), -1)
+    column[free] = np.arange(len(free))
+    c[dependents.dependents] = dependents.constants
+    row = np.concatenate([free, dependents.dependents[dependents.owner]])
+    columns = column[np.concatenate([free, dependents.independents])]
+    weights = np.concatenate([np.ones(len(free)), dependents.weights])
+    from scipy.sparse import csr_array
+
+    return ConstraintMap(free, c, csr_array((weights, (row, columns)), shape=(len(constrained), len(free))))
+
+
+def rigid_modes(points: Array, center: ArrayLike | None = None) -> Array:
+    """Return the six rigid-body modes (3n, 6) of points (n, 3).
+
+    They are translations along x y z and rotations about x y z through `center`, the mean of the points if
+    not given.
+    """
+    X = points - (points.mean(axis=0) if center is None else np.asarray(center))
+    R = np.zeros((len(points), 3, 6))
+    R[:, range(3), range(3)] = 1
+    x, y, z = X.T
+    R[:, 1, 3], R[:, 2, 3] = -z, y
+    R[:, 0, 4], R[:, 2, 4] = z, -x
+    R[:, 0, 5], R[:, 1, 5] = -y, x
+    return R.reshape(-1, 6)

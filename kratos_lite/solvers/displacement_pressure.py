@@ -1,4 +1,4 @@
-"""Displacements and a pressure in each nearly incompressible element, found together.
+"""Displacements and a pressure in each nearly incompressible element, solved for together.
 
 With p = κ D u the equations (A + Dᵀ κ D) u = b are
 
@@ -24,20 +24,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kratos_lite.solvers import multigrid
-from kratos_lite.solvers.block_inverse import block_inverse
+from kratos_lite.assembly.block_matrix import BlockMatrix, block_rows
 from kratos_lite.solvers.coarse_level import PCoarseLevel
 from kratos_lite.solvers.dilatation import SplitMatrix
-from kratos_lite.solvers.direct import one_thread
-from kratos_lite.solvers.iteration import FractionDone, GoOn
-from kratos_lite.typing import Array, Mask, Progress, Rows
+from kratos_lite.solvers.iteration import GoOn
+from kratos_lite.solvers.multigrid import Compiled
+from kratos_lite.typing import Array, Ints, Mask, Rows
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
     from scipy.sparse import bsr_array
 
 DIRECTIONS = 80
-"""Iterations after which they start anew from the residual: their directions are kept until then."""
+"""Iterations after which they start anew from the residual."""
 REDUCED = 1e-10
 """Fraction of the residual at which they start anew, as rounding allows no more."""
 ROUGH = 0.03
@@ -49,154 +47,36 @@ DEGREE = 3
 INNER, INNER_MAX = 0.1, 120
 """Fraction of the energy at which a solution with S ends, and its most iterations."""
 
+STRONG = 0.4
+"""Nodes are strongly coupled where |A_ij| exceeds this fraction of sqrt(|A_ii| |A_jj|)."""
+NEAR = 3.0
+"""Distance of such nodes to that of the nearest ones at most: quadratic cells couple others as strongly."""
+LONGEST = 40
+"""Nodes of the largest group; larger ones are taken as single nodes."""
+
 
 class DisplacementPressure:
-    """What solves K u = b for one right side after another, where K is split."""
+    """What solves K u = b for one right side after another, where K is split; it needs the kernels."""
 
     def __init__(self, K: SplitMatrix, free: Mask, points: Array, linear: PCoarseLevel | None = None) -> None:
-        self._K, self._fixed = K, ~free
-        self._cycle = multigrid.multigrid(K.A, free, points, linear, DEGREE)
+        self._cycle = Compiled(K.A, free, points, linear, DEGREE)
         self.levels: list[int] = self._cycle.levels
         inverse = block_inverse(K.A, free, points, K.D, K.kept)
-        size = np.sqrt(np.concatenate([inverse.diagonal(), K.modulus]))
-        self._weight = size  # residuals are measured by the energy that they stand for
-        self._inverse_weight = np.where(size > 0, 1 / np.where(size > 0, size, 1.0), 0.0)
-        self._schur = _Schur(K, inverse, np.asarray(free.reshape(-1, 3).any(axis=1)))
-        self._kernel = None
-        if isinstance(self._cycle, multigrid.Compiled):
-            D, S = K.D, self._schur.S
-            vectors = self._schur.scale, K.bulk, K.kept, size, INNER, INNER_MAX
-            self._kernel = self._cycle.with_pressures(_arrays(D), _arrays(S), *vectors)
+        # residuals are measured by the energy that they stand for
+        self._weight = np.sqrt(np.concatenate([inverse.diagonal(), K.modulus]))
+        self._S, self._scale = _pressure_operator(K, inverse, free)
+        vectors = self._scale, K.bulk, K.kept, self._weight, INNER, INNER_MAX
+        self._kernel = self._cycle.with_pressures(_arrays(K.D), _arrays(self._S), *vectors)
 
     def precondition(self, r: Array) -> Array:
         """Return about K⁻¹ r: a rough solution."""
         return self.solve(r, ROUGH, 0.0, None)[0]
 
     def solve(
-        self,
-        b: Array,
-        tolerance: float,
-        norm: float,
-        progress: Progress | None,
-        go_on: GoOn | None = None,
+        self, b: Array, tolerance: float, norm: float, each: GoOn | None = None
     ) -> tuple[Array, int, bool]:
         """Return u, iterations and success."""
-        each = FractionDone(tolerance, progress, go_on)
-        if self._kernel is None:
-            with one_thread():
-                u, iterations, converged = self._solve(b, tolerance, norm, each)
-        else:
-            limits = MAX_ITERATIONS, DIRECTIONS, REDUCED
-            u, iterations, converged = self._kernel.solve(b, tolerance, norm, *limits, each)
-        if converged:
-            each.finish()
-        return u, iterations, converged
-
-    def _solve(self, b: Array, tolerance: float, norm: float, each: GoOn) -> tuple[Array, int, bool]:
-        n, norm_b = len(b), float(np.linalg.norm(b))
-        x = np.zeros(len(self._weight))
-        if norm_b == 0:
-            return x[:n], 0, True
-        r = self._residual(b, x)
-        first = float(np.linalg.norm(r))
-        aim, before, space = tolerance * first, float("inf"), _Directions(r)
-        for iteration in range(1, MAX_ITERATIONS + 1):
-            z = self._precondition(space.last * self._inverse_weight).astype(np.float32)
-            estimate = space.extend(z, self._weight * self._product(z.astype(float)))
-            stop = not each(estimate / first)
-            exhausted = space.full or estimate <= REDUCED * space.start or iteration == MAX_ITERATIONS
-            if not (stop or exhausted or estimate <= aim):
-                continue
-            y = space.added_to(x)
-            r = self._residual(b, y)
-            residual = self._residual_norm(r)
-            rounding = 2 * np.finfo(float).eps * (norm * float(np.linalg.norm(y[:n])) + norm_b)
-            limit = max(float(rounding), tolerance * norm_b)
-            if residual <= limit or stop or (exhausted and residual > before / 2):
-                break
-            aim = estimate * min(limit / residual, 0.5)
-            if exhausted:
-                x, before, space = y, residual, _Directions(r)
-        return y[:n], iteration, residual <= limit
-
-    def _product(self, x: Array) -> Array:
-        """Return the product of the matrix of displacements and pressures with both."""
-        K, n = self._K, self._K.shape[0]
-        u, p = x[:n], x[n:]
-        forces = K.A @ u + K.D.T @ p
-        forces[self._fixed] = 0.0
-        return np.concatenate([forces, K.D @ u - p / K.bulk])
-
-    def _residual(self, b: Array, x: Array) -> Array:
-        """Return the weighted residual."""
-        r = -self._product(x)
-        r[: len(b)] += b
-        return self._weight * r
-
-    def _residual_norm(self, r: Array) -> float:
-        """Return |b - K u|: the pressures that the displacements have are not quite those of the solution."""
-        r = r * self._inverse_weight
-        n = self._K.shape[0]
-        forces = r[:n] + self._K.D.T @ (self._K.bulk * r[n:])
-        forces[self._fixed] = 0.0
-        return float(np.linalg.norm(forces))
-
-    def _precondition(self, r: Array) -> Array:
-        n = self._K.shape[0]
-        p = -self._schur.solve(r[n:]) - self._K.kept * r[n:]
-        forces = r[:n] - self._K.D.T @ p
-        forces[self._fixed] = 0.0
-        return np.concatenate([self._cycle.precondition(forces), p])
-
-
-class _Directions:
-    """Directions Z and their products with the matrix, of which the residual is made as small as can be.
-
-    The preconditioner may differ from step to step, as it does.  Source: Saad, SIAM J. Sci. Comput. 14 (1993)
-    461-469.
-    """
-
-    def __init__(self, r: Array) -> None:
-        self.start = float(np.linalg.norm(r))
-        self._V = np.empty((DIRECTIONS + 1, len(r)))
-        self._Z = np.empty((DIRECTIONS, len(r)), dtype=np.float32)  # as the multigrid cycle gives them
-        self._H = np.zeros((DIRECTIONS + 1, DIRECTIONS))
-        self._V[0] = r / (self.start or 1.0)
-        self._count = 0
-        self._y = np.zeros(0)
-
-    @property
-    def last(self) -> Array:
-        """The last of the orthonormal vectors."""
-        return self._V[self._count]
-
-    @property
-    def full(self) -> bool:
-        """Whether there is no room for more directions."""
-        return self._count == DIRECTIONS
-
-    def extend(self, z: NDArray[np.float32], w: Array) -> float:
-        """Take a direction and its product; return the smallest norm that the residual can have."""
-        from scipy.linalg.blas import daxpy
-
-        k = self._count
-        self._Z[k] = z
-        for j in range(k + 1):
-            self._H[j, k] = self._V[j] @ w
-            w = daxpy(self._V[j], w, a=-self._H[j, k])
-        self._H[k + 1, k] = np.linalg.norm(w)
-        self._V[k + 1] = w / (self._H[k + 1, k] or 1.0)
-        self._count = k + 1
-        H, goal = self._H[: k + 2, : k + 1], self.start * np.eye(k + 2)[0]
-        self._y = np.linalg.lstsq(H, goal, rcond=None)[0]
-        return float(np.linalg.norm(goal - H @ self._y))
-
-    def added_to(self, x: Array) -> Array:
-        """Return x changed along the directions so that the residual is smallest."""
-        x = x.copy()
-        for factor, z in zip(self._y, self._Z, strict=False):
-            x += factor * z.astype(float)  # NumPy before 2 keeps single precision otherwise
-        return x
+        return self._kernel.solve(b, tolerance, norm, MAX_ITERATIONS, DIRECTIONS, REDUCED, each)
 
 
 def _arrays(A: bsr_array) -> tuple[Rows, Rows, Array]:
@@ -204,36 +84,107 @@ def _arrays(A: bsr_array) -> tuple[Rows, Rows, Array]:
     return A.indptr.astype(np.int32), A.indices.astype(np.int32), np.ascontiguousarray(A.data)
 
 
-class _Schur:
-    """S in single precision, scaled to a diagonal of 1."""
+def _pressure_operator(K: SplitMatrix, inverse: bsr_array, free: Mask) -> tuple[bsr_array, Array]:
+    """Return S in single precision, scaled to a diagonal of 1, and the scale."""
+    from scipy.sparse import diags_array
 
-    def __init__(self, K: SplitMatrix, inverse: bsr_array, loose: Mask) -> None:
-        from scipy.sparse import diags_array
+    is_loose = np.asarray(free.reshape(-1, 3).any(axis=1))
+    around_free = is_loose[K.means.ends].any(axis=1)  # around constrained nodes checkerboards have means, too
+    means = K.means.matrix @ diags_array(1.0 * np.asarray(around_free))
+    S = (K.D @ inverse @ K.D.T).tocsr() + means @ means.T + diags_array(1 / K.bulk)
+    size = np.asarray(1 / np.sqrt(S.diagonal()))
+    scale = diags_array(size)
+    return (scale @ S @ scale).astype(np.float32).tocsr().tobsr(2 * K.D.blocksize[:1]), size
 
-        free = loose[K.means.ends].any(axis=1)  # around constrained nodes checkerboards have means, too
-        means = K.means.matrix @ diags_array(np.where(free, 1.0, 0.0))
-        S = (K.D @ inverse @ K.D.T).tocsr() + means @ means.T + diags_array(1 / K.bulk)
-        self.scale = 1 / np.sqrt(S.diagonal())
-        scale = diags_array(self.scale)
-        self.S = (scale @ S @ scale).astype(np.float32).tocsr().tobsr(2 * K.D.blocksize[:1])
 
-    def solve(self, r: Array) -> Array:
-        """Return S⁻¹ r, roughly, by conjugate gradients."""
-        r = self.scale * r
-        size = float(np.abs(r).max(initial=0.0))
-        if size == 0:
-            return r
-        x, r = np.zeros(len(r), dtype=np.float32), (r / size).astype(np.float32)
-        p, rr = r.copy(), float(r @ r)
-        end = INNER * rr
-        for _ in range(INNER_MAX):
-            Sp = self.S @ p
-            alpha = np.float32(rr / float(p @ Sp))
-            x += alpha * p
-            r -= alpha * Sp
-            old, rr = rr, float(r @ r)
-            if rr <= end:
-                break
-            p *= np.float32(rr / old)
-            p += r
-        return self.scale * (size * x.astype(float))
+# ---- the inverse within groups of strongly coupled nodes: lines in flat meshes, or single nodes ----------
+
+
+def block_inverse(A: BlockMatrix, free: Mask, points: Array, D: bsr_array, factor: Array) -> bsr_array:
+    """Return the inverse (3n, 3n) of A - Dᵀ factor D within each group on its free components, else 0.
+
+    Both are positive definite there; nodes that share a row of R x 3 blocks of D (p, 3n) share a block of A.
+    """
+    from scipy.sparse import bsr_array
+
+    rows, columns, n = A.rows(), A.indices, len(A.indptr) - 1
+    group, place = _groups(A, rows, points)
+    within = np.flatnonzero(group[rows] == group[columns])
+    stiffness = rows[within], columns[within], A.data[within]
+    square = _square(D, factor, group)
+    dilatations = block_rows(square.indptr), square.indices, square.data
+    size = np.bincount(group)
+    members, mask, inverses = np.argsort(group, kind="stable"), free.reshape(-1, 3), []
+    for k in np.unique(size):
+        nodes = members[size[group[members]] == k].reshape(-1, k)
+        number = np.empty(len(size), dtype=int)
+        number[group[nodes[:, 0]]] = np.arange(len(nodes))
+        blocks = np.zeros((len(nodes), k, 3, k, 3))
+        for sign, (rows, columns, data) in ((1, stiffness), (-1, dilatations)):
+            alike = size[group[rows]] == k
+            i, j = rows[alike], columns[alike]
+            blocks[number[group[i]], place[i], :, place[j], :] += sign * data[alike]
+        inverse = _inverse(blocks.reshape(-1, 3 * k, 3 * k), mask[nodes].reshape(-1, 3 * k))
+        ends = np.repeat(nodes, k, axis=1), np.tile(nodes, (1, k))
+        inverses.append((*ends, inverse.reshape(-1, k, 3, k, 3).swapaxes(2, 3)))
+    i, j = (np.concatenate([part[end].ravel() for part in inverses]) for end in (0, 1))
+    data = np.concatenate([part[2].reshape(-1, 3, 3) for part in inverses])
+    order = np.argsort(i, kind="stable")
+    starts = np.concatenate([[0], np.cumsum(np.bincount(i, minlength=n))])
+    return bsr_array((data[order], j[order], starts), shape=A.shape)
+
+
+def _square(D: bsr_array, factor: Array, group: Ints) -> bsr_array:
+    """Return Dᵀ factor D (3n, 3n) within each group of nodes."""
+    from scipy.sparse import bsr_array
+
+    row, R = block_rows(D.indptr), D.blocksize[0]
+    data = D.data * np.sqrt(factor).reshape(-1, R, 1)[row]
+    if group.max(initial=0) < len(group) - 1:  # what a row has within a group is a row of its own
+        row = np.unique(row * len(group) + group[D.indices], return_inverse=True)[1]
+    else:
+        row = np.arange(len(row))
+    order = np.argsort(row, kind="stable")
+    starts = np.concatenate([[0], np.cumsum(np.bincount(row))])
+    B = bsr_array((data[order], D.indices[order], starts), shape=(R * (len(starts) - 1), D.shape[1]))
+    return B.T @ B
+
+
+def _near(A: BlockMatrix, rows: Ints, points: Array) -> Mask:
+    """Return which entries couple nodes no farther than `NEAR` times the nearest of both, (nnz,)."""
+    apart = np.linalg.norm(points[rows] - points[A.indices], axis=1)
+    apart[rows == A.indices] = np.inf
+    starts = np.minimum(A.indptr[:-1], len(apart) - 1)
+    nearest: Array = np.minimum.reduceat(apart, starts)
+    return np.asarray(apart <= NEAR * np.minimum(nearest[rows], nearest[A.indices]))
+
+
+def _groups(A: BlockMatrix, rows: Ints, points: Array) -> tuple[Ints, Ints]:
+    """Return the group of each node, and its place in the group."""
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import connected_components
+
+    n = len(A.indptr) - 1
+    size = np.sqrt(np.einsum("nij,nij->n", A.data, A.data))
+    root = np.zeros(n)
+    on = A.diagonal_blocks()
+    root[A.indices[on]] = np.sqrt(size[on])
+    strong = size > STRONG * root[rows] * root[A.indices]
+    strong &= _near(A, rows, points)
+    graph = csr_array((np.ones(strong.sum()), (rows[strong], A.indices[strong])), shape=(n, n))
+    group: Ints = connected_components(graph, directed=False)[1].astype(np.int64)
+    large = np.bincount(group)[group] > LONGEST
+    group[large] = n + np.arange(large.sum())
+    group = np.unique(group, return_inverse=True)[1].astype(np.int64)
+    order = np.argsort(group, kind="stable")
+    first = np.concatenate([[0], np.cumsum(np.bincount(group))[:-1]])
+    place = np.empty(n, dtype=np.int64)
+    place[order] = np.arange(n) - first[group[order]]
+    return group, place
+
+
+def _inverse(blocks: Array, free: Mask) -> Array:
+    """Return the inverses of (m, k, k) on their free rows and columns (m, k), 0 on the others."""
+    both = free[:, :, None] & free[:, None, :]
+    inverse: Array = np.linalg.inv(np.where(both, blocks, np.eye(blocks.shape[-1])))
+    return np.where(both, inverse, 0.0)

@@ -1,3 +1,4 @@
+<<<<<<< HEAD
 """Modes: the lowest eigenvalues λ and vectors x of K x = λ M x, both symmetric, M positive definite.
 
 Small problems are solved whole (LAPACK).  Of larger ones a block of vectors comes down to the lowest
@@ -6,20 +7,35 @@ inverse of K (a cycle of multigrid, or factors) makes of their residuals, W.
 
 Sources: Knyazev, SIAM J. Sci. Comput. 23 (2001) 517-541 (LOBPCG); Hetmaniuk & Lehoucq, J. Comput. Phys. 218
 (2006) 324-332 (its basis); Stathopoulos & Wu, SIAM J. Sci. Comput. 23 (2002) 2165-2182 (dependent vectors).
+=======
+"""Modes: natural frequencies of K φ = ω² M φ, and complex modes of λ² M + λ C + K with λ nearest to 0.
+
+Small problems are solved whole (LAPACK), larger ones by Lanczos or Arnoldi with shift and invert (ARPACK).
+Motions that K and C do not resist are taken out of complex modes first: their eigenvalue 0 stands twice with
+one shape, so that rounding would spoil it by its square root.
+
+Source: Tisseur & Meerbergen, SIAM Review 43 (2001) 235-286; Fan, Lin & Van Dooren, SIAM J. Matrix Anal.
+Appl. 26 (2004) 252-256, for the scale of λ.
+>>>>>>> slv
 """
 
 from __future__ import annotations
 
+<<<<<<< HEAD
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeAlias
+=======
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+>>>>>>> slv
 
 import numpy as np
 
 from kratos_lite.errors import InputError, SolveError
 from kratos_lite.solvers import direct
 from kratos_lite.solvers.plan import DENSE_MODES
-from kratos_lite.typing import Array, Progress
+from kratos_lite.typing import Array, Complexes, Progress
 from kratos_lite.validation import whole_number
 
 if TYPE_CHECKING:
@@ -96,12 +112,18 @@ def dense_modes(K: Array, M: Array, count: int) -> tuple[Array, Array]:
     return np.sqrt(np.maximum(squares, 0.0)), shapes
 
 
+<<<<<<< HEAD
 @dataclass(frozen=True)
 class Problem:
     """K x = λ M x of n components, K positive beside the span of known vectors, where λ is 0.
 
     Vectors are rows of arrays (k, n).
     """
+=======
+def _by_iteration(K: Any, M: Any, count: int, progress: Progress | None) -> tuple[Array, Array]:
+    """Return the lowest modes by Lanczos on (K + s M)^-1 M, with a shift s that makes K definite."""
+    from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
+>>>>>>> slv
 
     n: int
     K: Operator
@@ -279,3 +301,133 @@ def check(errors: Array, allowed: Array) -> None:
             "terms, which is more than rounding explains; ask for another number of modes, and look for very "
             "thin elements, a large stiffness contrast or nearly free parts"
         )
+
+
+ROUNDS = 6
+"""Shifts that are tried."""
+NEUTRAL = 1e-11
+"""Fraction of the stiffness up to which a motion is not resisted at all."""
+
+
+@dataclass(frozen=True)
+class Pencil:
+    """λ² M + λ C + K, sparse (n, n), and the motions (n, k) that neither C nor K resists.
+
+    M is symmetric positive definite; C and K need not be symmetric.  The motions are columns with
+    φ^T M φ = 1, as `neutral_motions` makes them.
+    """
+
+    M: csr_array[Any, Any]
+    C: csr_array[Any, Any]
+    K: csr_array[Any, Any]
+    neutral: Array
+
+    def modes(self, count: int) -> tuple[Complexes, Complexes]:
+        """Return λ (count,) in 1/s, nearest to 0 first, and shapes (n, count) of length 1."""
+        n, zeros = self.K.shape[0], 2 * self.neutral.shape[1]
+        if count > 2 * n:
+            raise InputError(f"this model has 1 … {2 * n} complex modes; got {count}")
+        values = np.zeros(zeros, dtype=complex)
+        shapes = np.repeat(self.neutral, 2, axis=1).astype(complex)
+        if (further := count - zeros) > 0:
+            whole = 2 * n <= DENSE_MODES or further > n // 4
+            elastic, vectors = self._all() if whole else self._nearest(further)
+            order = np.argsort(np.abs(elastic), kind="stable")[:further]
+            values, shapes = np.append(values, elastic[order]), np.hstack([shapes, vectors[:, order]])
+        values, shapes = values[:count], shapes[:, :count]
+        shapes = shapes / np.linalg.norm(shapes, axis=0)
+        self.check(values, shapes)
+        return values, shapes
+
+    def check(self, values: Complexes, shapes: Complexes) -> None:
+        """Raise SolveError unless all pairs satisfy the equations."""
+        terms = [(values**2, self.M), (values, self.C), (np.ones_like(values), self.K)]
+        check_residuals(terms, shapes)
+
+    def _all(self) -> tuple[Complexes, Complexes]:
+        """Return all eigenvalues but those of the neutral motions, from dense matrices."""
+        Q: Array = np.eye(self.K.shape[0])
+        if k := self.neutral.shape[1]:
+            Q = np.linalg.qr(self.M @ self.neutral, mode="complete")[0][:, k:]
+        M, C, K = (Q.T @ (A @ Q) for A in (self.M, self.C, self.K))
+        L = np.linalg.cholesky(M)
+        C, K = (np.linalg.solve(L, np.linalg.solve(L, A).T).T for A in (C, K))
+        scale = max(float(np.abs(K).sum(axis=0).max(initial=0.0)), float(np.finfo(float).tiny)) ** 0.5
+        zero, one = np.zeros_like(K), scale * np.eye(len(K))
+        values, vectors = np.linalg.eig(np.block([[zero, one], [-K / scale, -C]]))
+        shapes = Q @ np.linalg.solve(L.T, vectors[: len(K)])
+        return values.astype(complex), np.asarray(shapes, dtype=complex)
+
+    def _nearest(self, count: int) -> tuple[Complexes, Complexes]:
+        """Return eigenvalues nearest to 0, from shifts that come ever nearer to it.
+
+        All within some distance of the shift are found, so that those nearest to 0 are known to be among
+        them where they lie within this distance less the shift.
+        """
+        shift, wanted = first_shift(self.K, self.M) ** 0.5, count + 2
+        for _ in range(ROUNDS):
+            values, vectors = self._beside(shift, wanted)
+            size = np.sort(np.abs(values))
+            if not len(size):  # all are far nearer to each other than to the shift
+                shift /= 30
+                continue
+            reach = float(np.abs(values - shift).max()) - shift
+            last = float(size[min(count, len(size)) - 1])
+            if len(size) >= count and last <= reach:
+                return values, vectors
+            if last > 3 * shift:
+                wanted = min(2 * wanted, self.K.shape[0])
+            shift = min(shift / 4, max(last / 2, 1e-5 * shift))
+        raise not_converged(count)
+
+    def _beside(self, shift: float, wanted: int) -> tuple[Complexes, Complexes]:
+        """Return eigenvalues nearest to a shift > 0 by Arnoldi; none if that does not converge.
+
+        With x = (u, λ u / shift) the inverse of the shifted pencil takes (p, q) to (u, u + p / shift), where
+        (shift² M + shift C + K) u = -shift M (p + q) - C p.  It is divided by the shift.
+        """
+        from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
+
+        n = self.K.shape[0]
+        factors = direct.factorize((shift**2 * self.M + shift * self.C + self.K).tocsr(), symmetric=False)
+
+        def inverse(x: Array) -> Array:
+            p, q = self._without(x[:n]), self._without(x[n:])
+            u = -self._without(factors.solve(shift**2 * (self.M @ (p + q)) + shift * (self.C @ p)))
+            return np.concatenate([u, u + p])
+
+        operator = LinearOperator((2 * n, 2 * n), matvec=inverse, dtype=np.float64)
+        start = np.random.default_rng(0).standard_normal(2 * n)
+        # Pairs are often nearly repeated: room for more of them, no tolerance below rounding.
+        room = min(3 * wanted + 20, 2 * n)
+        try:
+            values, vectors = eigs(
+                operator, wanted, which="LM", v0=start, ncv=room, tol=1e-11, maxiter=RESTARTS // 3
+            )
+        except ArpackNoConvergence:
+            return np.zeros(0, dtype=complex), np.zeros((n, 0), dtype=complex)
+        return shift * (1 + 1 / values), vectors[:n]
+
+    def _without(self, u: Array) -> Array:
+        """Return a motion without its neutral part."""
+        if not self.neutral.shape[1]:
+            return u
+        return np.asarray(u - self.neutral @ (self.neutral.T @ (self.M @ u)))
+
+
+def neutral_motions(M: Any, C: Any, K: Any, candidates: Array) -> Array:
+    """Return the span (n, k) of those candidates (n, m) that C, K and their transposes take to 0.
+
+    φ^T M φ = 1 of each, and 0 of two.
+    """
+    if not candidates.shape[1]:
+        return candidates
+    L = np.linalg.cholesky(candidates.T @ (M @ candidates))
+    phi = np.linalg.solve(L, candidates.T).T
+    speed = first_shift(K, M) ** 0.5
+    pushed = [
+        np.asarray(A @ phi) / factor for A, factor in ((K, 1.0), (K.T, 1.0), (C, 1 / speed), (C.T, 1 / speed))
+    ]
+    size = np.abs(K).sum(axis=0).max() * np.linalg.norm(phi, axis=0).max()
+    _, values, directions = np.linalg.svd(np.vstack(pushed), full_matrices=False)
+    return np.asarray(phi @ directions[values <= NEUTRAL * size].T)

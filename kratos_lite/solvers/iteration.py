@@ -1,4 +1,4 @@
-"""Conjugate gradients, the fraction of the work they have done, and when to give them up."""
+"""Conjugate gradients, how much of their work is done, and when to give them up."""
 
 from __future__ import annotations
 
@@ -19,43 +19,32 @@ GoOn: TypeAlias = Callable[[float], bool]
 """Takes a residual as a fraction of the first; returns whether to go on."""
 
 
-class ConvergenceForecast:
-    """Forecasts from the residuals so far, as fractions of the first, whether an iteration ends soon.
+class Monitor:
+    """Follows an iteration by its residuals, as fractions of the first: progress, and whether to go on.
 
-    It does not if, after 60 iterations, their rate promises more than `plan.PATIENCE` in all.  The rate is
-    that between the last two quarters, each the mean of its logarithms: residuals grow at first and jump.
+    Progress never falls.  With `may_stop` an iteration ends that is slow: whose rate, after
+    `plan.PATIENCE_FROM` iterations, promises more than `plan.PATIENCE` in all.  The rate is that between the
+    last two quarters, each the mean of its logarithms: residuals grow at first and jump.
     """
 
-    def __init__(self, tolerance: float) -> None:
-        self.tolerance, self.stopped = tolerance, False
+    def __init__(self, tolerance: float, progress: Progress | None = None, may_stop: bool = False) -> None:
+        self.progress, self.may_stop, self.is_slow, self.done = progress, may_stop, False, 0.0
+        self._aim = math.log(max(tolerance, 1e-300))
         self._logs: list[float] = []
 
     def __call__(self, residual: float) -> bool:
-        """Take the next residual; return whether to go on."""
+        """Take the residual after an iteration; return whether to go on."""
         self._logs.append(math.log(max(residual, 1e-300)))
-        done, remaining = len(self._logs), self._logs[-1] - math.log(self.tolerance)
-        if done < plan.PATIENCE_FROM or remaining <= 0:
-            return True
-        quarter = done // 4
-        before, now = self._logs[-2 * quarter : -quarter], self._logs[-quarter:]
-        rate = (math.fsum(before) - math.fsum(now)) / quarter**2
-        self.stopped = (plan.PATIENCE - done) * rate < remaining
-        return not self.stopped
-
-
-class FractionDone:
-    """Turns residuals, as fractions of the first, into the fraction of work that is done; it never falls."""
-
-    def __init__(self, tolerance: float, progress: Progress | None, go_on: GoOn | None = None) -> None:
-        self.tolerance, self.progress, self.go_on, self.done = tolerance, progress, go_on, 0.0
-
-    def __call__(self, residual: float) -> bool:
-        """Report after an iteration; return whether to go on."""
         if self.progress:
-            fraction = float(np.log(max(residual, 1e-300)) / np.log(self.tolerance))
-            self.done = min(max(self.done, fraction), 1.0)
+            self.done = min(max(self.done, self._logs[-1] / self._aim), 1.0)
             self.progress("solve", self.done)
-        return self.go_on is None or self.go_on(residual)
+        count, remaining = len(self._logs), self._logs[-1] - self._aim
+        if self.may_stop and count >= plan.PATIENCE_FROM and remaining > 0:
+            quarter = count // 4
+            before, now = self._logs[-2 * quarter : -quarter], self._logs[-quarter:]
+            rate = (math.fsum(before) - math.fsum(now)) / quarter**2
+            self.is_slow = (plan.PATIENCE - count) * rate < remaining
+        return not self.is_slow
 
     def finish(self) -> None:
         """Report that all is done, where round-off ended the iteration before its tolerance did."""
@@ -69,26 +58,23 @@ def conjugate_gradients(
     precondition: Callable[[Array], Array],
     tolerance: float,
     norm_A: float,
-    max_iterations: int = MAX_ITERATIONS,
-    progress: Progress | None = None,
-    go_on: GoOn | None = None,
+    each: GoOn | None = None,
 ) -> tuple[Array, int, bool]:
     """Solve A x = b with symmetric positive definite A; return x, iterations and success.
 
     It stops when |r| ≤ tolerance |b|, or when |r| reaches what round-off allows,
     2 eps (|A| |x| + |b|); and gives up when `STALLED` iterations bring no new smallest residual, or when
-    `go_on`, called with |r| / |b|, returns False.
+    `each`, called with |r| / |b|, returns False.
     Source: Saad, Iterative Methods for Sparse Linear Systems (2003), algorithm 9.1.
     """
     x, r = np.zeros_like(b), b.copy()
     norm_b = float(np.linalg.norm(b))
     if norm_b == 0:
         return x, 0, True
-    each = FractionDone(tolerance, progress, go_on)
     best, best_at = np.inf, 0  # residuals may grow at first
     z = precondition(r)
     p, rz = z.copy(), float(r @ z)
-    for iteration in range(1, max_iterations + 1):
+    for iteration in range(1, MAX_ITERATIONS + 1):
         Ap = A @ p
         curvature = float(p @ Ap)
         if not (curvature > 0 and rz > 0):
@@ -97,10 +83,9 @@ def conjugate_gradients(
         x += alpha * p
         r -= alpha * Ap
         norm = float(np.linalg.norm(r))
-        going = each(norm / norm_b)
+        going = each is None or each(norm / norm_b)
         limit = max(tolerance * norm_b, 2 * np.finfo(float).eps * (norm_A * np.linalg.norm(x) + norm_b))
         if norm <= limit:
-            each.finish()
             return x, iteration, True
         if not going:
             return x, iteration, False
@@ -111,4 +96,4 @@ def conjugate_gradients(
         z = precondition(r)
         rz, old = float(r @ z), rz
         p = z + (rz / old) * p
-    return x, max_iterations, False
+    return x, MAX_ITERATIONS, False

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -13,13 +13,14 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.matrix_free import MatrixFree
 from kratos_lite.errors import SolveError
 from kratos_lite.solvers import direct
-from kratos_lite.solvers.constraint_map import ConstraintMap
-from kratos_lite.solvers.iteration import ConvergenceForecast
+from kratos_lite.solvers.constraints import ConstraintMap
+from kratos_lite.solvers.iteration import Monitor
 from kratos_lite.solvers.plan import Plan, after, is_quick_to_factorize, tolerance_of
 from kratos_lite.typing import Array, Ints, Progress
 
 if TYPE_CHECKING:
-    from kratos_lite.solvers.coarse_level import PCoarseLevel
+    from kratos_lite.assembly.element_groups import ElementGroup
+    from kratos_lite.mesh.hanging import HangingNodes
     from kratos_lite.solvers.multigrid import Solver
 
 RESTART, MAX_RESTARTS = 30, 20
@@ -48,9 +49,15 @@ class LinearSolver:
     constraint_map: ConstraintMap  # the supports
     points: Array  # (n, 3) m, from which multigrid knows the rigid modes
     plan: Plan  # how it is solved
+<<<<<<< HEAD
     p_coarse_level: Callable[[], PCoarseLevel | None] | None = None
     symmetric: bool = True  # positive definite, too
     near: LinearSolver | None = None  # of a matrix that is, and not far from K, where K is not
+=======
+    symmetric: bool = True  # positive definite, too; otherwise the plan is ``dense`` or ``direct``
+    groups: Sequence[ElementGroup] = ()  # with `hanging`: quadratic elements, whose linear ones are a level
+    hanging: HangingNodes | None = None
+>>>>>>> slv
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what is pickled: what a method has prepared lives outside of Python, and is made anew."""
@@ -71,10 +78,13 @@ class LinearSolver:
         `start` (3n,), of which the free components count, if that is nearer than 0; then it ends not before
         the residual of the start is reduced to a fraction.
         """
+        reduce, expand = self.constraint_map.reduce, self.constraint_map.expand
         c = self.constraint_map.c if prescribed is None else prescribed
-        b = self.constraint_map.reduce(f - self.K @ c)
-        tolerance *= self._fraction(f, c, b)
+        u, b = c, reduce(f - self.K @ c)
+        size = float(np.linalg.norm(b))
+        tolerance *= self._fraction(f, c, size)
         if start is not None and self.plan.iterates:
+<<<<<<< HEAD
             start = self.constraint_map.expand((start - c)[self.constraint_map.free], c)
             residual, size = self.constraint_map.reduce(f - self.K @ start), float(np.linalg.norm(b))
             if np.linalg.norm(residual) <= size:
@@ -100,6 +110,24 @@ class LinearSolver:
 
     def _fraction(self, f: Array, c: Array, b: Array) -> float:
         """Return the fraction of |b| that tolerances refer to.
+=======
+            near = expand((start - c)[self.constraint_map.free], c)
+            residual = reduce(f - self.K @ near)
+            norm = float(np.linalg.norm(residual))
+            if norm <= size:
+                rounding = 2 * float(np.finfo(float).eps) * (self.norm * float(np.linalg.norm(near)) + size)
+                u, b = near, residual
+                tolerance = max(tolerance * size, rounding) / (norm or 1.0)
+        q, iterations, plan = np.zeros(len(b)), 0, self.plan
+        if len(b) and (u is c or tolerance < 1):
+            q, iterations, plan = self._solve(b, tolerance, progress, u is not c)
+        u = expand(q, u)
+        error = backward_error(reduce(f - self.K @ u), self.norm, u, f)
+        return Solution(u, plan.method, plan.reason, iterations, error)
+
+    def _fraction(self, f: Array, c: Array, size: float) -> float:
+        """Return the fraction of |b|, a `size`, that tolerances refer to.
+>>>>>>> slv
 
         Where prescribed displacements of nearly incompressible bodies are large forces in K, these are no
         measure of what has to be in equilibrium: the bulk modulus does not count.
@@ -107,6 +135,7 @@ class LinearSolver:
         soft = getattr(self.K, "A", None)
         if soft is None or not c.any():
             return 1.0
+<<<<<<< HEAD
         size = float(np.linalg.norm(self.constraint_map.reduce(f - soft @ c)))
         return min(1.0, size / (float(np.linalg.norm(b)) or 1.0))
 
@@ -133,17 +162,26 @@ class LinearSolver:
         u = self.constraint_map.expand(change.x, start)
         error = backward_error(self.constraint_map.reduce(f - self.K @ u), self.norm, u, f)
         return replace(change, x=u, backward_error=error)
+=======
+        return min(1.0, float(np.linalg.norm(self.constraint_map.reduce(f - soft @ c))) / (size or 1.0))
+>>>>>>> slv
 
     def _solve(
-        self, b: Array, tolerance: float, progress: Progress | None, continued: bool = False
-    ) -> Solution:
+        self, b: Array, tolerance: float, progress: Progress | None, continued: bool
+    ) -> tuple[Array, int, Plan]:
+        """Return q, iterations, and how it is solved: in another way if iterations did not converge."""
         plan = self.plan
         if plan.iterates:
-            solution, plan = self._iterate(b, tolerance, progress, continued)
+            q, iterations, plan = self._iterate(b, tolerance, progress, continued)
             if plan.iterates:
+<<<<<<< HEAD
                 return solution
         q, A = self._prepared("factors", "factorize", progress).solve(b), self.reduced_matrix
         return self._solution(q, 0, backward_error(b - A @ q, matrix_norm(A), q, b), plan)
+=======
+                return q, iterations, plan
+        return self._prepared("factors", "factorize", progress).solve(b), 0, plan
+>>>>>>> slv
 
     def _prepared(self, name: str, phase: str, progress: Progress | None) -> Any:
         """Return what a method prepares, and report a phase if it is made now."""
@@ -171,10 +209,7 @@ class LinearSolver:
 
     @cached_property
     def _blocks(self) -> Any:
-        """The matrix on all components, constraints worked in, of which only the free ones count.
-
-        It is a BlockMatrix, a MatrixFree or a SplitMatrix, as K is.
-        """
+        """The matrix on all components, constraints worked in, of which only the free ones count."""
         T, free = self.constraint_map.T, self.constraint_map.free
         if T is None:
             return self.K
@@ -188,44 +223,42 @@ class LinearSolver:
 
     @cached_property
     def _multigrid(self) -> Solver:
-        linear, matrix = self.p_coarse_level() if self.p_coarse_level else None, self._blocks
-        if linear is not None and self.constraint_map.T is not None:
-            from kratos_lite.solvers.coarse_level import apply_ties  # rarely needed
+        from kratos_lite.solvers.coarse_level import apply_ties, p_coarse_level  # a quick start
+        from kratos_lite.solvers.displacement_pressure import DisplacementPressure
+        from kratos_lite.solvers.multigrid import multigrid
 
-            linear = apply_ties(linear, self.constraint_map.T, self.constraint_map.free)
-        if self.plan.method == "amg":
-            from kratos_lite.solvers.multigrid import multigrid  # a quick start for small models
-
-            return multigrid(matrix, self.constraint_map.is_free, self.points, linear)
-        from kratos_lite.solvers.displacement_pressure import DisplacementPressure  # rarely needed
-
-        return DisplacementPressure(matrix, self.constraint_map.is_free, self.points, linear)
+        linear, map = p_coarse_level(self.points, self.groups, self.hanging), self.constraint_map
+        if linear is not None and map.T is not None:
+            linear = apply_ties(linear, map.T, map.free)
+        make = multigrid if self.plan.method == "amg" else DisplacementPressure
+        return make(self._blocks, map.is_free, self.points, linear)
 
     @cached_property
     def norm(self) -> float:
         """The largest row sum of |K|."""
-        return matrix_norm(self.K)
-
-    @cached_property
-    def _norm(self) -> float:
-        return self.norm if self._blocks is self.K else self._blocks.norm()
+        return float(np.abs(self.K).sum(axis=1).max() if self.plan.method == "dense" else self.K.norm())
 
     def _iterate(
         self, b: Array, tolerance: float, progress: Progress | None, continued: bool
-    ) -> tuple[Solution, Plan]:
-        """Solve by multigrid; return also how it is solved, in another way if that did not converge."""
+    ) -> tuple[Array, int, Plan]:
+        """Solve by multigrid; return q, iterations, and how to solve it instead if they do not converge."""
         free, rhs = self.constraint_map.free, np.zeros(len(self.constraint_map.c))
         rhs[free] = b
         aim = tolerance if continued else tolerance_of(tolerance, len(b))
+<<<<<<< HEAD
         forecast = ConvergenceForecast(tolerance) if is_quick_to_factorize(len(b)) else None
         if self.near is not None:
             return self._minimal_residual(b, aim, self.near), self.plan
+=======
+>>>>>>> slv
         multigrid = self._prepared("_multigrid", "set up", progress)
-        x, iterations, converged = multigrid.solve(rhs, aim, self._norm, progress, forecast)
-        error = backward_error(b - (self._blocks @ x)[free], self._norm, x, b)
-        slow = forecast is not None and forecast.stopped
-        plan = self.plan if converged else after(iterations, tolerance, len(b), slow)
-        return self._solution(x[free], iterations, error), plan
+        norm = self.norm if self._blocks is self.K else self._blocks.norm()
+        monitor = Monitor(tolerance, progress, is_quick_to_factorize(len(b)))
+        x, iterations, converged = multigrid.solve(rhs, aim, norm, monitor)
+        if not converged:
+            return x[free], iterations, after(iterations, tolerance, len(b), monitor.is_slow)
+        monitor.finish()
+        return x[free], iterations, self.plan
 
     def _minimal_residual(self, b: Array, tolerance: float, near: LinearSolver) -> Solution:
         """Solve equations that are not symmetric by GMRES, with the multigrid of a matrix near to theirs."""
@@ -280,18 +313,10 @@ def on_all(T: Any, free: Ints) -> Any:
     """Return T (N, q) with its columns in the places of the free components, (N, N)."""
     from scipy.sparse import csr_array
 
-    q = len(free)
-    return T @ csr_array((np.ones(q), (np.arange(q), free)), shape=(q, T.shape[0]))
-
-
-def matrix_norm(A: Any) -> float:
-    """Return the largest row sum of |A|."""
-    if hasattr(A, "norm"):  # blocks, split or not, or a product alone
-        return float(A.norm())
-    return float(np.asarray(abs(A).sum(axis=1)).max(initial=0.0))
+    return csr_array((T.data, free[T.indices], T.indptr), shape=(T.shape[0], T.shape[0]))
 
 
 def backward_error(residual: Array, norm: float, x: Array, b: Array) -> float:
     """Return |b - A x| / (|A| |x| + |b|) in the maximum norm."""
     scale = norm * np.abs(x).max() + np.abs(b).max()
-    return float(np.abs(residual).max() / scale) if scale > 0 else 0.0
+    return float(np.abs(residual).max(initial=0.0) / scale) if scale > 0 else 0.0

@@ -37,10 +37,7 @@ class _Product(NamedTuple):
 
 
 class Mass:
-    """The mass matrix of elements: consistent, or lumped at the nodes.
-
-    It is built when it is first needed: a body at rest has none.
-    """
+    """The mass matrix of elements: consistent, or lumped at the nodes."""
 
     def __init__(
         self,

@@ -20,11 +20,11 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.matrix_free import MatrixFree
 from kratos_lite.native import kernels
 from kratos_lite.solvers.coarse_level import PCoarseLevel
-from kratos_lite.solvers.constraint_map import rigid_modes
+from kratos_lite.solvers.constraints import rigid_modes
 from kratos_lite.solvers.direct import one_thread
-from kratos_lite.solvers.iteration import MAX_ITERATIONS, FractionDone, GoOn, conjugate_gradients
+from kratos_lite.solvers.iteration import MAX_ITERATIONS, GoOn, conjugate_gradients
 from kratos_lite.solvers.plate_level import bending_modes, is_very_thin, plate_axes, plate_level
-from kratos_lite.typing import Array, Mask, Progress
+from kratos_lite.typing import Array, Mask
 
 DEGREE = 2
 """Degree of the Chebyshev smoother: 1 … 3 cost the same in all."""
@@ -46,38 +46,28 @@ class Solver(Protocol):
         """Return about A⁻¹ r (3n,)."""
 
     def solve(
-        self, b: Array, tolerance: float, norm: float, progress: Progress | None, go_on: GoOn | None = None
+        self, b: Array, tolerance: float, norm: float, each: GoOn | None = None
     ) -> tuple[Array, int, bool]:
         """Return x, iterations and success; b and x (3n,) are zero at fixed components.
 
-        After each iteration `go_on` is called with the residual as a fraction of |b|; False stops.
+        After each iteration `each` is called with the residual as a fraction of |b|; False stops.
         """
 
 
 def multigrid(
-    A: BlockMatrix | MatrixFree,
-    free: Mask,
-    points: Array,
-    linear: PCoarseLevel | None = None,
-    degree: int = DEGREE,
+    A: BlockMatrix | MatrixFree, free: Mask, points: Array, linear: PCoarseLevel | None = None
 ) -> Compiled | Pyamg:
     """Return the solver of A on its free components (3n,)."""
-    compiled = kernels("multigrid")
-    if compiled is None:
+    if kernels("multigrid") is None:
         return Pyamg(A.assembled() if isinstance(A, MatrixFree) else A, free, points, linear)
-    return Compiled(compiled, A, free, points, linear, degree)
+    return Compiled(A, free, points, linear)
 
 
 class Compiled:
-    """The hierarchy of the kernels.  It keeps the memory of A, which must not change.
-
-    Where A is a product alone, its matrix is made for aggregation and forgotten; with linear elements below
-    it is not made at all.
-    """
+    """The hierarchy of the kernels.  It keeps the memory of A, which must not change."""
 
     def __init__(
         self,
-        module: Any,
         A: BlockMatrix | MatrixFree,
         free: Mask,
         points: Array,
@@ -87,12 +77,13 @@ class Compiled:
         axes = None if isinstance(A, MatrixFree) else plate_axes(points, free)
         thin = 0 if axes is None else 2 if is_very_thin(points, axes) else 1
         places = np.ascontiguousarray(points if axes is None else _closer(points, axes[:, 0]), dtype=float)
-        self._module, fixed = module, (~free).astype(np.uint8)
+        self._module: Any = kernels("multigrid")
+        fixed = (~free).astype(np.uint8)
         settings = fixed, places, degree, RATIO, STRENGTH
         if isinstance(A, MatrixFree):
-            self._kernel = module.Multigrid(A.product, *settings)
+            self._kernel = self._module.Multigrid(A.product, *settings)
         else:
-            self._kernel = module.Multigrid(self._matrix(A), *settings, thin)
+            self._kernel = self._module.Multigrid(self._matrix(A), *settings, thin)
         lines = self._kernel.labels()
         plate = plate_level(points, free, axes, lines, linear) if linear is not None and len(lines) else None
         if plate is not None:
@@ -143,14 +134,10 @@ class Compiled:
         return self._module.Pressures(self._kernel, *matrices)
 
     def solve(
-        self, b: Array, tolerance: float, norm: float, progress: Progress | None, go_on: GoOn | None = None
+        self, b: Array, tolerance: float, norm: float, each: GoOn | None = None
     ) -> tuple[Array, int, bool]:
         """Return x, iterations and success."""
-        each = FractionDone(tolerance, progress, go_on)
-        x, iterations, converged = self._kernel.solve(b, tolerance, norm, MAX_ITERATIONS, each)
-        if converged:
-            each.finish()
-        return x, iterations, converged
+        return self._kernel.solve(b, tolerance, norm, MAX_ITERATIONS, each)
 
 
 def _closer(points: Array, normal: Array) -> Array:
@@ -179,13 +166,11 @@ class Pyamg:
         return self._cycle @ r
 
     def solve(
-        self, b: Array, tolerance: float, norm: float, progress: Progress | None, go_on: GoOn | None = None
+        self, b: Array, tolerance: float, norm: float, each: GoOn | None = None
     ) -> tuple[Array, int, bool]:
         """Return x, iterations and success."""
         with one_thread():
-            return conjugate_gradients(
-                self._A, b, self.precondition, tolerance, norm, progress=progress, go_on=go_on
-            )
+            return conjugate_gradients(self._A, b, self.precondition, tolerance, norm, each)
 
 
 FORWARD = ("block_gauss_seidel", {"sweep": "forward"})
@@ -231,10 +216,7 @@ def above_linear(A: BlockMatrix, free: Mask, points: Array, linear: PCoarseLevel
 
 
 def uncoupled(A: BlockMatrix, free: Mask) -> BlockMatrix:
-    """Return a copy of A with the rows and columns of components that are not free cleared.
-
-    Their diagonal entries stay, so that the matrix keeps its scale.
-    """
+    """Return a copy of A with the rows and columns of components that are not free cleared."""
     mask = free.reshape(-1, 3)
     data = A.data * mask[A.rows()][:, :, None] * mask[A.indices][:, None, :]
     diagonal = A.diagonal_blocks()

@@ -88,7 +88,7 @@ def choose(solver: str, facts: Facts) -> Plan:
     nearly = f"a bulk modulus > {NEAR_HALF:g} shear moduli"
     if solver == "auto" and max(mixed, plain) > NEAR_HALF and _is_soon_factorized(facts, plain):
         return Plan("direct", f"few unknowns with {nearly}: a factorization is fastest")
-    if mixed > NEAR_HALF:
+    if mixed > NEAR_HALF and facts.compiled():
         return Plan("displacement-pressure", f"{nearly}: pressures beside displacements keep multigrid fast")
     return Plan("amg", plan.reason, needs_no_matrix(facts))
 
@@ -112,7 +112,7 @@ def _is_soon_factorized(facts: Facts, plain: float) -> bool:
     n = facts.unknowns
     if n <= QUICK or (n <= SLOW and n * facts.bandwidth() ** 2 <= QUICK_BAND):
         return True
-    return plain > LOCKED and is_quick_to_factorize(n)
+    return (plain > LOCKED or not facts.compiled()) and is_quick_to_factorize(n)
 
 
 def needs_no_matrix(facts: Facts) -> bool:

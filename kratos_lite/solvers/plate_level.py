@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kratos_lite.solvers.coarse_level import PCoarseLevel
-from kratos_lite.solvers.constraint_map import rigid_modes
+from kratos_lite.solvers.constraints import rigid_modes
 from kratos_lite.solvers.plan import FLAT
 from kratos_lite.typing import Array, Ints, Mask, Rows
 

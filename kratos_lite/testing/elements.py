@@ -11,7 +11,7 @@ from kratos_lite import voigt
 from kratos_lite.elements import KinematicLinear, custom
 from kratos_lite.quadrature import Rule
 from kratos_lite.shapes import Shape
-from kratos_lite.solvers.constraint_map import rigid_modes
+from kratos_lite.solvers.constraints import rigid_modes
 from kratos_lite.testing import patches
 from kratos_lite.testing.patches import C_ISOTROPIC, affine, anisotropic, distorted, linear_field, rotations
 from kratos_lite.testing.report import Finding, Measured, difference, largest, run, run_after, worst

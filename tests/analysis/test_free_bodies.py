@@ -7,7 +7,7 @@ from meshes import joined
 import kratos_lite as kl
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.model.loads.body import BodyForce
-from kratos_lite.solvers.constraint_map import rigid_modes
+from kratos_lite.solvers.constraints import rigid_modes
 
 STEEL = kl.Isotropic3D(E=210e9, nu=0.3, density=7850.0)
 STRING = kl.Isotropic3D(E=210e9, nu=0.0, density=7850.0)

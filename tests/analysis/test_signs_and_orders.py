@@ -9,7 +9,7 @@ from kratos_lite.analysis.solution_checks import check_solution
 from kratos_lite.assembly.nodal_values import extrapolation
 from kratos_lite.errors import SolveError
 from kratos_lite.model.checks import equilibrium
-from kratos_lite.solvers.constraint_map import rigid_modes
+from kratos_lite.solvers.constraints import rigid_modes
 from kratos_lite.solvers.linear_solver import Solution
 from kratos_lite.time_series import slope_of
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from computing import compiled, same_on_all_threads
 from rounding import close
+from systems import pattern_of
 
 import kratos_lite as kl
 from kratos_lite.ale import MotionMatrices, Rotation
 from kratos_lite.assembly import element_groups
 from kratos_lite.assembly.gauss_point_fields import body_force
 from kratos_lite.assembly.mass_and_convection import inertia_matrices, lumped_mass
-from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.elements.exact_rules import AFFINE, CURVED, STRAIGHT, exact_rule, geometries
 from kratos_lite.elements.kinematic_linear_3d10n import KinematicLinear3D10N
 from kratos_lite.elements.kinematic_linear_3d27n import KinematicLinear3D27N
@@ -89,7 +89,7 @@ def test_convective_matrix_is_exact_and_the_second_is_exact_on_affine_cells(kind
     shape = kl.ELEMENTS[kind].shape
     model = kl.Model(kl.Mesh(X, {kind: [range(len(X))]}), kl.Isotropic3D(E=1.0, nu=0.3, density=2.0))
     groups, motion = model.element_groups(), Rotation((1.0, 2.0, -0.5), center=(0.3, -0.1, 0.2))
-    pattern = Pattern(len(X), [groups[0].nodes])
+    pattern = pattern_of(X, groups)
     terms = MotionMatrices(motion, X, groups, pattern, Mass(X, groups, pattern, False))
     N, gradients, dV = fine(shape, X)
     along = (gradients @ motion.field(N @ X)[:, :, None])[..., 0]
@@ -131,11 +131,8 @@ def mixed(kind):
     bent = warped[:, 2] > 0.9
     warped[bent] += 0.01 * rng.uniform(-1, 1, (int(bent.sum()), 3))
     mesh = mesh.replace(points=warped)
-    model = kl.Model(mesh, kl.Isotropic3D(E=1.0, nu=0.3, density=3.0))
-    groups = model.element_groups()
-    return SimpleNamespace(
-        points=warped, groups=groups, pattern=Pattern(mesh.n_nodes, [g.nodes for g in groups])
-    )
+    groups = kl.Model(mesh, kl.Isotropic3D(E=1.0, nu=0.3, density=3.0)).element_groups()
+    return SimpleNamespace(points=warped, groups=groups, pattern=pattern_of(warped, groups))
 
 
 def computed(at):

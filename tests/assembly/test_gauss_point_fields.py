@@ -7,23 +7,26 @@ import pytest
 from computing import compiled, printed, same_on_all_threads
 from meshes import changed_at, joined, with_block
 from rounding import all_close
+from systems import stiffness_of
 
 import kratos_lite as kl
 from kratos_lite.assembly import element_groups, mass_and_convection, nodal_values
 from kratos_lite.assembly import gauss_point_fields as fields
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.elements import ELEMENTS
+from kratos_lite.elements.enhanced_strain_3d8n import EnhancedStrain3D8N
 from kratos_lite.elements.kinematic_linear_3d4n import KinematicLinear3D4N
 from kratos_lite.elements.kinematic_linear_3d8n import KinematicLinear3D8N
 from kratos_lite.elements.kinematic_linear_3d20n import KinematicLinear3D20N
-from kratos_lite.errors import MeshError
+from kratos_lite.errors import InputError, MaterialError, MeshError
+from kratos_lite.materials import LinearMaterial
 from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.materials.orthotropic3d import Orthotropic3D
 from kratos_lite.model import checks
-from kratos_lite.quadrature import hexahedron
+from kratos_lite.quadrature import Rule, hexahedron
 
 NAMES = [f"KinematicLinear3D{n}N" for n in (4, 5, 6, 8, 10, 13, 15, 20, 27)]
-CONDENSED = ["EnhancedStrain3D8N", *(f"BBar3D{n}N" for n in (8, 10, 13, 15, 20, 27))]
+CONDENSED = [name for name in sorted(ELEMENTS) if ELEMENTS[name].formulation in ("enhanced", "b_bar")]
 WOOD = Orthotropic3D(11e9, 0.9e9, 0.5e9, 0.4, 0.3, 0.4, 0.7e9, 0.05e9, 0.7e9, 450.0)
 SOIL = Isotropic3D(210e6, 0.3, 7620.0)
 
@@ -51,42 +54,52 @@ def strained(mesh, seed=3):
     return model.element_groups(), 1e-3 * rng.standard_normal(mesh.points.shape)
 
 
-def everything(mesh):
-    """Return all that the module computes of a mesh, by name."""
-    P, (groups, u) = mesh.points, strained(mesh)
-    found = {f"volumes {i}": fields.volumes(P, b) for i, b in enumerate(groups)}
-    found |= {f"stress {i}": fields.at_gauss(P, b, u) for i, b in enumerate(groups)}
-    found |= {f"strain {i}": fields.at_gauss(P, b, u, stress=False) for i, b in enumerate(groups)}
-    found["internal load"] = fields.internal_load(P, groups, u)
+def everything(points, groups, u):
+    """Return all that the module computes of groups, and their stiffness, by name."""
+    found, m = {}, sum(map(len, groups))
+    for i, group in enumerate(groups):
+        found[f"volumes {i}"] = fields.volumes(points, group)
+        found[f"stress {i}"] = fields.at_gauss(points, group, u)
+        found[f"strain {i}"] = fields.at_gauss(points, group, u, stress=False)
+    found["internal load"] = fields.internal_load(points, groups, u)
     for what in (True, False):
-        found[f"means {what}"], found[f"nodal {what}"] = nodal_values.averages(
-            P, groups, u, mesh.n_elements, stress=what
-        )
-    energy, mises, row = fields.totals(P, groups, u)
-    found |= {"energy": np.array(energy), "mises": np.array(mises), "row": np.array(row)}
-    some = np.arange(1, mesh.n_elements, 2)
+        means, nodal = nodal_values.averages(points, groups, u, m, stress=what)
+        found |= {f"means {what}": means, f"nodal {what}": nodal}
+    for name, value in zip(("energy", "mises", "row"), fields.totals(points, groups, u), strict=True):
+        found[name] = np.array(value)
+    found["K"] = stiffness_of(points, groups).data
+    return found
+
+
+def of_mesh(mesh):
+    """Return all that is computed of a strained mesh, and of its loads and mass, by name."""
+    groups, u = strained(mesh)
+    found, some = everything(mesh.points, groups, u), np.arange(1, mesh.n_elements, 2)
     for label, force in (("constant", (1.0, -2.0, 3.0)), ("nodal", u)):
         found[f"{label} force"] = kl.BodyForce(force).forces(mesh, groups)
         found[f"{label} force of some"] = kl.BodyForce(force, some).forces(mesh, groups)
     found["weight"] = kl.Gravity((0, 0, -9.81)).forces(mesh, groups)
-    found["lumped mass"] = mass_and_convection.lumped_mass(P, groups)
+    found["lumped mass"] = mass_and_convection.lumped_mass(mesh.points, groups)
     return found
 
 
 @compiled
-@pytest.mark.parametrize("name", [*NAMES, *CONDENSED, "all"])
+@pytest.mark.parametrize("name", [*NAMES, "all"])
 def test_kernels_give_what_the_elements_own_methods_give(name, numpy_only):
     mesh = joined(*map(distorted, NAMES + CONDENSED)) if name == "all" else distorted(name)
-    found = everything(mesh)
+    found = of_mesh(mesh)
     numpy_only()
-    all_close(found, everything(mesh), 1e-11)
+    all_close(found, of_mesh(mesh), 1e-11)
 
 
 @compiled
-def test_results_do_not_depend_on_the_number_of_threads():
-    mesh = distorted("KinematicLinear3D4N", (14, 14, 14))
-    assert mesh.n_elements > 16384  # more than are added together
-    same_on_all_threads(lambda: everything(mesh))
+@pytest.mark.parametrize(
+    ("name", "cells"), [("KinematicLinear3D4N", 14), ("EnhancedStrain3D8N", 9), ("BBar3D10N", 5)]
+)
+def test_results_do_not_depend_on_the_number_of_threads(name, cells):
+    mesh = distorted(name, (cells, cells, cells))
+    assert mesh.n_elements > 16384 or cells < 14  # more than are added together
+    same_on_all_threads(lambda: of_mesh(mesh))
 
 
 SCRIPT = """
@@ -109,6 +122,93 @@ def test_other_instruction_sets_and_numpy_give_the_same_solution(variable):
     name, value = variable.split("=")
     best, other = (np.array(json.loads(printed(SCRIPT, **more))) for more in ({}, {name: value}))
     np.testing.assert_allclose(other, best, rtol=1e-9, atol=1e-9 * np.abs(best).max())
+
+
+# ---- elements that do not lock ------------------------------------------------------------------------
+
+
+def of_elasticity(C):
+    """Return a material of any C."""
+    return type("Any", (), {"C": C, "stress": LinearMaterial.stress})()
+
+
+STEEL, RUBBER = Isotropic3D(210e9, 0.3), Isotropic3D(1e6, 0.4999)
+A = np.random.default_rng(8).standard_normal((6, 6))
+CRYSTAL = of_elasticity((A @ A.T + 6 * np.eye(6)) * 1e9)
+
+
+def group_of(element, material=STEEL, sizes=(1.0, 1.0, 1.0), distortion=0.03, rule=None, count=11):
+    """Return points and a group of cells apart from each other, turned and distorted, with prestress."""
+    rng = np.random.default_rng(2)
+    turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    cells = element.nodes + distortion * rng.uniform(-1, 1, (count, *element.nodes.shape))
+    points = (cells * sizes @ turn + rng.uniform(-1, 1, (count, 1, 3))).reshape(-1, 3)
+    nodes = np.arange(len(points), dtype=np.int32).reshape(count, -1)
+    prestress = rng.standard_normal((count, 6)) * 0.1 * np.abs(material.C).max()
+    return points, ElementGroup(element, rule or element.rule, material, nodes, np.arange(count), prestress)
+
+
+def of_group(points, group):
+    return everything(points, [group], np.random.default_rng(1).uniform(-1, 1, points.shape))
+
+
+def assert_same(scene, numpy_only, tolerance=1e-11):
+    """Assert that kernels and NumPy give the same."""
+    found = of_group(*scene)
+    numpy_only()
+    all_close(found, of_group(*scene), tolerance)
+
+
+@compiled
+@pytest.mark.parametrize("material", [STEEL, RUBBER, CRYSTAL], ids=["isotropic", "incompressible", "general"])
+@pytest.mark.parametrize("distortion", [0.0, 0.03], ids=["affine", "distorted"])
+@pytest.mark.parametrize("name", CONDENSED)
+def test_kernels_give_what_the_classes_give(name, distortion, material, numpy_only):
+    assert_same(group_of(ELEMENTS[name], material, distortion=distortion), numpy_only)
+
+
+@pytest.mark.parametrize("name", CONDENSED)
+def test_thin_cells(name, numpy_only):
+    scene = group_of(ELEMENTS[name], CRYSTAL, (1.0, 1.0, 1e-4), distortion=0.0)
+    assert_same(scene, numpy_only, 1e-8)  # a thickness of 1e-4 has twelve digits
+
+
+@compiled
+@pytest.mark.parametrize("distortion", [0.0, 0.03], ids=["affine", "distorted"])
+@pytest.mark.parametrize("skew", [False, True], ids=["degree 5", "skew"])
+def test_enhanced_modes_take_other_rules(skew, distortion, numpy_only):
+    rule = hexahedron(degree=5)
+    if skew:  # the mean of ξηζ is not 0
+        corners = 0.5 * np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
+        points = np.vstack([hexahedron(degree=3).points, corners])
+        rule = Rule(points, np.repeat([0.75, 0.5], [8, 4]), 1, "skew")
+    assert_same(group_of(EnhancedStrain3D8N, STEEL, distortion=distortion, rule=rule), numpy_only)
+
+
+@pytest.mark.parametrize("name", ["EnhancedStrain3D8N", "BBar3D27N", "BBar3D10N"])
+def test_a_class_with_a_B_of_its_own_is_computed_by_it(name):
+    base = ELEMENTS[name]
+    with ELEMENTS.temporary():
+        own = type("Own", (base,), {"B": lambda self, xi, C: 0.5 * base.B(self, xi, C)})
+        points, group = group_of(own)
+        found, plain = of_group(points, group), of_group(*group_of(base))
+        all_close(
+            {"strain": found["strain 0"], "K": found["K"]},
+            {"strain": plain["strain 0"] / 2, "K": plain["K"] / 4},
+            1e-11,
+        )
+
+
+def test_what_enhanced_modes_cannot_take_is_refused():
+    points, group = group_of(EnhancedStrain3D8N)
+    u = np.zeros_like(points)
+    group.rule = hexahedron(degree=1)
+    with pytest.raises(InputError, match="2x2x2 points or more"):
+        fields.at_gauss(points, group, u)
+    group.rule = EnhancedStrain3D8N.rule
+    group.material = of_elasticity(np.diag([1.0, 1, 1, 1, 1, -1]))
+    with pytest.raises(MaterialError, match="positive definite; got C with the eigenvalues -1 … 1 Pa"):
+        stiffness_of(points, [group])
 
 
 # ---- who is computed by the kernels ----------------------------------------------------------------

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
+from kratos_lite.elements.surface import area_vectors
+
+UNIT = kl.Isotropic3D(E=1.0, nu=0.3)
 
 
-def test_rows_keep_their_order_so_that_values_meet_their_nodes():
-    mesh = kl.box(cells=(2, 1, 1))
-    assert mesh.nodes([7, 5, 7, 5]).tolist() == [7, 5]
-    model = kl.Model(mesh, kl.Isotropic3D(1.0, 0.3))
+def test_values_meet_their_nodes():
+    model = kl.Model(kl.box(cells=(2, 1, 1)), UNIT)
     model.fix([7, 5], "z", [[1.0], [2.0]])
     assert model.supports.values[[7, 5], 2].tolist() == [1.0, 2.0]
 
@@ -28,6 +29,7 @@ def test_sides_are_measured_along_their_own_axis():
     [
         (("abc",), "real numbers"),
         (([[0, 0]],), r"shape \(n, 3\)"),
+        ((np.diag([0, np.nan, 0]),), "points must be finite"),
         (([[0, 0, 0]], [], {"node_ids": ["a"]}), "whole numbers"),
         (([[0, 0, 0], [1, 0, 0]], [], {"node_ids": [4, 4]}), "node id 4 occurs more than once"),
         (([[0, 0, 0]], [], {"parts": {"A": kl.Part(nodes=np.array([1]))}}), "'A': indices of nodes"),
@@ -44,11 +46,11 @@ def test_wrong_arguments_are_mesh_errors(arguments, text):
 def test_inverted_elements_are_reoriented(element):
     mesh = kl.box((1.0, 2.0, 3.0), (2, 1, 1), element)
     broken = kl.Mesh(mesh.points * [-1, 1, 1], mesh.blocks)
-    model = kl.Model(broken, kl.Isotropic3D(1.0, 0.3))
+    model = kl.Model(broken, UNIT)
     with pytest.raises(kl.MeshError, match="inverted"):
         model.check_geometry()
     mended = broken.reoriented()
-    assert kl.Model(mended, kl.Isotropic3D(1.0, 0.3)).check_geometry() == []
+    assert kl.Model(mended, UNIT).check_geometry() == []
     kind = kl.ELEMENTS[element]
     volume = kind(mended.points[mended.blocks[0].nodes]).volume().sum()
     assert abs(volume - 6) < 1e-12
@@ -56,8 +58,6 @@ def test_inverted_elements_are_reoriented(element):
 
 @pytest.mark.parametrize("element", list(kl.ELEMENTS))
 def test_boundary_of_a_box_has_its_area_outward(element):
-    from kratos_lite.elements.surface import area_vectors
-
     mesh = kl.box((1.0, 2.0, 3.0), (2, 2, 2), element)
     area = [area_vectors(block.shape, mesh.points[block.nodes]) for block in mesh.boundary]
     assert abs(sum(np.linalg.norm(a, axis=-1).sum() for a in area) - 22) < 1e-12
@@ -169,3 +169,69 @@ def test_a_block_without_cells_is_an_empty_list_too():
     for nodes in ([], np.zeros((0, 8), dtype=int)):
         mesh = kl.Mesh([[0, 0, 0]], {"KinematicLinear3D8N": nodes})
         assert (mesh.n_elements, mesh.blocks[0].nodes.shape) == (0, (0, 8))
+
+
+# ---- nodes at a point, and triples that may be a point or rows ------------------------------------------
+
+MESH = kl.box((2, 1, 1), cells=(2, 1, 1))
+POINT = (1.0, 1.0, 0.0)
+
+
+@pytest.mark.parametrize("where", [POINT, list(POINT), np.array(POINT), (1, 1, 0.0), tuple(np.array(POINT))])
+def test_three_coordinates_choose_the_node_there(where):
+    (row,) = MESH.nodes(where)
+    assert MESH.points[row].tolist() == list(POINT)
+    assert MESH.nodes(np.array(where) + 1e-7).tolist() == [row]
+
+
+def test_all_nodes_at_a_place_are_chosen():
+    twice = kl.Mesh(np.vstack([MESH.points, MESH.points]), {})
+    assert twice.nodes(POINT).tolist() == [row + at for at in (0, 12) for row in MESH.nodes(POINT)]
+
+
+@pytest.mark.parametrize("where", [(0, 1, 2), [0, 1, 2], (1, 1, 1)])
+def test_three_whole_numbers_are_refused_with_both_readings(where):
+    model, words = kl.Model(MESH, UNIT), r"point or three node indices: write \(.\.0, 1\.0, .*np\.array\(\["
+    part, load = (lambda w: MESH.replace().add_part("a", w)), (lambda w: kl.PointLoad(w, POINT))
+    for call in (MESH.nodes, model.fix, part, load):
+        with pytest.raises(kl.MeshError, match=words):
+            call(where)
+
+
+@pytest.mark.parametrize(
+    ("where", "rows"),
+    [
+        *((three, [0, 1, 2]) for three in (np.arange(3), range(3), [*np.arange(3)], [np.int32(0), 1, 2])),
+        ([4, 1], [4, 1]),
+        ([7, 5, 7, 5], [7, 5]),
+        (np.arange(12) % 5 == 0, [0, 5, 10]),
+    ],
+)
+def test_indices_and_masks_choose_nodes_in_their_order(where, rows):
+    assert MESH.nodes(where).tolist() == rows
+
+
+def test_a_place_without_a_node_is_an_error_that_names_the_nearest():
+    match = (
+        r"no node at \[0\.9, 1\.0, 0\.0\] m; the nearest node is that at \[1\.0, 1\.0, 0\.0\] m .*0\.1 m away"
+    )
+    with pytest.raises(kl.MeshError, match=match):
+        MESH.nodes((0.9, 1.0, 0.0))
+    with pytest.raises(kl.MeshError, match="must be finite"):
+        MESH.nodes((0.9, np.nan, 0.0))
+    with pytest.raises(kl.MeshError, match="there are no nodes"):
+        kl.Mesh(np.zeros((0, 3)), {}).nodes(POINT)
+
+
+def test_a_support_and_a_displacement_at_a_point():
+    model = kl.Model(MESH, UNIT)
+    model.fix("x-")
+    model.fix((2.0, 0.0, 0.0), "z", 1e-3)
+    assert model.solve().displacement((2.0, 0.0, 0.0))[0, 2] == 1e-3
+
+
+def test_a_point_on_a_thin_plate_does_not_choose_its_other_side():
+    plate = kl.box((1e3, 1e3, 1e-3), cells=(2, 2, 2))
+    for row, point in enumerate(plate.points):
+        assert plate.nodes(tuple(map(float, point))).tolist() == [row]
+    assert len(plate.nodes((500.0, 500.0, 2.5e-4))) == 1

@@ -31,7 +31,7 @@ KINDS = {
 TESTS = [
     "tests/native",
     "tests/ale/test_kernel.py",
-    "tests/assembly/test_condensed_kernels.py",
+    "tests/assembly/test_gauss_point_fields.py",
     "tests/assembly/test_stiffness.py",
     "tests/assembly/test_finite_strain.py",
     "tests/io/formats/test_mdpa_kernel.py",

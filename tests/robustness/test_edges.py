@@ -9,7 +9,7 @@ import kratos_lite as kl
 from kratos_lite.assembly.sparsity_pattern import PatternCache
 from kratos_lite.materials import MATERIALS
 from kratos_lite.solvers import constrained_system as system
-from kratos_lite.solvers.constraint_map import rigid_modes
+from kratos_lite.solvers.constraints import rigid_modes
 
 STEEL = kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0)
 

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 from computing import compiled, same_on_all_threads
-from rounding import round_off
+from rounding import close, round_off
+from systems import parts_of, stiffness_of, system_of
 
 import kratos_lite as kl
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.mesh import Block
-from kratos_lite.native import kernels
-from kratos_lite.solvers import coarse_level, plan
-from kratos_lite.solvers.constrained_system import ConstrainedSystem
-from kratos_lite.solvers.constraint_map import rigid_modes
+from kratos_lite.solvers import plan
+from kratos_lite.solvers.coarse_level import p_coarse_level
+from kratos_lite.solvers.constraints import rigid_modes
 from kratos_lite.solvers.multigrid import Compiled
 from kratos_lite.solvers.plate_level import bending_modes, plate_axes, plate_level
 
@@ -21,20 +21,20 @@ STEEL = kl.Isotropic3D(E=2e11, nu=0.3)
 CELLS = {"4N": (11, 11, 11), "8N": (11, 11, 11), "10N": (5, 5, 5), "20N": (6, 6, 6), "27N": (5, 5, 5)}
 
 
+WEIGHT = (3.0, 4.0, -9.0)  # in no special direction
+
+
 def body(element, size, side, cells=None, contrast=None):
-    """Return a box under its own weight, which acts in no special direction, clamped at a side."""
+    """Return a box under its own weight, clamped at a side or between rollers."""
     name = "EnhancedStrain3D8N" if element == "E8N" else f"KinematicLinear3D{element}"
     mesh = kl.box(size, cells or CELLS[element], name)
     model = kl.Model(mesh, kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0))
     if contrast:
         centers = np.vstack([mesh.points[b.nodes].mean(axis=1) for b in mesh.blocks]) / size
         model.assign(kl.Isotropic3D(E=1e3, nu=0.3, density=1000.0), np.flatnonzero(contrast(centers)))
-    if side == "rollers":
-        for face, axis in (("x-", "x"), ("y-", "y"), ("z-", "z")):
-            model.fix(face, axis)
-    else:
-        model.fix(side)
-    model.add(kl.Gravity((3.0, 4.0, -9.0)))
+    for face, axes in (("x-", "x"), ("y-", "y"), ("z-", "z")) if side == "rollers" else ((side, "xyz"),):
+        model.fix(face, axes)
+    model.add(kl.Gravity(WEIGHT))
     return model
 
 
@@ -42,7 +42,22 @@ def check(model, rtol=1e-8):
     found, exact = model.solve("amg"), model.solve("direct")
     assert found.report.solver == "amg", found.report.reason
     assert found.report.iterations < LIMIT
-    np.testing.assert_allclose(found.u, exact.u, rtol=0, atol=rtol * np.abs(exact.u).max())
+    close(found.u, exact.u, rtol)
+
+
+def hierarchy(model):
+    """Return the multigrid of a model, and a right side."""
+    system = system_of(model)
+    free, linear = system.constraint_map.is_free, p_coarse_level(system.points, system.groups)
+    b = np.random.default_rng(1).standard_normal(len(free)) * free
+    return Compiled(system.K, free, system.points, linear), b
+
+
+def iterations(model, load=None):
+    """Return the iterations to 1e-8 under a load of every node, or random numbers."""
+    solver, b = hierarchy(model)
+    b = b if load is None else np.where(b != 0, np.tile(load, len(b) // 3), 0.0)
+    return solver.solve(b, 1e-8, 0.0)[1]
 
 
 @pytest.fixture(autouse=True)
@@ -81,12 +96,11 @@ def test_stretched_elements(element, size, side):
 @pytest.mark.parametrize("length", [0.3, 1.0, 4.0])
 def test_long_elements_in_planes_too_large_to_be_solved(element, n, length):
     model = body(element, (1.0, 1.0, length), "x-", (n, n, 1))
-    solver, b = hierarchy(model)
-    assert not solver.clusters[0]
-    assert solver.solve(b, 1e-8, 0.0, None)[1] <= (45 if element == "10N" else 30)
+    assert not hierarchy(model)[0].clusters[0]
+    assert iterations(model) <= (45 if element == "10N" else 30)
 
 
-@pytest.mark.parametrize("element", ["4N", "8N"])
+@pytest.mark.parametrize("element", LINEAR)
 def test_a_plate_of_linear_elements(element):
     check(body(element, (1.0, 1.0, 0.01), "x-", (26, 26, 2)))
 
@@ -138,8 +152,7 @@ PLATES = {
     ],
 )
 def test_plates_have_modes_of_bending(plate, element, n, limit):
-    solver, b = hierarchy(plate(element, n))
-    assert solver.solve(gravity(b), 1e-8, 0.0, None)[1] <= limit
+    assert iterations(plate(element, n), WEIGHT) <= limit
 
 
 @pytest.mark.parametrize(("element", "n"), [("E8N", 30), ("10N", 14), ("20N", 16)])
@@ -180,7 +193,7 @@ def test_lines_of_a_plate_interpolate_constant_curvature(element, known):
     points, free = mesh.points @ turn, np.ones(mesh.points.size, dtype=bool)
     groups = kl.Model(mesh, STEEL).element_groups()
     lines = lines_across(mesh.points)
-    axes, linear = plate_axes(points, free), coarse_level.p_coarse_level(points, groups)
+    axes, linear = plate_axes(points, free), p_coarse_level(points, groups)
     level = plate_level(points, free, axes if known else None, lines, linear)
     nodes = np.repeat(np.arange(len(points)), np.diff(level.indptr))
     found = np.zeros((len(points), 3, 12))
@@ -198,8 +211,7 @@ def test_iterations_of_a_plate_do_not_grow_with_its_mesh(turn):
         points = model.mesh.points @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
         turned = kl.Model(kl.Mesh(points, model.mesh.blocks), STEEL)
         turned.fix(model.mesh.nodes("x-"))
-        solver, b = hierarchy(turned)
-        assert solver.solve(gravity(b), 1e-8, 0.0, None)[1] <= 26
+        assert iterations(turned, WEIGHT) <= 26
 
 
 def cylinder(n, element="8N"):
@@ -212,15 +224,11 @@ def cylinder(n, element="8N"):
     return model
 
 
-def test_sides_of_three_lengths_without_a_gap_between_them_make_no_clusters():
-    assert not any(hierarchy(cylinder(40))[0].clusters)
-
-
 def test_modes_of_a_shell_hold_its_rigid_motions():
     model = cylinder(12, "20N")
     points, groups = model.mesh.points, model.element_groups()
     lines = lines_across(kl.box((1.5, 1.0, 0.01), (12, 12, 1), "KinematicLinear3D20N").points)
-    linear = coarse_level.p_coarse_level(points, groups)
+    linear = p_coarse_level(points, groups)
     level = plate_level(points, np.ones(points.size, dtype=bool), None, lines, linear)
     own = level.indptr[linear.nodes]  # each corner belongs to one line
     modes = level.modes.reshape(-1, 6, 12)[level.indices[own], :, :6]
@@ -236,19 +244,8 @@ def test_lines_that_are_no_shell_are_left(case):
     lines = np.arange(len(mesh.points)) if case == "single nodes" else lines_across(mesh.points)
     free = np.ones((len(mesh.points), 3), dtype=bool)
     free[:, 2] = case != "plane strain"
-    linear = coarse_level.p_coarse_level(mesh.points, kl.Model(mesh, STEEL).element_groups())
+    linear = p_coarse_level(mesh.points, kl.Model(mesh, STEEL).element_groups())
     assert plate_level(mesh.points, free.ravel(), None, lines, linear) is None
-
-
-def test_an_unstructured_plate_takes_no_more_memory_than_its_matrix():
-    model = unstructured(100)
-    solver, _ = hierarchy(model)
-    assert solver.complexity < 3.5
-
-
-def gravity(b):
-    """Return a load in no special direction on the free components."""
-    return np.where(b != 0, np.tile([3.0, 4.0, -9.0], len(b) // 3), 0.0)
 
 
 def test_modes_of_bending_have_the_energy_of_constant_curvature():
@@ -256,24 +253,15 @@ def test_modes_of_bending_have_the_energy_of_constant_curvature():
     turn = np.linalg.qr(np.random.default_rng(2).standard_normal((3, 3)))[0]
     turn *= np.linalg.det(turn)
     points = mesh.points @ turn
-    model = kl.Model(kl.Mesh(points, mesh.blocks), STEEL)
-    system = ConstrainedSystem(points, model.element_groups(), model.supports.constraint_map)
     modes = bending_modes(points, plate_axes(points, np.ones(points.size, dtype=bool)))
-    energy = modes.T @ system.K.scipy() @ modes
+    K = stiffness_of(*parts_of(kl.Model(kl.Mesh(points, mesh.blocks), STEEL)))
+    energy = modes.T @ K.scipy() @ modes
     mu = STEEL.E / 2 / (1 + STEEL.nu)
     lame = 2 * mu * STEEL.nu / (1 - 2 * STEEL.nu)
     inertia = 4 * 0.7 * 0.05**3 / 12 / np.ptp(points, axis=0).max() ** 4
     want = np.zeros((12, 12))
     want[6:9, 6:9] = inertia * np.array([[lame + 2 * mu, lame, 0], [lame, lame + 2 * mu, 0], [0, 0, mu]])
     np.testing.assert_allclose(np.abs(energy), want, rtol=0, atol=1e-6 * want.max())
-
-
-@pytest.mark.parametrize("side", ["z", "thick"])
-def test_other_bodies_are_no_plates(side):
-    points = kl.box((1.0, 0.7, 0.05 if side == "z" else 0.2), (6, 6, 1)).points
-    free = np.ones(points.shape, dtype=bool)
-    free[:, 2] = side == "thick"  # plane strain is no bending
-    assert plate_axes(points, free.ravel()) is None
 
 
 def layers(count):
@@ -293,16 +281,6 @@ def test_stiff_and_soft_materials(elements, height, soft, rtol):
     for element in elements:
         model = body(element, (1.0, 1.0, height), "z-", contrast=soft)
         check(model, rtol + round_off(model))
-
-
-def hierarchy(model):
-    """Return the multigrid of a model, and a right side."""
-    module = kernels("multigrid")
-    system = ConstrainedSystem(model.mesh.points, model.element_groups(), model.supports.constraint_map)
-    free = system.constraint_map.is_free
-    linear = coarse_level.p_coarse_level(system.points, system.groups)
-    b = np.random.default_rng(1).standard_normal(len(free)) * free
-    return Compiled(module, system.K, free, system.points, linear), b
 
 
 @pytest.mark.parametrize(
@@ -339,44 +317,41 @@ def unstructured(aspect):
     return model
 
 
-ISOTROPIC = {
-    **{element: lambda element=element: body(element, (1.0, 1.1, 0.9), "z-") for element in CELLS},
-    "a little stretched": lambda: body("8N", (2.5, 1.0, 1.0), "z-"),
-    "unstructured": lambda: unstructured(1),
-    "unstructured and flat": lambda: unstructured(10),
+def halves(x):
+    return x[:, 2] > 6 / 11
+
+
+CLUSTERS = {
+    **{element: (0, lambda element=element: body(element, (1.0, 1.1, 0.9), "z-")) for element in CELLS},
+    "a little stretched": (0, lambda: body("8N", (2.5, 1.0, 1.0), "z-")),
+    "three sides without a gap": (0, lambda: cylinder(40)),
+    "unstructured": (0, lambda: unstructured(1)),
+    "unstructured and flat": (0, lambda: unstructured(10)),
+    "flat: lines": (12**2, lambda: body("8N", (1.0, 1.0, 0.1), "rollers")),
+    "long: planes": (12, lambda: body("8N", (1.0, 1.0, 10.0), "rollers")),
+    "flat, of unlike materials": (2 * 12**2, lambda: body("8N", (1, 1, 0.1), "rollers", contrast=halves)),
 }
+"""Clusters of nodes on the finest level, and a body with as many."""
 
 
-@pytest.mark.parametrize("case", ISOTROPIC)
-def test_other_meshes_have_no_clusters(case):
-    model = ISOTROPIC[case]()
-    clusters = hierarchy(model)[0].clusters
-    assert not (clusters[0] if "flat" in case else any(clusters))
+@pytest.mark.parametrize("case", CLUSTERS)
+def test_clusters_are_lines_across_flat_elements_and_planes_across_long_ones(case):
+    count, make = CLUSTERS[case]
+    found = hierarchy(make())[0]
+    assert found.clusters[0] == count
+    assert count or case == "unstructured and flat" or not any(found.clusters)
 
 
-@pytest.mark.parametrize(("size", "clusters"), [((1.0, 1.0, 0.1), 12**2), ((1.0, 1.0, 10.0), 12)])
-def test_clusters_are_lines_across_flat_elements_and_planes_across_long_ones(size, clusters):
-    found = hierarchy(body("8N", size, "rollers"))[0]
-    assert found.levels[0] == 3 * 12**3
-    assert found.clusters[0] == clusters
-
-
-def test_unlike_materials_part_clusters():
-    model = body("8N", (1.0, 1.0, 0.1), "rollers", contrast=lambda x: x[:, 2] > 6 / 11)
-    assert hierarchy(model)[0].clusters[0] == 2 * 12**2
-
-
-def incompressible():
-    model = body("8N", (1.0, 1.0, 1.0), "z-", (8, 8, 8))
-    model.assign(kl.Isotropic3D(E=1e9, nu=0.4999, density=1000.0))
-    return model
+def test_an_unstructured_plate_takes_no_more_memory_than_its_matrix():
+    assert hierarchy(unstructured(100))[0].complexity < 3.5
 
 
 @pytest.mark.parametrize("quick", [True, False])
 def test_an_iteration_slower_than_a_factorization_stops_early(quick, monkeypatch):
     monkeypatch.setattr("kratos_lite.solvers.plan.PATIENCE", 70)
     monkeypatch.setattr("kratos_lite.solvers.linear_solver.is_quick_to_factorize", lambda unknowns: quick)
-    model = incompressible()
+    model = body("8N", (1.0, 1.0, 1.0), "z-", (8, 8, 8))
+    model.assign(kl.Isotropic3D(E=1e9, nu=0.4999, density=1000.0))
     result, exact = model.solve("amg"), model.solve("direct").u
     if quick:
         assert (result.report.solver, result.report.reason) == (
@@ -387,7 +362,7 @@ def test_an_iteration_slower_than_a_factorization_stops_early(quick, monkeypatch
     else:
         assert result.report.solver == "amg"
         assert result.report.iterations > 70
-    np.testing.assert_allclose(result.u, exact, rtol=0, atol=1e-7 * np.abs(exact).max())
+    close(result.u, exact, 1e-7)
 
 
 def bonded(kind, thickness, layers=40):

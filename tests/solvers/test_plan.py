@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 from computing import compiled
+from systems import system_of
 
 import kratos_lite as kl
 from kratos_lite.solvers import coarse_level, plan, plate_level
-from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.plan import Facts, Plan
+
+STEEL = kl.Isotropic3D(E=2e11, nu=0.3, density=7850.0)
 
 
 def facts(unknowns, **known):
@@ -48,6 +50,9 @@ def facts(unknowns, **known):
         (30_000, {"bulk_over_shear": (3001.0, 3001.0)}, "direct"),
         (30_000, {"bulk_over_shear": (3001.0, 3000.0)}, "displacement-pressure"),
         (150_001, {"bulk_over_shear": (0.0, 3001.0)}, "amg"),
+        # without kernels no pressures
+        (30_000, {"bulk_over_shear": (51.0, 0.0), "compiled": False}, "direct"),
+        (150_001, {"bulk_over_shear": (51.0, 0.0), "compiled": False}, "amg"),
     ],
 )
 def test_method_follows_from_facts(unknowns, known, method):
@@ -122,15 +127,17 @@ def test_after_an_iteration_few_unknowns_are_factorized():
         plan.after(7, 1e-10, 150_001, False)
 
 
-def test_bands_are_narrow_and_small():
-    assert plan.of_band(10_000, 1600, 1601) == Plan("band", "width 1600 ≤ 1600: a band is fastest")
-    assert plan.of_band(10_000, 1601, 1602) == Plan(
-        "sparse", "width 1601 > 1600: a sparse factorization takes less work"
-    )
-    assert plan.of_band(100_000, 499, 500).method == "band"
-    assert plan.of_band(100_000, 500, 501) == Plan(
-        "sparse", "50100000 numbers > 50000000: a band takes too much memory"
-    )
+@pytest.mark.parametrize(
+    ("band", "method", "reason"),
+    [
+        ((10_000, 1600, 1601), "band", "width 1600 ≤ 1600: a band is fastest"),
+        ((10_000, 1601, 1602), "sparse", "width 1601 > 1600: a sparse factorization takes less work"),
+        ((100_000, 499, 500), "band", "width 499 ≤ 5059: a band is fastest"),
+        ((100_000, 500, 501), "sparse", "50100000 numbers > 50000000: a band takes too much memory"),
+    ],
+)
+def test_bands_are_narrow_and_small(band, method, reason):
+    assert plan.of_band(*band) == Plan(method, reason)
 
 
 @pytest.mark.parametrize(
@@ -169,23 +176,20 @@ def test_methods_over_ranks(solver, unknowns, nearly, mumps, options, method):
 # ---- thresholds that change a result ---------------------------------------------------------------------
 
 
-def system_of(size=(1.0, 1.0, 1.0), cells=(8, 8, 8), side="z-"):
+def system(size=(1.0, 1.0, 1.0), cells=(8, 8, 8), side="z-"):
     """Return the equations of a box of 8N, clamped at a side, and its weight in no special direction."""
-    mesh = kl.box(size, cells, "KinematicLinear3D8N")
-    model = kl.Model(mesh, kl.Isotropic3D(E=2e11, nu=0.3, density=7850.0))
+    model = kl.Model(kl.box(size, cells, "KinematicLinear3D8N"), STEEL)
     model.fix(side)
-    points, constraints = model.mesh.points, model.supports.constraint_map
-    forces = np.tile([3.0, 4.0, -9.0], (len(points), 1))
-    return ConstrainedSystem(points, model.element_groups(), constraints, solver="amg"), forces
+    return system_of(model, solver="amg"), np.tile([3.0, 4.0, -9.0], (model.mesh.n_nodes, 1))
 
 
 def test_few_unknowns_are_iterated_to_round_off_whatever_the_tolerance(monkeypatch):
-    system, forces = system_of()
-    few, solution = system.solve(forces, tolerance=1e-3)
+    few_unknowns, forces = system()
+    few, solution = few_unknowns.solve(forces, tolerance=1e-3)
     size = np.abs(few).max()
-    np.testing.assert_allclose(system.solve(forces, tolerance=1e-14)[0], few, rtol=0, atol=1e-12 * size)
-    monkeypatch.setattr(plan, "DIRECT_LIMIT", len(system.constraint_map.free) - 1)
-    many, sooner = system.solve(forces, tolerance=1e-3)
+    np.testing.assert_allclose(few_unknowns.solve(forces, tolerance=1e-14)[0], few, rtol=0, atol=1e-12 * size)
+    monkeypatch.setattr(plan, "DIRECT_LIMIT", len(few_unknowns.constraint_map.free) - 1)
+    many, sooner = few_unknowns.solve(forces, tolerance=1e-3)
     assert sooner.iterations < solution.iterations
     assert 1e-9 * size < np.abs(many - few).max() < 1e-2 * size
 
@@ -200,30 +204,28 @@ def test_few_unknowns_are_iterated_to_round_off_whatever_the_tolerance(monkeypat
 )
 def test_products_alone_do_not_serve_flat_cells_and_plates(module, name, size, cells, side, monkeypatch):
     """Without these thresholds iterations are at least half as many again."""
-    system, forces = system_of(size, cells, side)
-    assert not system.plan.matrix_free
-    iterations = system.solve(forces)[1].iterations
+    careful, forces = system(size, cells, side)
+    assert not careful.plan.matrix_free
+    iterations = careful.solve(forces)[1].iterations
     monkeypatch.setattr(module, name, 0.0 if name == "FLAT" else 1e9)
-    careless, _ = system_of(size, cells, side)
+    careless, _ = system(size, cells, side)
     assert careless.plan.matrix_free or name == "FLAT"
     assert careless.solve(forces)[1].iterations > 1.5 * iterations
 
 
-@pytest.mark.parametrize(("aspect", "stretched"), [(2.9, False), (3.1, True)])
-def test_cells_are_stretched_from_a_third_on(aspect, stretched):
-    model = kl.Model(kl.box((aspect, 1.0, 1.0), (1, 1, 1)), kl.Isotropic3D(E=1.0, nu=0.3))
-    assert coarse_level.is_stretched(model.mesh.points, model.element_groups()) == stretched
-
-
-@pytest.mark.parametrize(("aspect", "many", "few"), [(3.5, 11, 10), (31.0, 2, 1), (29.0, 11, 10)])
-def test_one_of_20_stretched_cells_matters_and_one_of_200_extreme_ones(aspect, many, few):
-    for count, stretched in ((many, True), (few, False)):
-        mesh = kl.box((200.0, 1.0, 1.0), (200, 1, 1))
-        widths = np.where(np.arange(200) < count, 1 / aspect, 1.0)
-        X = mesh.points.copy()
-        X[:, 0] = np.interp(X[:, 0], np.arange(201.0), np.insert(np.cumsum(widths), 0, 0.0))
-        groups = kl.Model(mesh, kl.Isotropic3D(E=1.0, nu=0.3)).element_groups()
-        assert coarse_level.is_stretched(X, groups) == stretched
+@pytest.mark.parametrize(
+    ("aspect", "count", "stretched"),
+    [
+        *[(2.9, 200, False), (3.1, 200, True), (3.5, 11, True), (3.5, 10, False)],
+        *[(31.0, 2, True), (31.0, 1, False), (29.0, 11, True), (29.0, 10, False)],
+    ],
+)
+def test_one_of_20_stretched_cells_matters_and_one_of_200_extreme_ones(aspect, count, stretched):
+    mesh = kl.box((200.0, 1.0, 1.0), (200, 1, 1))
+    widths = np.where(np.arange(200) < count, 1 / aspect, 1.0)
+    X = mesh.points.copy()
+    X[:, 0] = np.interp(X[:, 0], np.arange(201.0), np.insert(np.cumsum(widths), 0, 0.0))
+    assert coarse_level.is_stretched(X, kl.Model(mesh, STEEL).element_groups()) == stretched
 
 
 @pytest.mark.parametrize(("thickness", "flat"), [(0.09, True), (0.11, False)])

@@ -25,8 +25,8 @@ from kratos_lite.elements.formulations import NON_LOCKING
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.registry import Registry
 from kratos_lite.solvers import plan
-from kratos_lite.solvers.banded import Factorizer
-from kratos_lite.solvers.constraint_map import ConstraintMap
+from kratos_lite.solvers.constraints import ConstraintMap
+from kratos_lite.solvers.direct import Factorizer
 from kratos_lite.solvers.linear_solver import LinearSolver
 from kratos_lite.solvers.mass import Mass
 from kratos_lite.typing import Array
