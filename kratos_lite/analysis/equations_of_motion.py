@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -22,9 +23,6 @@ from kratos_lite.solvers.mass import Mass
 from kratos_lite.solvers.plan import Plan, stepped
 from kratos_lite.typing import Array, Mask, Progress
 from kratos_lite.validation import finite
-
-if TYPE_CHECKING:
-    from kratos_lite.solvers.coarse_level import PCoarseLevel
 
 Solve: TypeAlias = Callable[[Array, Array, "Array | None"], Array]
 """Takes nodal forces, prescribed displacements and a start (3a,) or None, returns displacements (3a,)."""
@@ -261,19 +259,11 @@ class EquationsOfMotion:
 
     def _solver(self, A: BlockMatrix, near: BlockMatrix | None, m: float, k: float) -> Solve:
         """Return what solves A x = f; `near` is what it has beside skew parts, if it is not symmetric."""
-        system, constraints = self.system, self.system.constraint_map
-        plan, level = stepped(len(constraints.free)), partial(self._p_coarse_level, m, k)
-        make = partial(LinearSolver, constraint_map=constraints, points=system.points, plan=plan)
-        if near is None or not plan.iterates:
-            equations = make(A, p_coarse_level=level, symmetric=near is None)
-        else:
-            equations = make(A, symmetric=False, near=make(near, p_coarse_level=level))
-        return partial(_solved, equations, system.progress)
-
-    def _p_coarse_level(self, m: float, k: float) -> PCoarseLevel | None:
-        make = self.system.equations.p_coarse_level
-        level = make() if make else None
-        return level and level.with_mass(k, m * self.mass.nodal)
+        made, plan = self.system.equations, stepped(len(self.system.constraint_map.free))
+        equations = replace(made, K=A, plan=plan, symmetric=near is None, with_mass=(k, m * self.mass.nodal))
+        if near is not None and plan.iterates:
+            equations.near = replace(equations, K=near, symmetric=True)
+        return partial(_solved, equations, self.system.progress)
 
 
 def _solved(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -14,15 +13,10 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.errors import InputError
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers import direct
-<<<<<<< HEAD
-from kratos_lite.solvers.constraint_map import rigid_modes
-from kratos_lite.solvers.eigen import Problem, dense_modes, is_small
+from kratos_lite.solvers.constraints import ConstraintMap, rigid_modes
+from kratos_lite.solvers.eigen import Operator, Pencil, Problem, dense_modes, is_small, neutral_motions
 from kratos_lite.solvers.linear_solver import LinearSolver
-=======
-from kratos_lite.solvers.constraints import rigid_modes
-from kratos_lite.solvers.eigen import Pencil, modes, neutral_motions
->>>>>>> slv
-from kratos_lite.solvers.plan import DENSE_MODES
+from kratos_lite.solvers.plan import DENSE_MODES, stepped
 from kratos_lite.typing import Array, Complexes, Progress
 from kratos_lite.validation import instance, whole_number
 
@@ -67,15 +61,17 @@ def _by_iteration(
         out[kept] = solver.precondition(r[kept])
         return out
 
-    def reduced_product(times: Callable[[Array], Array]) -> Callable[[Array], Array]:
-        return lambda q: constraints.reduce(times(np.stack([constraints.transform(x) for x in q])).T).T
-
-    times_K, times_M = reduced_product(solver.times), reduced_product(e.mass.times)
+    times_K, times_M = (_reduced_product(constraints, times) for times in (solver.times, e.mass.times))
     norms = solver.norm, float(abs(e.mass.scalar).sum(axis=1).max())
     known = (R, times_M(R)) if len(R) else None
     problem = Problem(len(constraints.free), times_K, times_M, precondition, norms, known, progress)
     squares, shapes = problem.lowest(further)
     return np.sqrt(np.append(np.zeros(len(R)), squares)), np.vstack([R, shapes]).T
+
+
+def _reduced_product(constraints: ConstraintMap, times: Operator) -> Operator:
+    """Return the product on free degrees of freedom (k, q) of a matrix that multiplies all of them (k, N)."""
+    return lambda q: constraints.reduce(times(np.stack([constraints.transform(x) for x in q])).T).T
 
 
 def _free_motions(e: EquationsOfMotion) -> Array:
@@ -141,19 +137,18 @@ def critical_rate(model: Structure, count: int = 1) -> Array:
 
 def critical_rates(e: EquationsOfMotion, count: int) -> Array:
     """Return the lowest critical rates (count,) of equations whose supports hold all rigid motions."""
-    K, H = _critical_pencil(e)
-    n = K.shape[0]
+    constraints = e.system.constraint_map
+    n, H = len(constraints.free), _critical_terms(e)
     if count > n:
         raise InputError(f"this model has 1 … {n} critical rates; got {count}")
     if n <= DENSE_MODES or count > n // 4:
-        largest = _dense(K, H)[::-1][:count]
+        largest = _dense(reduced(e, e.K), reduced(e, H))[::-1][:count]
     else:
-        from scipy.sparse.linalg import LinearOperator, eigsh
-
-        factors = direct.factorize(K)
-        inverse = LinearOperator((n, n), matvec=factors.solve, dtype=np.float64)
-        start = np.random.default_rng(0).standard_normal(n)
-        largest = eigsh(H, count, K, which="LA", Minv=inverse, v0=start, return_eigenvectors=False)[::-1]
+        solver = replace(e.system.equations, plan=stepped(n))
+        times_H, times_K = (_reduced_product(constraints, A.times) for A in (H, e.K))
+        norms = H.norm(), e.K.norm()
+        problem = Problem(n, lambda X: -times_H(X), times_K, solver.precondition, norms, power=2)
+        largest = -problem.lowest(count)[0]
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.sort(np.where(largest > 0, 1 / np.sqrt(np.maximum(largest, 1e-300)), np.inf))
 
@@ -166,7 +161,7 @@ def critical_rates_beside(
     They are 0 and infinite where there is none.  `factors` are those of K - rate² H, if they are known: some
     twenty solutions with them are enough.
     """
-    square, (K, H) = rate**2, _critical_pencil(e)
+    square, K, H = rate**2, reduced(e, e.K), reduced(e, _critical_terms(e))
     if K.shape[0] <= FEW:
         with np.errstate(divide="ignore"):
             squares = 1 / _dense(K, H)
@@ -191,12 +186,12 @@ def _beside(K: Any, H: Any, square: float, factors: direct.Factorization) -> Arr
         return np.asarray(getattr(error, "eigenvalues", ()), dtype=float)
 
 
-def _critical_pencil(e: EquationsOfMotion) -> tuple[Any, Any]:
-    """Return K and H, less what stiffens, on the free degrees of freedom."""
+def _critical_terms(e: EquationsOfMotion) -> BlockMatrix:
+    """Return H, less what stiffens."""
     assert e.terms is not None
     H = BlockMatrix(np.zeros_like(e.K.data), e.K.indices, e.K.indptr)
     H.add_scalar(e.terms.H - (e.stiffening if e.stiffened else 0.0))
-    return reduced(e, e.K), reduced(e, H)
+    return H
 
 
 def _dense(K: Any, H: Any) -> Array:

@@ -1,34 +1,22 @@
-<<<<<<< HEAD
-"""Modes: the lowest eigenvalues λ and vectors x of K x = λ M x, both symmetric, M positive definite.
+"""Modes: eigenvalues of K x = λ M x, both symmetric, and complex ones of λ² M + λ C + K, nearest to 0.
 
 Small problems are solved whole (LAPACK).  Of larger ones a block of vectors comes down to the lowest
 energies: each step takes the best of the span of the vectors X, their last step P, and what an approximate
-inverse of K (a cycle of multigrid, or factors) makes of their residuals, W.
+inverse of K (a cycle of multigrid, or factors) makes of their residuals, W.  Motions that K and C do not
+resist are taken out of complex modes first: their eigenvalue 0 stands twice with one shape, so that rounding
+would spoil it by its square root.
 
 Sources: Knyazev, SIAM J. Sci. Comput. 23 (2001) 517-541 (LOBPCG); Hetmaniuk & Lehoucq, J. Comput. Phys. 218
-(2006) 324-332 (its basis); Stathopoulos & Wu, SIAM J. Sci. Comput. 23 (2002) 2165-2182 (dependent vectors).
-=======
-"""Modes: natural frequencies of K φ = ω² M φ, and complex modes of λ² M + λ C + K with λ nearest to 0.
-
-Small problems are solved whole (LAPACK), larger ones by Lanczos or Arnoldi with shift and invert (ARPACK).
-Motions that K and C do not resist are taken out of complex modes first: their eigenvalue 0 stands twice with
-one shape, so that rounding would spoil it by its square root.
-
-Source: Tisseur & Meerbergen, SIAM Review 43 (2001) 235-286; Fan, Lin & Van Dooren, SIAM J. Matrix Anal.
-Appl. 26 (2004) 252-256, for the scale of λ.
->>>>>>> slv
+(2006) 324-332 (its basis); Stathopoulos & Wu, SIAM J. Sci. Comput. 23 (2002) 2165-2182 (dependent vectors);
+Tisseur & Meerbergen, SIAM Review 43 (2001) 235-286; Fan, Lin & Van Dooren, SIAM J. Matrix Anal. Appl. 26
+(2004) 252-256, for the scale of λ.
 """
 
 from __future__ import annotations
 
-<<<<<<< HEAD
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeAlias
-=======
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
->>>>>>> slv
 
 import numpy as np
 
@@ -112,18 +100,12 @@ def dense_modes(K: Array, M: Array, count: int) -> tuple[Array, Array]:
     return np.sqrt(np.maximum(squares, 0.0)), shapes
 
 
-<<<<<<< HEAD
 @dataclass(frozen=True)
 class Problem:
     """K x = λ M x of n components, K positive beside the span of known vectors, where λ is 0.
 
     Vectors are rows of arrays (k, n).
     """
-=======
-def _by_iteration(K: Any, M: Any, count: int, progress: Progress | None) -> tuple[Array, Array]:
-    """Return the lowest modes by Lanczos on (K + s M)^-1 M, with a shift s that makes K definite."""
-    from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
->>>>>>> slv
 
     n: int
     K: Operator
@@ -303,6 +285,7 @@ def check(errors: Array, allowed: Array) -> None:
         )
 
 
+# ---- complex modes ----
 ROUNDS = 6
 """Shifts that are tried."""
 NEUTRAL = 1e-11

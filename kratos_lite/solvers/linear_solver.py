@@ -49,15 +49,11 @@ class LinearSolver:
     constraint_map: ConstraintMap  # the supports
     points: Array  # (n, 3) m, from which multigrid knows the rigid modes
     plan: Plan  # how it is solved
-<<<<<<< HEAD
-    p_coarse_level: Callable[[], PCoarseLevel | None] | None = None
     symmetric: bool = True  # positive definite, too
     near: LinearSolver | None = None  # of a matrix that is, and not far from K, where K is not
-=======
-    symmetric: bool = True  # positive definite, too; otherwise the plan is ``dense`` or ``direct``
     groups: Sequence[ElementGroup] = ()  # with `hanging`: quadratic elements, whose linear ones are a level
     hanging: HangingNodes | None = None
->>>>>>> slv
+    with_mass: tuple[float, Array] | None = None  # k, masses of nodes (n,), where K is k K + M of the groups
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what is pickled: what a method has prepared lives outside of Python, and is made anew."""
@@ -84,13 +80,19 @@ class LinearSolver:
         size = float(np.linalg.norm(b))
         tolerance *= self._fraction(f, c, size)
         if start is not None and self.plan.iterates:
-<<<<<<< HEAD
-            start = self.constraint_map.expand((start - c)[self.constraint_map.free], c)
-            residual, size = self.constraint_map.reduce(f - self.K @ start), float(np.linalg.norm(b))
-            if np.linalg.norm(residual) <= size:
-                return self._continue(f, start, residual, size, (tolerance, reduction), progress)
-        solution = self._solve(b, tolerance, progress) if len(b) else self._solution(b, 0, 0.0)
-        return replace(solution, x=self.constraint_map.expand(solution.x, c))
+            near = expand((start - c)[self.constraint_map.free], c)
+            residual = reduce(f - self.K @ near)
+            norm = float(np.linalg.norm(residual))
+            if norm <= size:
+                rounding = 2 * float(np.finfo(float).eps) * (self.norm * float(np.linalg.norm(near)) + size)
+                u, b = near, residual
+                tolerance = max(min(tolerance * size, reduction * norm), rounding) / (norm or 1.0)
+        q, iterations, plan = np.zeros(len(b)), 0, self.plan
+        if len(b) and (u is c or tolerance < 1):
+            q, iterations, plan = self._solve(b, tolerance, progress, u is not c)
+        u = expand(q, u)
+        error = backward_error(reduce(f - self.K @ u), self.norm, u, f)
+        return Solution(u, plan.method, plan.reason, iterations, error)
 
     def times(self, u: Array) -> Array:
         """Return K u of several vectors (k, N)."""
@@ -104,30 +106,8 @@ class LinearSolver:
         forces[self.constraint_map.free] = r
         return self._multigrid.precondition(forces)[self.constraint_map.free]
 
-    def _solution(self, x: Array, iterations: int, error: float, plan: Plan | None = None) -> Solution:
-        plan = self.plan if plan is None else plan
-        return Solution(x, plan.method, plan.reason, iterations, error)
-
-    def _fraction(self, f: Array, c: Array, b: Array) -> float:
-        """Return the fraction of |b| that tolerances refer to.
-=======
-            near = expand((start - c)[self.constraint_map.free], c)
-            residual = reduce(f - self.K @ near)
-            norm = float(np.linalg.norm(residual))
-            if norm <= size:
-                rounding = 2 * float(np.finfo(float).eps) * (self.norm * float(np.linalg.norm(near)) + size)
-                u, b = near, residual
-                tolerance = max(tolerance * size, rounding) / (norm or 1.0)
-        q, iterations, plan = np.zeros(len(b)), 0, self.plan
-        if len(b) and (u is c or tolerance < 1):
-            q, iterations, plan = self._solve(b, tolerance, progress, u is not c)
-        u = expand(q, u)
-        error = backward_error(reduce(f - self.K @ u), self.norm, u, f)
-        return Solution(u, plan.method, plan.reason, iterations, error)
-
     def _fraction(self, f: Array, c: Array, size: float) -> float:
         """Return the fraction of |b|, a `size`, that tolerances refer to.
->>>>>>> slv
 
         Where prescribed displacements of nearly incompressible bodies are large forces in K, these are no
         measure of what has to be in equilibrium: the bulk modulus does not count.
@@ -135,36 +115,7 @@ class LinearSolver:
         soft = getattr(self.K, "A", None)
         if soft is None or not c.any():
             return 1.0
-<<<<<<< HEAD
-        size = float(np.linalg.norm(self.constraint_map.reduce(f - soft @ c)))
-        return min(1.0, size / (float(np.linalg.norm(b)) or 1.0))
-
-    def _continue(
-        self,
-        f: Array,
-        start: Array,
-        residual: Array,
-        size: float,
-        limits: tuple[float, float],
-        progress: Progress | None,
-    ) -> Solution:
-        """Solve for the residual of the displacements `start` under a load of norm `size`.
-
-        `limits` are fractions of this norm, and of that of the residual.
-        """
-        norm = float(np.linalg.norm(residual))
-        rounding = 2 * float(np.finfo(float).eps) * (self.norm * float(np.linalg.norm(start)) + size)
-        aim = max(min(limits[0] * size, limits[1] * norm), rounding)
-        if norm > aim:
-            change = self._solve(residual, aim / norm, progress, continued=True)
-        else:
-            change = self._solution(np.zeros(len(residual)), 0, 0.0)
-        u = self.constraint_map.expand(change.x, start)
-        error = backward_error(self.constraint_map.reduce(f - self.K @ u), self.norm, u, f)
-        return replace(change, x=u, backward_error=error)
-=======
         return min(1.0, float(np.linalg.norm(self.constraint_map.reduce(f - soft @ c))) / (size or 1.0))
->>>>>>> slv
 
     def _solve(
         self, b: Array, tolerance: float, progress: Progress | None, continued: bool
@@ -174,14 +125,8 @@ class LinearSolver:
         if plan.iterates:
             q, iterations, plan = self._iterate(b, tolerance, progress, continued)
             if plan.iterates:
-<<<<<<< HEAD
-                return solution
-        q, A = self._prepared("factors", "factorize", progress).solve(b), self.reduced_matrix
-        return self._solution(q, 0, backward_error(b - A @ q, matrix_norm(A), q, b), plan)
-=======
                 return q, iterations, plan
         return self._prepared("factors", "factorize", progress).solve(b), 0, plan
->>>>>>> slv
 
     def _prepared(self, name: str, phase: str, progress: Progress | None) -> Any:
         """Return what a method prepares, and report a phase if it is made now."""
@@ -228,6 +173,8 @@ class LinearSolver:
         from kratos_lite.solvers.multigrid import multigrid
 
         linear, map = p_coarse_level(self.points, self.groups, self.hanging), self.constraint_map
+        if linear is not None and self.with_mass is not None:
+            linear = linear.with_mass(*self.with_mass)
         if linear is not None and map.T is not None:
             linear = apply_ties(linear, map.T, map.free)
         make = multigrid if self.plan.method == "amg" else DisplacementPressure
@@ -245,12 +192,8 @@ class LinearSolver:
         free, rhs = self.constraint_map.free, np.zeros(len(self.constraint_map.c))
         rhs[free] = b
         aim = tolerance if continued else tolerance_of(tolerance, len(b))
-<<<<<<< HEAD
-        forecast = ConvergenceForecast(tolerance) if is_quick_to_factorize(len(b)) else None
         if self.near is not None:
-            return self._minimal_residual(b, aim, self.near), self.plan
-=======
->>>>>>> slv
+            return *self._minimal_residual(b, aim, self.near), self.plan
         multigrid = self._prepared("_multigrid", "set up", progress)
         norm = self.norm if self._blocks is self.K else self._blocks.norm()
         monitor = Monitor(tolerance, progress, is_quick_to_factorize(len(b)))
@@ -260,7 +203,7 @@ class LinearSolver:
         monitor.finish()
         return x[free], iterations, self.plan
 
-    def _minimal_residual(self, b: Array, tolerance: float, near: LinearSolver) -> Solution:
+    def _minimal_residual(self, b: Array, tolerance: float, near: LinearSolver) -> tuple[Array, int]:
         """Solve equations that are not symmetric by GMRES, with the multigrid of a matrix near to theirs."""
         from scipy.sparse.linalg import LinearOperator, gmres
 
@@ -272,15 +215,13 @@ class LinearSolver:
             return constraints.reduce(self.K @ constraints.transform(q))
 
         A, M = (LinearOperator((len(b), len(b)), matvec=f, dtype=float) for f in (times, near.precondition))
-        x, failed = gmres(A, b, rtol=tolerance, atol=0.0, restart=RESTART, maxiter=MAX_RESTARTS, M=M)
+        q, failed = gmres(A, b, rtol=tolerance, atol=0.0, restart=RESTART, maxiter=MAX_RESTARTS, M=M)
         if failed:
             raise SolveError(
                 f"the equations of a motion were not solved to {tolerance:g} in {iterations} iterations; "
                 "take smaller steps"
             )
-        u = constraints.transform(x)
-        error = backward_error(b - constraints.reduce(self.K @ u), self.norm, u, b)
-        return self._solution(x, iterations, error)
+        return q, iterations
 
 
 def constrained(K: BlockMatrix, T: Any, free: Ints) -> BlockMatrix:

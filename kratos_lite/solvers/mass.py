@@ -16,7 +16,7 @@ from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.errors import SolveError
 from kratos_lite.native import kernels
 from kratos_lite.solvers import direct
-from kratos_lite.solvers.constraint_map import ConstraintMap
+from kratos_lite.solvers.constraints import ConstraintMap
 from kratos_lite.solvers.iteration import conjugate_gradients
 from kratos_lite.typing import Array
 
