@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -52,21 +53,29 @@ def _by_iteration(
     further = count - len(R)
     if further <= 0:
         return np.zeros(count), R[:count].T
-    held = constraints.holding(e.free_motions.held[e.system.nodes])
-    kept = np.searchsorted(constraints.free, held.free)
-    solver = replace(solver, constraint_map=held)
-
-    def precondition(r: Array) -> Array:
-        out = np.zeros_like(r)
-        out[kept] = solver.precondition(r[kept])
-        return out
-
     times_K, times_M = (_reduced_product(constraints, times) for times in (solver.times, e.mass.times))
     norms = solver.norm, float(abs(e.mass.scalar).sum(axis=1).max())
     known = (R, times_M(R)) if len(R) else None
-    problem = Problem(len(constraints.free), times_K, times_M, precondition, norms, known, progress)
+    problem = Problem(
+        len(constraints.free), times_K, times_M, _preconditioner(e, solver), norms, known, progress
+    )
     squares, shapes = problem.lowest(further)
     return np.sqrt(np.append(np.zeros(len(R)), squares)), np.vstack([R, shapes]).T
+
+
+def _preconditioner(e: EquationsOfMotion, solver: LinearSolver) -> Callable[[Array], Array]:
+    """Return about K⁻¹ of free degrees of freedom (q,), rigid motions that are free being held."""
+    constraints = e.system.constraint_map
+    held = constraints.holding(e.free_motions.held[e.system.nodes])
+    kept = np.searchsorted(constraints.free, held.free)
+    firm = replace(solver, constraint_map=held)
+
+    def precondition(r: Array) -> Array:
+        out = np.zeros_like(r)
+        out[kept] = firm.precondition(r[kept])
+        return out
+
+    return precondition
 
 
 def _reduced_product(constraints: ConstraintMap, times: Operator) -> Operator:
@@ -91,7 +100,13 @@ def complex_modes(
     with phase("assemble"):
         M, C, K = (reduced(e, e.matrix(0.0, *factors)) for factors in ((1, 0, 0), (0, 1, 0), (0, 0, 1)))
     with phase("modes"):
-        pencil = Pencil(M, C, K, neutral_motions(M, C, K, _rigid_motions(e)))
+        solver = replace(e.system.equations, plan=stepped(len(e.system.constraint_map.free)))
+
+        def start(number: int) -> Array:
+            return _by_iteration(e, solver, number + len(_free_motions(e)), progress)[1].T
+
+        neutral = neutral_motions(M, C, K, _rigid_motions(e))
+        pencil = Pencil(M, C, K, neutral, start, _preconditioner(e, solver))
         values, shapes = pencil.modes(whole_number(count, "count"))
     return values, expanded(e, shapes)
 

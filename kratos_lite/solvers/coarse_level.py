@@ -169,7 +169,7 @@ def _submeshes(points: Array, group: ElementGroup, corners: Ints, halved: bool) 
         long = order[:, 2] > LONG * order[:, 1]
         if 2 * np.count_nonzero(long) >= len(long):  # a few come apart from their neighbors, which takes more
             along[long] = sides[long].argmax(axis=1)
-    return [_Submesh(group.take(along == axis), element, cells[axis]) for axis in np.unique(along)]
+    return [_Submesh(group.take(along == axis), element, cells[axis]) for axis in sorted(set(along.tolist()))]
 
 
 def _halves(shape: type[Shape], corners: Ints, axis: int) -> Ints:

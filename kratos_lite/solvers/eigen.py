@@ -51,8 +51,6 @@ RESIDUAL = 1e-6
 """Fraction of its terms that an equation may miss."""
 EPS, ROUNDING = 1e-15, 1e-12
 """Fraction of the norms of its matrices that it may miss, and where an iteration comes no nearer."""
-RESTARTS = 40
-"""Restarts of Lanczos or Arnoldi after which another shift is tried."""
 COLUMNS = 1 << 14
 """Components of vectors that are combined at once: they stay in the cache."""
 
@@ -264,13 +262,19 @@ def not_converged(count: int) -> SolveError:
     )
 
 
-def check_residuals(terms: list[tuple[Any, Any]], shapes: Any) -> None:
-    """Raise SolveError unless the sum of terms, factors and matrices, is 0 for each shape (n, count)."""
+def check_residuals(terms: list[tuple[Any, Any]], shapes: Any, energies: bool = False) -> None:
+    """Raise SolveError unless the sum of terms, factors and matrices, is 0 for each shape (n, count).
+
+    Of `energies` it is the product with the shape that has to be 0, which is known more exactly than that.
+    """
     parts = [factor * (A @ shapes) for factor, A in terms]
     norms = sum(np.abs(factor) * float(abs(A).sum(axis=0).max()) for factor, A in terms)
+    lengths = np.linalg.norm(shapes, axis=0)
+    if energies:
+        parts = [(shapes.conj() * part).sum(axis=0, keepdims=True) / lengths for part in parts]
     residual = np.linalg.norm(sum(parts), axis=0)
     size = sum(np.linalg.norm(part, axis=0) for part in parts)
-    allowed = RESIDUAL * size + 0.1 * ROUNDING * norms * np.linalg.norm(shapes, axis=0)
+    allowed = RESIDUAL * size + 0.1 * ROUNDING * norms * lengths
     check(residual / size, allowed / size)
 
 
@@ -286,8 +290,12 @@ def check(errors: Array, allowed: Array) -> None:
 
 
 # ---- complex modes ----
-ROUNDS = 6
-"""Shifts that are tried."""
+EXPANSIONS = 60
+"""Times that the space of complex modes grows; more do not converge."""
+ROUNDED = 1e-8
+"""Length that a vector of length 1 has left without the span of others, below which it is rounding."""
+SMALL = 1e-6
+"""Fraction of the largest |λ| asked for below which one counts as 0."""
 NEUTRAL = 1e-11
 """Fraction of the stiffness up to which a motion is not resisted at all."""
 
@@ -304,6 +312,8 @@ class Pencil:
     C: csr_array[Any, Any]
     K: csr_array[Any, Any]
     neutral: Array
+    start: Callable[[int], Array]  # makes of a number so many real modes (k, n), and rigid motions
+    precondition: Callable[[Array], Array]  # about K⁻¹, of one vector (n,)
 
     def modes(self, count: int) -> tuple[Complexes, Complexes]:
         """Return λ (count,) in 1/s, nearest to 0 first, and shapes (n, count) of length 1."""
@@ -312,6 +322,7 @@ class Pencil:
             raise InputError(f"this model has 1 … {2 * n} complex modes; got {count}")
         values = np.zeros(zeros, dtype=complex)
         shapes = np.repeat(self.neutral, 2, axis=1).astype(complex)
+        whole = True
         if (further := count - zeros) > 0:
             whole = 2 * n <= DENSE_MODES or further > n // 4
             elastic, vectors = self._all() if whole else self._nearest(further)
@@ -319,83 +330,67 @@ class Pencil:
             values, shapes = np.append(values, elastic[order]), np.hstack([shapes, vectors[:, order]])
         values, shapes = values[:count], shapes[:, :count]
         shapes = shapes / np.linalg.norm(shapes, axis=0)
-        self.check(values, shapes)
+        self.check(values, shapes, energies=not whole)
         return values, shapes
 
-    def check(self, values: Complexes, shapes: Complexes) -> None:
-        """Raise SolveError unless all pairs satisfy the equations."""
+    def check(self, values: Complexes, shapes: Complexes, energies: bool = False) -> None:
+        """Raise SolveError unless all pairs satisfy the equations, or their products with the shapes."""
         terms = [(values**2, self.M), (values, self.C), (np.ones_like(values), self.K)]
-        check_residuals(terms, shapes)
+        check_residuals(terms, shapes, energies)
 
     def _all(self) -> tuple[Complexes, Complexes]:
         """Return all eigenvalues but those of the neutral motions, from dense matrices."""
         Q: Array = np.eye(self.K.shape[0])
         if k := self.neutral.shape[1]:
             Q = np.linalg.qr(self.M @ self.neutral, mode="complete")[0][:, k:]
-        M, C, K = (Q.T @ (A @ Q) for A in (self.M, self.C, self.K))
-        L = np.linalg.cholesky(M)
-        C, K = (np.linalg.solve(L, np.linalg.solve(L, A).T).T for A in (C, K))
-        scale = max(float(np.abs(K).sum(axis=0).max(initial=0.0)), float(np.finfo(float).tiny)) ** 0.5
-        zero, one = np.zeros_like(K), scale * np.eye(len(K))
-        values, vectors = np.linalg.eig(np.block([[zero, one], [-K / scale, -C]]))
-        shapes = Q @ np.linalg.solve(L.T, vectors[: len(K)])
-        return values.astype(complex), np.asarray(shapes, dtype=complex)
+        values, vectors = _all_values(*(Q.T @ (A @ Q) for A in (self.M, self.C, self.K)))
+        return values, Q @ vectors
 
     def _nearest(self, count: int) -> tuple[Complexes, Complexes]:
-        """Return eigenvalues nearest to 0, from shifts that come ever nearer to it.
+        """Return eigenvalues nearest to 0, from a space that grows by what the residuals miss.
 
-        All within some distance of the shift are found, so that those nearest to 0 are known to be among
-        them where they lie within this distance less the shift.
+        It begins with real modes, two for each pair of complex ones.
         """
-        shift, wanted = first_shift(self.K, self.M) ** 0.5, count + 2
-        for _ in range(ROUNDS):
-            values, vectors = self._beside(shift, wanted)
-            size = np.sort(np.abs(values))
-            if not len(size):  # all are far nearer to each other than to the shift
-                shift /= 30
-                continue
-            reach = float(np.abs(values - shift).max()) - shift
-            last = float(size[min(count, len(size)) - 1])
-            if len(size) >= count and last <= reach:
-                return values, vectors
-            if last > 3 * shift:
-                wanted = min(2 * wanted, self.K.shape[0])
-            shift = min(shift / 4, max(last / 2, 1e-5 * shift))
+        V = self._independent(self.start(count), np.zeros((0, self.K.shape[0])))
+        roundoff = 10 * EPS * float(abs(self.K).sum(axis=0).max())
+        for _ in range(EXPANSIONS):
+            products = [(A @ V.T).T for A in (self.M, self.C, self.K)]
+            values, Y = _all_values(*(V @ AV.T for AV in products))
+            chosen = np.argsort(np.abs(values), kind="stable")[:count]
+            values, Y = values[chosen], Y[:, chosen].T
+            residual = sum(
+                factor[:, None] * (Y @ AV)
+                for factor, AV in zip((values**2, values, np.ones(count)), products, strict=True)
+            )
+            W = [np.stack([self.precondition(r) for r in part]) for part in (residual.real, residual.imag)]
+            energies = (residual.real * W[0] + residual.imag * W[1]).sum(axis=1)
+            sizes = (np.abs(values) + SMALL * np.abs(values).max()) ** 2
+            errors = np.abs(energies) / (sizes * (np.abs(Y) ** 2).sum(axis=1))
+            errors[np.linalg.norm(residual, axis=1) <= roundoff * np.linalg.norm(Y @ V, axis=1)] = 0.0
+            wrong = (errors > TOLERANCE**1.5) & (values.imag >= 0)  # conjugates span the same
+            if not wrong.any():
+                return values, (Y @ V).T
+            V = np.vstack([V, self._independent(np.vstack([part[wrong] for part in W]), V)])
         raise not_converged(count)
 
-    def _beside(self, shift: float, wanted: int) -> tuple[Complexes, Complexes]:
-        """Return eigenvalues nearest to a shift > 0 by Arnoldi; none if that does not converge.
+    def _independent(self, W: Array, V: Array) -> Array:
+        """Return vectors (k, n) without the neutral ones and V, orthonormal in M."""
+        known = np.vstack([self.neutral.T, V])
+        for _ in range(2):
+            W = W / np.maximum(_lengths(W), np.finfo(float).tiny)[:, None]
+            W = W - (W @ (self.M @ known.T)) @ known
+            W = W[_lengths(W) > ROUNDED]
+        return _orthonormal(W @ (self.M @ W.T)).T @ W
 
-        With x = (u, λ u / shift) the inverse of the shifted pencil takes (p, q) to (u, u + p / shift), where
-        (shift² M + shift C + K) u = -shift M (p + q) - C p.  It is divided by the shift.
-        """
-        from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
 
-        n = self.K.shape[0]
-        factors = direct.factorize((shift**2 * self.M + shift * self.C + self.K).tocsr(), symmetric=False)
-
-        def inverse(x: Array) -> Array:
-            p, q = self._without(x[:n]), self._without(x[n:])
-            u = -self._without(factors.solve(shift**2 * (self.M @ (p + q)) + shift * (self.C @ p)))
-            return np.concatenate([u, u + p])
-
-        operator = LinearOperator((2 * n, 2 * n), matvec=inverse, dtype=np.float64)
-        start = np.random.default_rng(0).standard_normal(2 * n)
-        # Pairs are often nearly repeated: room for more of them, no tolerance below rounding.
-        room = min(3 * wanted + 20, 2 * n)
-        try:
-            values, vectors = eigs(
-                operator, wanted, which="LM", v0=start, ncv=room, tol=1e-11, maxiter=RESTARTS // 3
-            )
-        except ArpackNoConvergence:
-            return np.zeros(0, dtype=complex), np.zeros((n, 0), dtype=complex)
-        return shift * (1 + 1 / values), vectors[:n]
-
-    def _without(self, u: Array) -> Array:
-        """Return a motion without its neutral part."""
-        if not self.neutral.shape[1]:
-            return u
-        return np.asarray(u - self.neutral @ (self.neutral.T @ (self.M @ u)))
+def _all_values(M: Array, C: Array, K: Array) -> tuple[Complexes, Complexes]:
+    """Return all λ (2n,) of λ² M + λ C + K, full matrices, and vectors (n, 2n)."""
+    L = np.linalg.cholesky(M)
+    C, K = (np.linalg.solve(L, np.linalg.solve(L, A).T).T for A in (C, K))
+    scale = max(float(np.abs(K).sum(axis=0).max(initial=0.0)), float(np.finfo(float).tiny)) ** 0.5
+    zero, one = np.zeros_like(K), scale * np.eye(len(K))
+    values, vectors = np.linalg.eig(np.block([[zero, one], [-K / scale, -C]]))
+    return values.astype(complex), np.asarray(np.linalg.solve(L.T, vectors[: len(K)]), dtype=complex)
 
 
 def neutral_motions(M: Any, C: Any, K: Any, candidates: Array) -> Array:

@@ -569,8 +569,8 @@ MUTATIONS = [
     Mutation("native/element_products.hpp", "K[3 + i] += both * D[i]", "K[3 + i] += D[i]", PRODUCTS),
     Mutation(
         "native/sparse.hpp",
-        "s1 += *reinterpret_cast<const Vec*>(a + 3) * v;",
-        "s1 -= *reinterpret_cast<const Vec*>(a + 3) * v;",
+        "s[v][1] += *reinterpret_cast<const Vec*>(a + 3) * at;",
+        "s[v][1] -= *reinterpret_cast<const Vec*>(a + 3) * at;",
         "tests/native/test_native.py",
     ),
     Mutation("native/rigid.hpp", "A[i] = p[i] + h * load_[i];", "A[i] = p[i] - h * load_[i];", STEPS),

@@ -84,7 +84,7 @@ PHASES = {
         "kratos_lite.solvers.linear_solver:LinearSolver._iterate",
         (*STATIC, "--solver", "amg"),
     ),
-    "frequencies": ("kratos_lite.solvers.eigen:modes", (*STATIC, "--modes", "3")),
+    "frequencies": ("kratos_lite.solvers.eigen:dense_modes", (*STATIC, "--modes", "3")),
     "stresses": ("kratos_lite.io.runners.outcome:Outcome.summary", STATIC),
     "writing": ("os:fsync", STATIC),
     "replacing": ("os:replace", STATIC),

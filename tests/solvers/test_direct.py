@@ -61,7 +61,7 @@ def skew(n=200):
 @each_backend
 def test_backends_solve(backend, monkeypatch):
     monkeypatch.setattr(direct, "BACKENDS", (backend,))
-    for A, symmetric in ((equations()._matrix, True), (csr_array(skew()), False)):
+    for A, symmetric in ((equations().reduced_matrix, True), (csr_array(skew()), False)):
         b = np.random.default_rng(1).standard_normal(A.shape[0])
         for factors in (direct.factorize(A, symmetric), direct.factorize_dense(A.toarray())):
             assert factors.method in (backend.__name__, "dense")
