@@ -123,10 +123,11 @@ class Problem:
 
         def converged(squares: Array, errors: Array) -> bool:
             nonlocal smallest
-            smallest = min(smallest, max(float(errors[:count].max()), TOLERANCE))
+            largest = float(errors[:count].max())
+            smallest = min(smallest, max(largest, TOLERANCE))
             if self.progress:
                 self.progress("modes", 0.99 * float(np.log(smallest) / np.log(TOLERANCE)))
-            return smallest <= TOLERANCE
+            return largest <= TOLERANCE
 
         X = self._start(count + GUARDS + count // 6)
         while True:

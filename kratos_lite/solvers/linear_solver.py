@@ -193,7 +193,7 @@ class LinearSolver:
         rhs[free] = b
         aim = tolerance if continued else tolerance_of(tolerance, len(b))
         if self.near is not None:
-            return *self._minimal_residual(b, aim, self.near), self.plan
+            return *self._minimal_residual(b, tolerance, self.near), self.plan
         multigrid = self._prepared("_multigrid", "set up", progress)
         norm = self.norm if self._blocks is self.K else self._blocks.norm()
         monitor = Monitor(tolerance, progress, is_quick_to_factorize(len(b)))

@@ -16,6 +16,8 @@ ELEMENTS = "tests/testing/test_registered.py"
 STIFFNESS = "tests/assembly/test_stiffness.py"
 GAUSS = "tests/assembly/test_gauss_point_fields.py"
 STRAIN = "tests/assembly/test_finite_strain.py"
+BLOCK_MODES = "tests/analysis/test_block_modes.py"
+COMPLEX = "tests/analysis/test_complex_modes.py"
 TRANSIENT = "tests/analysis/test_transient.py"
 SIGNS = "tests/analysis/test_signs_and_orders.py"
 STEPS = "tests/analysis/test_rigid_and_pseudo_rigid_steps.py"
@@ -191,6 +193,15 @@ MUTATIONS = [
         "force = 0 * float(np.abs(total.sum(axis=0)).max() / size)",
         SIGNS,
     ),
+    # ---- modes
+    Mutation("solvers/eigen.py", "return largest <= TOLERANCE", "return smallest <= TOLERANCE", BLOCK_MODES),
+    Mutation("solvers/eigen.py", "if others[0] > last", "if True or others[0] > last", BLOCK_MODES),
+    Mutation(
+        "solvers/eigen.py", "values**2, values, np.ones(count)", "values, values, np.ones(count)", COMPLEX
+    ),
+    Mutation("solvers/eigen.py", "W = W[_lengths(W) > ROUNDED]", "W = W[:]", COMPLEX),
+    Mutation("solvers/coarse_level.py", "self.weights * nodal[fine]", "0.0 * nodal[fine]", BLOCK_MODES),
+    Mutation("native/sparse.hpp", "s[v] += A.data[k]", "s[0] += A.data[k]", BLOCK_MODES),
     # ---- transients
     Mutation(
         "analysis/integrators/generalized_alpha.py",

@@ -1,0 +1,261 @@
+"""Modes of larger models, by a block of vectors: none is missed, none comes twice."""
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.analysis.modal import critical_rate
+from kratos_lite.errors import SolveError
+from kratos_lite.mesh.refinement import refine
+from kratos_lite.native import kernels
+from kratos_lite.solvers import eigen
+from kratos_lite.solvers.linear_solver import LinearSolver
+from kratos_lite.solvers.plan import Plan
+from tests.fixtures.systems import system_of
+
+STEEL = {"E": 210e9, "density": 7850.0}
+SOFTER = (1.0, 1e-3, 1e-6)
+
+
+def two_of(mesh, scale):
+    """Return a mesh and, apart from it, the same with another size."""
+    points = np.vstack([mesh.points, mesh.points * scale + (9.0, 0.0, 0.0)])
+    n = mesh.n_nodes
+    return kl.Mesh(points, [kl.Block(b.name, np.vstack([b.nodes, b.nodes + n])) for b in mesh.blocks])
+
+
+def random_model(seed):
+    """Return a block of any element: flat or long, of two materials, of two nearly alike, tied, hanging."""
+    rng = np.random.default_rng(seed)
+    element = str(rng.choice(["4N", "8N", "10N", "20N", "27N"]))
+    size = tuple(rng.choice([1.0, 1.0, 2.0, 0.1, 0.02], 3))
+    cells = tuple(rng.integers(1, 4 if element in ("4N", "8N") else 3, 3).tolist())
+    mesh = kl.box(size, cells, f"KinematicLinear3D{element}")
+    kind = rng.integers(5)
+    if kind == 0:
+        mesh = two_of(mesh, 1 + rng.choice([0.0, 1e-6, 1e-3]))
+    if kind == 1 and element in ("8N", "20N") and mesh.n_elements > 1:
+        mesh = refine(mesh, np.arange(mesh.n_elements) == 0).mesh
+    model = kl.Model(mesh, kl.Isotropic3D(nu=float(rng.choice([0.0, 0.3, 0.4999])), **STEEL))
+    if kind == 2:
+        half = np.arange(mesh.n_elements) < mesh.n_elements // 2
+        soft = kl.Isotropic3D(E=210e9 * rng.choice(SOFTER), nu=0.3, density=1000.0)
+        model.assign(soft, np.flatnonzero(half))
+    for side, axes in ((), (("x-", "xyz"),), (("x-", "x"), ("y-", "y")))[rng.integers(3)]:
+        model.fix(side, axes)
+    if kind == 3:
+        first, *others = [n for n in mesh.nodes("z+").tolist() if not model.supports.fixed[n].any()][:4]
+        for node in others:
+            model.constrain((node, "z"), {(first, "z"): 1.0})
+    return model, bool(rng.integers(2))
+
+
+@pytest.mark.parametrize("seeds", np.split(np.arange(100), 10))
+def test_random_models_have_the_modes_of_lapack(seeds, monkeypatch):
+    for seed in seeds:
+        model, lumped = random_model(seed)
+        mesh = model.mesh
+        count = min(6, len(model.supports.constraint_map(np.arange(mesh.n_nodes)).free) // 5)
+        M = model.matrices(lumped=lumped).M.diagonal()
+        roundoff = 1e-12 * (model.matrices().K.diagonal()[M > 0] / M[M > 0]).max()
+        monkeypatch.setattr(eigen, "DENSE_MODES", 2000)
+        exact = model.modes(count, lumped=lumped)[0] ** 2
+        monkeypatch.setattr(eigen, "DENSE_MODES", 0)
+        squares = model.modes(count, lumped=lumped)[0] ** 2
+        np.testing.assert_allclose(squares, exact, rtol=4e-8, atol=roundoff, err_msg=f"seed {seed}")
+
+
+def test_modes_of_larger_bodies_by_closed_forms():
+    """A confined column: c π (k - ½) / L; a free cube has double and triple modes."""
+    material = kl.Isotropic3D(E=1.0, nu=0.3, density=1.0)
+    column = kl.Model(kl.box((1, 1, 8), (3, 3, 60)), material)
+    column.fix(lambda X: np.ones(len(X), dtype=bool), "xy")
+    column.fix("z-", "z")
+    speed = np.sqrt(material.C[0, 0])
+    omega, shapes = column.modes(3)
+    np.testing.assert_allclose(omega, speed * np.pi * np.array([0.5, 1.5, 2.5]) / 8, rtol=2e-3)
+    assert shapes.shape == (3, column.mesh.n_nodes, 3)
+    cube = kl.Model(kl.box((1, 1, 1), (9, 9, 9), "EnhancedStrain3D8N"), material)
+    omega = cube.modes(14)[0]
+    assert not omega[:6].any()
+    groups = [omega[6:8], omega[8:11], omega[11:14]]
+    for group, reference in zip(groups, (1.77125, 2.38517, 2.42566), strict=True):
+        np.testing.assert_allclose(group, group[0], rtol=1e-8)
+        assert group[0] == pytest.approx(reference, rel=0.02)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1 + 1e-6])
+def test_two_bodies_nearly_alike_have_each_mode_twice(scale):
+    one = kl.box((1, 1, 1), (6, 6, 6))
+    omegas = []
+    for mesh in (one, two_of(one, scale)):
+        model = kl.Model(mesh, kl.Isotropic3D(nu=0.3, **STEEL))
+        model.fix(np.isclose(mesh.points[:, 2], 0.0))
+        omegas.append(model.modes(4 if mesh is one else 8)[0])
+    twice = np.sort(np.concatenate([omegas[0], omegas[0] / scale]))
+    np.testing.assert_allclose(omegas[1], twice, rtol=1e-8)
+
+
+def test_a_mode_that_a_start_misses_is_found(monkeypatch):
+    """The first block begins without a trace of the lowest mode."""
+    model = kl.Model(kl.box((1, 1, 2), (7, 7, 8)), kl.Isotropic3D(nu=0.3, **STEEL))
+    model.fix("x-")
+    omega = model.modes(4)[0]
+    plain = eigen.Problem._descend
+    blocks = []
+
+    def blind(self, X, done):
+        if not blocks:
+            squares, V, MV = plain(self, X, done)
+            blocks.append(squares)
+            return squares[1:], V[1:], MV[1:]
+        blocks.append(X)
+        return plain(self, X, done)
+
+    monkeypatch.setattr(eigen.Problem, "_descend", blind)
+    np.testing.assert_allclose(model.modes(4)[0], omega, rtol=1e-8)
+    assert len(blocks) > 2
+
+
+def test_modes_beyond_reach_are_refused(monkeypatch):
+    model = kl.Model(kl.box((1, 1, 1), (8, 8, 8)), kl.Isotropic3D(nu=0.3, **STEEL))
+    model.fix("z-")
+    monkeypatch.setattr(eigen, "STEPS", 2)
+    with pytest.raises(SolveError, match="cannot be found by iteration"):
+        model.modes(3)
+
+
+def test_critical_rates_of_larger_wheels():
+    """Those of the full matrices, and of a mesh above their limit near them."""
+    rates = []
+    for around in (12, 24):
+        wheel = kl.Model(kl.annulus(0.3, 1.0, 0.2, cells=(3, around, 2)), kl.Isotropic3D(nu=0.3, **STEEL))
+        wheel.fix("inner")
+        wheel.add(kl.ale.Rotation("z", 10.0))
+        rates.append(critical_rate(wheel, 3))
+    full = rates[0].copy()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("kratos_lite.analysis.modal.DENSE_MODES", 0)
+        wheel = kl.Model(kl.annulus(0.3, 1.0, 0.2, cells=(3, 12, 2)), kl.Isotropic3D(nu=0.3, **STEEL))
+        wheel.fix("inner")
+        wheel.add(kl.ale.Rotation("z", 10.0))
+        np.testing.assert_allclose(critical_rate(wheel, 3), full, rtol=1e-8)
+    np.testing.assert_allclose(rates[1], rates[0], rtol=0.2)
+
+
+# ---- steps in time of larger models ----
+
+
+def struck(element, cells, **options):
+    """Return a block on a clamped side in its first mode of motion, and its period."""
+    model = kl.Model(kl.box((1, 1, 2), cells, element), kl.Isotropic3D(nu=0.3, **STEEL))
+    model.fix("x-")
+    omega, shapes = model.modes(1)
+    return model.transient(velocity=shapes[0], **options), 2 * np.pi / omega[0]
+
+
+@pytest.mark.parametrize(
+    ("element", "cells"),
+    [
+        ("KinematicLinear3D8N", (9, 9, 18)),
+        ("KinematicLinear3D10N", (5, 5, 9)),
+        ("KinematicLinear3D27N", (4, 5, 9)),
+    ],
+)
+def test_energy_is_kept_by_iterations(element, cells):
+    transient, period = struck(element, cells)
+    assert transient.u.size > 4_000
+    energy = transient.energy()
+    *_, end = kl.integrate(transient, period / 20, 60, every=60)
+    assert abs(transient.energy(end) / energy - 1) < 1e-9
+
+
+def test_iterations_and_factors_come_to_the_same(monkeypatch):
+    ends = []
+    for limit in (4_000, 40_000):
+        monkeypatch.setattr("kratos_lite.solvers.plan.STEPPED_LIMIT", limit)
+        transient, period = struck("KinematicLinear3D20N", (4, 4, 8), rayleigh=(3.0, 1e-6))
+        *_, end = kl.integrate(transient, period / 20, 20, every=20)
+        ends.append(end.u)
+    assert np.abs(ends[0] - ends[1]).max() < 1e-8 * np.abs(ends[1]).max()
+
+
+def test_the_linear_level_of_a_step_has_mass():
+    """Without it, slow motions of light time steps would be far from what the level takes them for."""
+    transient, period = struck("KinematicLinear3D27N", (4, 5, 9))
+    h = period / 200
+    f = np.random.default_rng(0).standard_normal(transient.u.size)
+    iterations = []
+    for kept in (True, False):
+        solve = transient.equations.solver(0.0, 4 / h**2, 0.0, 1.0)
+        equations = solve.args[0]
+        if not kept:
+            equations.with_mass = None
+            vars(equations).pop("_multigrid", None)
+        iterations.append(equations.solve(f, 1e-10).iterations)
+    assert iterations[0] < iterations[1]
+
+
+def test_transport_terms_by_minimal_residuals_come_to_what_factors_give(monkeypatch):
+    ends = []
+    for limit in (0, 40_000):
+        monkeypatch.setattr("kratos_lite.solvers.plan.STEPPED_LIMIT", limit)
+        wheel = kl.Model(kl.annulus(0.3, 1.0, 0.2, cells=(2, 16, 1)), kl.Isotropic3D(nu=0.3, **STEEL))
+        wheel.fix("inner")
+        wheel.add(kl.ale.Rotation("z", 300.0, damping=20.0))
+        wheel.add(kl.Traction("outer", (1e6, 0, 0)))
+        *_, end = kl.integrate(wheel.transient(), 1e-4, 20, every=20)
+        ends.append(end.u)
+    assert np.abs(ends[1]).max() > 0
+    assert np.abs(ends[0] - ends[1]).max() < 1e-7 * np.abs(ends[1]).max()
+
+
+def test_equations_out_of_reach_of_minimal_residuals_are_refused(monkeypatch):
+    monkeypatch.setattr("kratos_lite.solvers.linear_solver.RESTART", 1)
+    monkeypatch.setattr("kratos_lite.solvers.linear_solver.MAX_RESTARTS", 1)
+    monkeypatch.setattr("kratos_lite.solvers.plan.STEPPED_LIMIT", 0)
+    wheel = kl.Model(kl.annulus(0.3, 1.0, 0.2, cells=(2, 16, 1)), kl.Isotropic3D(nu=0.3, **STEEL))
+    wheel.fix("inner")
+    wheel.add(kl.ale.Rotation("z", 300.0))
+    wheel.add(kl.Traction("outer", (1e6, 0, 0)))
+    with pytest.raises(SolveError, match="were not solved to"):
+        list(kl.integrate(wheel.transient(), 1e-4, 2))
+
+
+@pytest.mark.parametrize("tied", [False, True])
+def test_the_first_acceleration_balances(tied):
+    model = kl.Model(kl.box((1, 1, 2), (2, 2, 3), "KinematicLinear3D20N"), kl.Isotropic3D(nu=0.3, **STEEL))
+    model.fix("x-")
+    model.add(kl.Traction("z+", (1e6, 2e6, 3e6)))
+    if tied:
+        first, *others = model.mesh.nodes("x+").tolist()
+        for node in others:
+            model.constrain((node, "x"), {(first, "x"): 0.5})
+    transient = model.transient()
+    e = transient.equations
+    left = e.system.constraint_map.reduce(e.mass.times(transient.a) - e.load(0.0))
+    assert np.abs(left).max() < 1e-12 * np.abs(e.load(0.0)).max()
+
+
+@pytest.mark.skipif(kernels("sparse") is None, reason="the compiled kernels were not built")
+@pytest.mark.parametrize("count", [1, 3, 4, 9])
+def test_several_vectors_read_a_matrix_together(count):
+    model = kl.Model(kl.box((1, 1, 2), (3, 2, 2)), kl.Isotropic3D(nu=0.3, **STEEL))
+    e = model.transient().equations
+    x = np.random.default_rng(count).standard_normal((count, e.size))
+    np.testing.assert_allclose(e.K.times(x), (e.K.scipy() @ x.T).T, rtol=1e-12, atol=1e-3)
+    np.testing.assert_allclose(e.mass.times(x), (e.mass.matrix() @ x.T).T, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("method", ["amg", "direct", "dense"])
+def test_an_approximate_inverse_is_one(method):
+    model = kl.Model(kl.box((1, 1, 2), (5, 5, 5)), kl.Isotropic3D(nu=0.3, **STEEL))
+    model.fix("x-")
+    system = system_of(model, solver=method)
+    solver = LinearSolver(system.K, system.constraint_map, system.points, Plan(method), groups=system.groups)
+    q = np.random.default_rng(0).standard_normal(len(system.constraint_map.free))
+    r = system.constraint_map.reduce(solver.times(system.constraint_map.transform(q)[None])[0])
+    z = solver.precondition(r)
+    assert 0.3 < (r @ z) / (r @ q) < (1 + 1e-9 if method != "amg" else 1.5)
+    if method != "amg":
+        np.testing.assert_allclose(z, q, rtol=1e-6, atol=1e-9)
