@@ -1,7 +1,7 @@
 """Measure: ``python -m benchmarks quick``, or ``full``, or one set by its name.
 
 Sets: ``kratos error growth stall assembly parse skips cube1 motion ale distributed``, and in this process
-``effectivity adaptive edges``.
+``effectivity adaptive edges dynamics``.
 
 ``report`` makes the pages and pictures of the docs from the results kept; ``references`` makes the
 energies of the scenes without an exact field.  See benchmarks/README.md.
@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks import accuracy, curves, report, scaling, scenes, sets, stall
+from benchmarks import accuracy, curves, dynamics, report, scaling, scenes, sets, stall
 from benchmarks.driver import ROOT, Driver, Run, load, results, save, scratch
 from benchmarks.motion import MOTIONS
 from benchmarks.programs import HELPERS, PROGRAMS
@@ -54,6 +54,7 @@ OTHERS: dict[str, Callable[[argparse.Namespace], int | None]] = {
     "effectivity": lambda o: accuracy.effectivity(o.scenes, o.elements),
     "adaptive": lambda o: accuracy.adaptive(o.scenes, o.elements),
     "edges": lambda o: accuracy.edges(),
+    "dynamics": lambda o: dynamics.dynamics(),
     "references": lambda o: references(o.cells or (4, 8, 16)),
     "report": lambda o: write_report(),
 }

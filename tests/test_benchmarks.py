@@ -27,6 +27,7 @@ from benchmarks import (  # noqa: E402
     cases,
     curves,
     driver,
+    dynamics,
     hard_scenes,
     motion,
     report,
@@ -275,6 +276,16 @@ def stall_row(scene, program="kratos_lite", kind="8N enhanced", **words):
     return plain | {"scene": scene, "program": program, "kind": kind} | words
 
 
+def test_modes_and_steps_beside_statics(monkeypatch):
+    monkeypatch.setattr(dynamics, "REPEATS", 1)
+    row = dynamics.of("8N", 3)
+    times = [row[name] for name in ("static", "modes 6", "modes 20", "first step", "further step")]
+    assert row["unknowns"] == 3 * 4 * 4 * 7
+    assert min(times) > 0
+    last = dynamics.page([row | {"static": 2.0, "modes 6": 5.0}]).splitlines()[-1]
+    assert last.startswith("| 8N | 336 | 2 | 5 (2.5) | ")
+
+
 def test_scenes_that_may_stall_have_ratios_to_the_block_and_to_other_solvers():
     rows = [
         stall_row("block"),
@@ -501,7 +512,7 @@ def test_goal_table_gives_ratios():
 
 
 @pytest.mark.parametrize(
-    "module", [accuracy, curves, driver, tables, sets, stall, hard_scenes, report, scaling, command]
+    "module", [accuracy, curves, driver, dynamics, tables, sets, stall, hard_scenes, report, scaling, command]
 )
 def test_examples_of_the_modules_hold(module):
     assert doctest.testmod(module).failed == 0
