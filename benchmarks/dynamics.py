@@ -1,7 +1,7 @@
 """Modes and steps in time beside the static solution of the same model, all in this process.
 
-``python -m benchmarks dynamics`` solves a block on a clamped side under its weight, finds modes of it, and lets
-it swing with steps of a twentieth of its longest period; it writes the page `docs/about/dynamics.md`.
+``python -m benchmarks dynamics`` solves a block on a clamped side under its weight, finds modes of it, and
+lets it swing with steps of a twentieth of its longest period; it writes the page `docs/about/dynamics.md`.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ BLOCKS = {"8N": (10, 16, 24, 40), "10N": (8, 16), "20N": (8, 18), "27N": (6, 12,
 STEPS, REPEATS = 12, 3
 TEXT = """# Modes and steps beside statics
 
-What modes and steps in time of a model cost beside its static solution: a block of 1 × 1 × 2 m on a clamped side,
-`python -m benchmarks dynamics`, two cores, seconds (and times the static solution), medians of {repeats} runs in one
-process. Modes are found to 1e-9 of their frequencies ([how](../howto/modes.md)); a step is a twentieth of the longest
-period, and the first one has the first acceleration, the matrix and the hierarchy of multigrid in it
-([how](../howto/models-in-time.md)).
+What modes and steps in time of a model cost beside its static solution: a block of 1 × 1 × 2 m on a clamped
+side, `python -m benchmarks dynamics`, two cores, seconds (times the static solution), medians of {repeats}
+runs in one process. Modes are found to 1e-9 of their frequencies ([how](../howto/modes.md)); a step is a
+twentieth of the longest period, and the first one has the first acceleration, the matrix and the hierarchy of
+multigrid in it ([how](../howto/models-in-time.md)).
 
 """
 

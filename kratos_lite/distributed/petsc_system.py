@@ -81,14 +81,15 @@ class PetscSystem(ConstrainedSystem):
         return ElementProduct(self.points, self.groups)
 
     @cached_property
-    def _equations(self) -> PetscSolver:  # type: ignore[override]
+    def equations(self) -> PetscSolver:  # type: ignore[override]
+        """What solves them: PETSc on the other ranks."""
         cut = Cut(self.points, self.K.groups, self.constraint_map, self._ranks.size)
         return PetscSolver(self, cut, self._ranks, self._options)
 
     def destroy(self) -> None:
         """Let all ranks release matrix and solver."""
-        if "_equations" in vars(self):
-            self._equations.destroy()
+        if "equations" in vars(self):
+            self.equations.destroy()
 
 
 class ElementProduct:
