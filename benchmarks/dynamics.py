@@ -18,7 +18,7 @@ from benchmarks.driver import ROOT, load, save
 from benchmarks.tables import Row, ratio, seconds, table
 
 PAGE, RESULTS = ROOT / "docs" / "about" / "dynamics.md", ROOT / "benchmarks" / "results" / "dynamics.json"
-BLOCKS = {"8N": (10, 16, 24, 40), "10N": (8, 16), "20N": (8, 18), "27N": (6, 12, 20)}
+BLOCKS = {"8N": (10, 16, 24, 32), "10N": (8, 14), "20N": (8, 14), "27N": (6, 10, 14)}
 """Cells along the short edges of the blocks of each element."""
 STEPS, REPEATS = 12, 3
 TEXT = """# Modes and steps beside statics

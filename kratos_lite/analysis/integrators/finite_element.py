@@ -20,6 +20,7 @@ from kratos_lite.analysis.integrators.base import BodyIntegrator
 from kratos_lite.bodies.constraint_projection import Step, constrained_step
 from kratos_lite.bodies.deformable import Deformable
 from kratos_lite.bodies.finite_element import FiniteElementBody
+from kratos_lite.bodies.formulations.base import Iterated
 from kratos_lite.bodies.linear_algebra import Solve
 from kratos_lite.errors import SolveError
 from kratos_lite.solvers.direct import one_thread
@@ -123,12 +124,13 @@ def _balanced(
 ) -> tuple[Array, Array]:
     """Return the velocity at the end and the load at the middle, by Newton with factors kept a while."""
     q, u, ratio = body.q, body.u, body.damping / h
+    correct = _corrector(solve)
     v, last = u.copy(), np.inf
     for _ in range(NEWTON_MAX):
         dq = h / 2 * (u + v)
         load = body.external_force(q + dq / 2, body.time + h / 2, loading)
         force = load + extra - body.formulation.load_over(q, dq, ratio)
-        step = solve(h * force - body.times_mass(v - u))
+        step = correct(h * force - body.times_mass(v - u))
         size, scale = float(np.abs(step).max()), float(np.abs(v).max())
         if not np.isfinite(size):
             break
@@ -136,15 +138,19 @@ def _balanced(
         if size <= body.tolerance * scale:
             return v, load
         if size > SLOW * last:
-            given = float(np.abs(solve(h * (load + extra))).max())  # at rest, loads tell what is small
+            given = float(np.abs(correct(h * (load + extra))).max())  # at rest, loads tell what is small
             if size <= 1e-9 * max(scale, given):
                 return v, load
-            solve = body.formulation.increment_solver(q, h / 2 * (u + v), ratio, h * h / 2)
+            correct = _corrector(body.formulation.increment_solver(q, h / 2 * (u + v), ratio, h * h / 2))
         last = size
     raise SolveError(
         f"the energy–momentum step at t = {body.time:g} s with dt = {h:g} s does not converge; "
         "take a shorter step"
     )
+
+
+def _corrector(solve: Solve) -> Solve:
+    return solve.correction if isinstance(solve, Iterated) else solve
 
 
 def warn_of_stiffness(body: Deformable, h: float) -> None:

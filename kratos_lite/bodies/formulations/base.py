@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -33,6 +34,30 @@ from kratos_lite.typing import Array
 
 RESIDUAL = 1e-13
 """Relative residual at which an iteration stops: momentum is as exact."""
+
+CORRECTED = 1e-3
+"""That of a correction: the next one begins with what it leaves."""
+
+
+@dataclass
+class Iterated:
+    """What solves A x = b, (n,) or (n, k), by iterations, and about as well as a correction needs it."""
+
+    equations: LinearSolver
+
+    def __call__(self, b: Array) -> Array:
+        """Return x."""
+        columns = b.reshape(len(b), -1).T
+        x = [self.equations.solve(np.ascontiguousarray(column), RESIDUAL).x for column in columns]
+        return np.stack(x, axis=1).reshape(b.shape)
+
+    def correction(self, b: Array) -> Array:
+        """Return about x of one b (n,).
+
+        Source: Eisenstat & Walker, SIAM J. Sci. Comput. 17 (1996) 16-32 (inexact Newton methods).
+        """
+        return self.equations.solve(b, CORRECTED, start=np.zeros_like(b)).x
+
 
 FORMULATIONS: Registry[type[Formulation]] = Registry("formulation of a finite-element body")
 """Every formulation by its class name and by its `name`."""
@@ -97,12 +122,7 @@ class Formulation(ABC):
         every = ConstraintMap(np.arange(self.points.size), np.zeros(self.points.size))
         equations = LinearSolver(A, every, self.points, plan.Plan("amg", "a matrix for each step"))
 
-        def solve(b: Array) -> Array:
-            columns = b.reshape(len(b), -1).T
-            x = [equations.solve(np.ascontiguousarray(column), RESIDUAL).x for column in columns]
-            return np.stack(x, axis=1).reshape(b.shape)
-
-        return solve
+        return Iterated(equations)
 
     @abstractmethod
     def load(self, q: Array) -> Array:
