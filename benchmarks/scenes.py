@@ -18,7 +18,7 @@ from benchmarks.programs import ALL, FORMULATIONS
 from kratos_lite.typing import Array
 from kratos_lite.verification import concentrations
 from kratos_lite.verification import scenes as shared
-from kratos_lite.verification.meshes import element, joined, on_plane, plane, shaped
+from kratos_lite.verification.meshes import element, joined, shaped
 from kratos_lite.verification.pressure import lame_cylinder
 from kratos_lite.verification.scenes import UNIT, Scene, bending, cavity, cube, l_domain, manufactured, sphere
 
@@ -96,10 +96,8 @@ def cylinder(kind: str, n: int) -> Scene:
 
     mesh = shaped(kind, (n, n, 1), place)
     model = kl.Model(mesh, UNIT)
-    model.fix(plane(0, 0.0), "x")
-    model.fix(plane(1, 0.0), "y")
-    for end in (0.0, 0.5):
-        model.fix(plane(2, end), "z")
+    shared.on_symmetry_planes(model, "xy")
+    shared.in_plane_strain(model)
     model.add(kl.Pressure(np.abs(np.linalg.norm(mesh.points[:, :2], axis=1) - 1) < 1e-9, 1.0))
     return Scene("cylinder", kind, n, model, exact)
 
@@ -122,7 +120,7 @@ def two_bodies(kind: str, n: int, loaded: int = 2) -> Scene:
     mesh = joined([kl.box(cells=(n, n, n), element=element(kind), origin=(2.0 * i, 0, 0)) for i in range(2)])
     model = kl.Model(mesh, SOLID)
     model.fix("z-")
-    model.add(kl.Traction(on_plane(mesh, 2, 1.0) & (mesh.points[:, 0] < 1.5 * loaded), (1e3, 0.0, -1e3)))
+    model.add(kl.Traction(lambda X: (X[:, 2] == 1) & (X[:, 0] < 1.5 * loaded), (1e3, 0.0, -1e3)))
     return Scene("two_bodies", kind, n, model)
 
 

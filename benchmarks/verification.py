@@ -21,7 +21,7 @@ from benchmarks.driver import ROOT
 from benchmarks.programs import PROGRAMS
 from benchmarks.scenes import write
 from kratos_lite.verification import page
-from kratos_lite.verification.problem import Row, models_of
+from kratos_lite.verification.problem import Row, as_tuple
 from kratos_lite.verification.scenes import Scene
 from kratos_lite.verification.table import verify
 
@@ -88,7 +88,7 @@ def prepared(rows: list[Row], folder: Path) -> dict[int, list[Given]]:
         if row.problem.models is not None:
             key = row.problem.models, row.element
             if key not in known:
-                models = models_of(row.problem.models, row.element)
+                models = as_tuple(row.problem.models(row.element))
                 known[key] = [given(m, row.kind, folder, 10 * len(known) + k) for k, m in enumerate(models)]
             if None not in known[key]:
                 ready[i] = known[key]

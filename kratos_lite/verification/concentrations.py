@@ -5,14 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from kratos_lite.analysis.model import Model
-from kratos_lite.analysis.result import Result
 from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.typing import Array
 from kratos_lite.verification import fields, scenes
-from kratos_lite.verification.meshes import is_quadratic, nearest, plane, shaped
+from kratos_lite.verification.meshes import is_quadratic, shaped
 from kratos_lite.verification.orders import ENERGY, error_of, order_of
-from kratos_lite.verification.problem import Problem, static, stress_at
-from kratos_lite.verification.scenes import Scene
+from kratos_lite.verification.problem import Problem, displacement_at, models_of, stress_at
+from kratos_lite.verification.scenes import Scene, in_plane_strain, on_symmetry_planes
 
 
 def hole(kind: str, n: int = 6, nu: float = scenes.UNIT.nu) -> Scene:
@@ -33,64 +32,49 @@ def hole(kind: str, n: int = 6, nu: float = scenes.UNIT.nu) -> Scene:
         "xy",
         field=lambda X: np.where(np.abs(X) < 1e-9, 0.0, exact(X))[:, :2],
     )
-    model.fix(plane(0, 0.0), "x")
-    model.fix(plane(1, 0.0), "y")
-    model.fix("z-", "z")
-    model.fix("z+", "z")
+    on_symmetry_planes(model, "xy")
+    in_plane_strain(model)
     return Scene("hole", kind, n, model, exact)
-
-
-def _cook_middle(result: Result) -> float:
-    """Return u_y of the middle of the loaded edge under a unit load (the scene has 100)."""
-    return float(result.u[nearest(result.mesh, (48, 52, 0)), 1]) / 100
 
 
 COOK = Isotropic3D(E=1.0, nu=1 / 3)
 SOFT = Isotropic3D(E=240.565, nu=0.4999)
 
 
-def _hole(kind: str) -> Model:
-    return hole(kind).model
-
-
-def _soft_hole(kind: str) -> Model:
-    return hole(kind, nu=SOFT.nu).model
-
-
-def _cavity(kind: str) -> Model:
-    return scenes.cavity(kind, 4).model
-
-
+_hole, _soft_hole = models_of(hole), models_of(hole, nu=SOFT.nu)
+_cavity = models_of(scenes.cavity, 4)
+_cook_middle = displacement_at((48, 52, 0), 1, 1 / 100)  # of a unit load: the scene has 100
 NU = scenes.UNIT.nu
 PROBLEMS: list[Problem] = [
-    static("concentration/kirsch",
-           "σ_xx at the edge (0, 1) of a hole under unit tension, plane strain, 6 × 12 × 1 bricks",
-           "Kirsch, closed form", 3.0, _hole, stress_at((0, 1, 0), 0)),
-    static("concentration/kirsch_field", "relative error of u over the plate with a hole (L2)",
-           "Kirsch, closed form", 0.0, _hole, error_of(fields.hole(1.0, NU, 1.0, 1.0)), 1e-3, is_quadratic),
-    static("concentration/kirsch_incompressible", "σ_xx at the edge of the hole, ν = 0.4999",
-           "Kirsch, closed form", 3.0, _soft_hole, stress_at((0, 1, 0), 0)),
-    static("concentration/kirsch_incompressible_field",
-           "relative error of u over the plate with a hole (L2), ν = 0.4999",
-           "Kirsch, closed form", 0.0, _soft_hole, error_of(fields.hole(1.0, SOFT.nu, 1.0, 1.0))),
-    static("concentration/goodier",
-           "σ_zz at the equator of a spherical cavity under unit tension, 3 blocks of 4 × 4 × 4 bricks",
-           "Goodier, closed form (27 - 15 ν) / (2 (7 - 5 ν))", (27 - 15 * NU) / (2 * (7 - 5 * NU)),
-           _cavity, stress_at((1, 0, 0), 2)),
-    static("concentration/goodier_field", "relative error of u around the cavity (L2)",
-           "Goodier, closed form", 0.0, _cavity, error_of(fields.cavity(1.0, NU, 1.0, 1.0)), 2e-3,
-           is_quadratic),
-    static("concentration/corner_order",
-           "order of the error in the energy norm at a corner of 270°, from 4 to 8 cells",
-           "Williams, λ = 0.544484", fields.EXPONENT,
-           lambda kind: tuple(scenes.l_domain(kind, n).model for n in (4, 8)),
-           order_of(fields.l_domain(1.0, NU), ENERGY), 0.08),
-    static("concentration/cook",
-           "u_y amid the loaded edge of Cook's membrane, plane stress, 8 × 8 × 1 bricks, unit load",
-           "Cook, limit 23.96", 23.96,
-           lambda kind: scenes.cook(kind, 8, COOK, plane_stress=True).model, _cook_middle),
-    static("concentration/cook_incompressible", "the same in plane strain, E = 240.565, ν = 0.4999, load 100",
-           "Cook, with E and ν of Simo and Rifai; limit 7.695 of refined meshes of 20N and 27N", 0.07695,
-           lambda kind: scenes.cook(kind, 8, SOFT).model, _cook_middle),
+    Problem("concentration/kirsch",
+            "σ_xx at the edge (0, 1) of a hole under unit tension, plane strain, 6 × 12 × 1 bricks",
+            "Kirsch, closed form", 3.0, _hole, stress_at((0, 1, 0), 0)),
+    Problem("concentration/kirsch_field", "relative error of u over the plate with a hole (L2)",
+            "Kirsch, closed form", 0.0, _hole, error_of(fields.hole(1.0, NU, 1.0, 1.0)), 1e-3, is_quadratic),
+    Problem("concentration/kirsch_incompressible", "σ_xx at the edge of the hole, ν = 0.4999",
+            "Kirsch, closed form", 3.0, _soft_hole, stress_at((0, 1, 0), 0)),
+    Problem("concentration/kirsch_incompressible_field",
+            "relative error of u over the plate with a hole (L2), ν = 0.4999",
+            "Kirsch, closed form", 0.0, _soft_hole, error_of(fields.hole(1.0, SOFT.nu, 1.0, 1.0))),
+    Problem("concentration/goodier",
+            "σ_zz at the equator of a spherical cavity under unit tension, 3 blocks of 4 × 4 × 4 bricks",
+            "Goodier, closed form (27 - 15 ν) / (2 (7 - 5 ν))", (27 - 15 * NU) / (2 * (7 - 5 * NU)),
+            _cavity, stress_at((1, 0, 0), 2)),
+    Problem("concentration/goodier_field", "relative error of u around the cavity (L2)",
+            "Goodier, closed form", 0.0, _cavity, error_of(fields.cavity(1.0, NU, 1.0, 1.0)), 2e-3,
+            is_quadratic),
+    Problem("concentration/corner_order",
+            "order of the error in the energy norm at a corner of 270°, from 4 to 8 cells",
+            "Williams, λ = 0.544484", fields.EXPONENT,
+            lambda kind: tuple(scenes.l_domain(kind, n).model for n in (4, 8)),
+            order_of(fields.l_domain(1.0, NU), ENERGY), 0.08),
+    Problem("concentration/cook",
+            "u_y amid the loaded edge of Cook's membrane, plane stress, 8 × 8 × 1 bricks, unit load",
+            "Cook, limit 23.96", 23.96,
+            models_of(scenes.cook, 8, COOK, plane_stress=True), _cook_middle),
+    Problem("concentration/cook_incompressible",
+            "the same in plane strain, E = 240.565, ν = 0.4999, load 100",
+            "Cook, with E and ν of Simo and Rifai; limit 7.695 of refined meshes of 20N and 27N", 0.07695,
+            models_of(scenes.cook, 8, SOFT), _cook_middle),
 ]  # fmt: skip
 """The rows of this family."""

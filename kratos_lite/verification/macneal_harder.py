@@ -9,11 +9,12 @@ from kratos_lite.analysis.result import Result
 from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.loads.body import BodyForce
-from kratos_lite.model.loads.nodal import NodalForces
-from kratos_lite.typing import Array, Mask
+from kratos_lite.model.loads.surface import Pressure, Traction
+from kratos_lite.typing import Array
 from kratos_lite.verification.fields import Field
-from kratos_lite.verification.meshes import face_forces, nearest, on_plane, shaped, straight
-from kratos_lite.verification.problem import Models, Problem, static
+from kratos_lite.verification.meshes import shaped, straight
+from kratos_lite.verification.problem import Models, Problem, displacement_at
+from kratos_lite.verification.scenes import on_symmetry_planes
 
 LENGTH, DEPTH, WIDTH = 6.0, 0.2, 0.1
 STRAIGHT = Isotropic3D(E=1e7, nu=0.3)
@@ -22,11 +23,11 @@ UNIT_LOADS = {"extension": (1.0, 0, 0), "in_plane": (0, 1.0, 0), "out_of_plane":
 TIPS = {"extension": 3.0e-5, "in_plane": 0.1081, "out_of_plane": 0.4321}
 
 
-def clamped(mesh: Mesh, material: Isotropic3D, root: Mask, tip: Mask, traction: Field) -> Model:
-    """Return a clamped beam under a traction on its end."""
+def clamped(mesh: Mesh, material: Isotropic3D, tip: str, traction: Field) -> Model:
+    """Return a beam clamped at x = 0 under a traction on its end."""
     model = Model(mesh, material)
-    model.fix(root, "xyz")
-    model.add(NodalForces(face_forces(mesh, tip, lambda X, _: traction(X))))
+    model.fix("x-")
+    model.add(Traction(tip, traction))
     return model
 
 
@@ -57,12 +58,7 @@ def straight_beam(form: str, kind: str) -> Mesh:
 
 
 def _loaded(form: str, traction: Field) -> Models:
-    def models(kind: str) -> Model:
-        mesh = straight_beam(form, kind)
-        ends = on_plane(mesh, 0, 0.0), on_plane(mesh, 0, LENGTH)
-        return clamped(mesh, STRAIGHT, *ends, traction)
-
-    return models
+    return lambda kind: clamped(straight_beam(form, kind), STRAIGHT, "x+", traction)
 
 
 def couple(X: Array) -> Array:
@@ -93,12 +89,7 @@ def curved_beam(vector: tuple[float, float, float]) -> Models:
         angle, r = np.pi / 2 * (1 - X[:, 0]), 4.12 + 0.2 * X[:, 1]
         return np.column_stack([r * np.cos(angle), r * np.sin(angle), 0.1 * X[:, 2]])
 
-    def models(kind: str) -> Model:
-        mesh = shaped(kind, (6, 1, 1), place)
-        ends = on_plane(mesh, 0, 0.0), on_plane(mesh, 1, 0.0)
-        return clamped(mesh, CURVED, *ends, evenly(vector, 0.02))
-
-    return models
+    return lambda kind: clamped(shaped(kind, (6, 1, 1), place), CURVED, "y-", evenly(vector, 0.02))
 
 
 def twisted_beam(vector: tuple[float, float, float]) -> Models:
@@ -109,12 +100,8 @@ def twisted_beam(vector: tuple[float, float, float]) -> Models:
         c, s = np.cos(angle), np.sin(angle)
         return np.column_stack([12 * X[:, 0], c * y - s * z, s * y + c * z])
 
-    def models(kind: str) -> Model:
-        mesh = shaped(kind, (12, 2, 1), place)
-        ends = on_plane(mesh, 0, 0.0), on_plane(mesh, 0, 12.0)
-        return clamped(mesh, TWISTED, *ends, evenly(vector, 1.1 * 0.32))
-
-    return models
+    traction = evenly(vector, 1.1 * 0.32)
+    return lambda kind: clamped(shaped(kind, (12, 2, 1), place), TWISTED, "x+", traction)
 
 
 # ---- plates and shells -------------------------------------------------------------------------------
@@ -131,19 +118,13 @@ def plate(length: float, clamped: bool, n: int = 8) -> Models:
     def models(kind: str) -> Model:
         mesh = shaped(kind, (n, n, 1), lambda X: X * size)
         model = Model(mesh, PLATE)
-        for axis, letter in enumerate("xy"):
-            model.fix(on_plane(mesh, axis, 0.0), letter)
-            model.fix(on_plane(mesh, axis, size[axis]), "xyz" if clamped else "z", override=True)
-        top = on_plane(mesh, 2, THICKNESS)
-        model.add(NodalForces(face_forces(mesh, top, lambda X, n: -LOAD * n)))
+        on_symmetry_planes(model, "xy")
+        for side in ("x+", "y+"):
+            model.fix(side, "xyz" if clamped else "z", override=True)
+        model.add(Pressure("z+", LOAD))
         return model
 
     return models
-
-
-def middle(result: Result) -> float:
-    """Return the deflection of the middle."""
-    return float(-result.u[nearest(result.mesh, (0, 0, 0)), 2])
 
 
 def roof(kind: str, n: int = 8) -> Model:
@@ -155,37 +136,33 @@ def roof(kind: str, n: int = 8) -> Model:
 
     mesh = shaped(kind, (n, n, 1), place)
     model = Model(mesh, ROOF)
-    model.fix(on_plane(mesh, 0, 0.0), "x")
-    model.fix(on_plane(mesh, 1, 25.0), "y")
-    model.fix(on_plane(mesh, 1, 0.0), "xz", override=True)  # the diaphragm at the end
+    model.fix("x-", "x")
+    model.fix("y+", "y")
+    model.fix("y-", "xz", override=True)  # the diaphragm at the end
     model.add(BodyForce((0.0, 0.0, -90 / 0.25)))
     return model
 
 
-def edge(result: Result) -> float:
-    """Return how far the free edge sinks at the middle of the roof."""
-    angle = np.radians(40)
-    return float(-result.u[nearest(result.mesh, (25 * np.sin(angle), 25, 25 * np.cos(angle))), 2])
-
-
+middle = displacement_at((0, 0, 0), 2, -1.0)
+free_edge = displacement_at((25 * np.sin(np.radians(40)), 25, 25 * np.cos(np.radians(40))), 2, -1.0)
 G = STRAIGHT.E / (2 * (1 + STRAIGHT.nu))
 FAMILY, END = "macneal_harder", "displacement of the end"
 PROBLEMS: list[Problem] = [
     *(
-        static(f"{FAMILY}/straight_{form}_{load}", f"{END}, {form} cells, {load.replace('_', ' ')}",
-               "MacNeal, straight beam", TIPS[load], _loaded(form, evenly(vector, DEPTH * WIDTH)), work)
+        Problem(f"{FAMILY}/straight_{form}_{load}", f"{END}, {form} cells, {load.replace('_', ' ')}",
+                "MacNeal, straight beam", TIPS[load], _loaded(form, evenly(vector, DEPTH * WIDTH)), work)
         for form in FORMS
         for load, vector in UNIT_LOADS.items()
     ),
     *(
-        static(f"{FAMILY}/straight_{form}_twist", f"angle of the end under a unit torque, {form} cells, rad",
-               "Timoshenko, section 109: L / (G J)", LENGTH / (G * torsion_constant(DEPTH, WIDTH)),
-               _loaded(form, couple), work)
+        Problem(f"{FAMILY}/straight_{form}_twist", f"angle of the end under a unit torque, {form} cells, rad",
+                "Timoshenko, section 109: L / (G J)", LENGTH / (G * torsion_constant(DEPTH, WIDTH)),
+                _loaded(form, couple), work)
         for form in FORMS
     ),
     *(
-        static(f"{FAMILY}/{name}_{plane}", f"{END}, {plane.replace('_', ' ')}", f"MacNeal, {name} beam",
-               reference, models, work)
+        Problem(f"{FAMILY}/{name}_{plane}", f"{END}, {plane.replace('_', ' ')}", f"MacNeal, {name} beam",
+                reference, models, work)
         for name, plane, reference, models in (
             ("curved", "in_plane", 0.08734, curved_beam((1.0, 0.0, 0.0))),
             ("curved", "out_of_plane", 0.5022, curved_beam((0.0, 0.0, 1.0))),
@@ -194,9 +171,9 @@ PROBLEMS: list[Problem] = [
         )
     ),
     *(
-        static(f"shells/plate_{name}",
-               f"deflection of the middle of a thin plate, {name.replace('_', ' ')}, 8 × 8 × 1 bricks",
-               "MacNeal, rectangular plates", reference, plate(length, clamped), middle)
+        Problem(f"shells/plate_{name}",
+                f"deflection of the middle of a thin plate, {name.replace('_', ' ')}, 8 × 8 × 1 bricks",
+                "MacNeal, rectangular plates", reference, plate(length, clamped), middle)
         for name, length, clamped, reference in (
             ("supported_square", 2.0, False, 4.062e-6),
             ("clamped_square", 2.0, True, 1.26e-6),
@@ -204,8 +181,8 @@ PROBLEMS: list[Problem] = [
             ("clamped_1_to_5", 10.0, True, 2.56e-6),
         )
     ),
-    static("shells/scordelis_lo",
-           "deflection of the free edge of the roof of Scordelis and Lo, 8 × 8 × 1 bricks",
-           "MacNeal, Scordelis-Lo roof", 0.3024, roof, edge),
+    Problem("shells/scordelis_lo",
+            "deflection of the free edge of the roof of Scordelis and Lo, 8 × 8 × 1 bricks",
+            "MacNeal, Scordelis-Lo roof", 0.3024, roof, free_edge),
 ]  # fmt: skip
 """The rows of both families."""

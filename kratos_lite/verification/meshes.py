@@ -1,4 +1,4 @@
-"""Meshes of the problems, of any element, and nodal forces of loads that vary in space."""
+"""Meshes of the problems, of any element."""
 
 from __future__ import annotations
 
@@ -7,14 +7,13 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from kratos_lite.elements import ELEMENTS, KinematicLinear
-from kratos_lite.elements.surface import area_vectors, face_rule
-from kratos_lite.elements.tables import tabulate
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.mesh.centers import raise_order
 from kratos_lite.mesh.generators import SPLITS, box
-from kratos_lite.quadrature import rule_for
-from kratos_lite.typing import Array, Ints, Mask, Rows
+from kratos_lite.typing import Array, Ints, Rows
 
+COMPLETE = (10, 27)
+"""Nodes of the elements that hold every quadratic field on cells with straight edges."""
 Place = Callable[[Array], Array]
 """Takes places (n, 3) of the unit cube to places in space."""
 
@@ -62,8 +61,8 @@ def split(points: Array, bricks: Ints | Rows, kind: str) -> Mesh:
     if shape.cell == "pyramid":
         corners = np.column_stack([corners, len(points) + np.arange(len(corners))])
         points = np.vstack([points, points[corners[:, :8]].mean(axis=1)])
-    pieces = np.array(SPLITS[shape.cell])
-    points, nodes = raise_order(points, corners[:, pieces].reshape(-1, pieces.shape[1]), shape)
+    cells = np.array(SPLITS[shape.cell])
+    points, nodes = raise_order(points, corners[:, cells].reshape(-1, cells.shape[1]), shape)
     return Mesh(points, [Block(element(kind), nodes)])
 
 
@@ -117,57 +116,11 @@ def octant(n: int, kind: str, outer: Place) -> Mesh:
     return joined([block(k) for k in range(3)])
 
 
-# ---- chosen nodes ------------------------------------------------------------------------------------
-
-
-def on_plane(mesh: Mesh, axis: int, value: float) -> Mask:
-    """Return a mask of the nodes with coordinate `value` along an axis."""
-    return np.abs(mesh.points[:, axis] - value) < 1e-7 * float(np.ptp(mesh.points[:, axis]))
-
-
-def plane(axis: int, value: float) -> Callable[[Array], Mask]:
-    """Return a predicate: whether places (n, 3) have coordinate `value` along an axis, as those of a mesh."""
-    return lambda X: np.abs(X[:, axis] - value) < 1e-7 * float(np.ptp(X[:, axis]))
-
-
-def on_boundary(mesh: Mesh) -> Mask:
-    """Return a mask of the nodes on the surface of the body."""
-    rows = np.unique(np.concatenate([block.nodes.ravel() for block in mesh.boundary]))
-    return np.isin(np.arange(mesh.n_nodes), rows)
+def on_boundary(mesh: Mesh) -> Ints:
+    """Return the nodes on the surface of the body."""
+    return np.unique(np.concatenate([block.nodes.ravel() for block in mesh.boundary]))
 
 
 def nearest(mesh: Mesh, place: tuple[float, float, float]) -> int:
-    """Return the row of the node nearest to a place."""
+    """Return the node nearest to a place."""
     return int(np.argmin(np.linalg.norm(mesh.points - np.asarray(place), axis=1)))
-
-
-# ---- loads that vary ---------------------------------------------------------------------------------
-
-
-def body_forces(mesh: Mesh, force: Place) -> Array:
-    """Return ∫ N b dV as nodal forces (n, 3), with b known everywhere, by a rule of degree 8."""
-    (block,) = mesh.blocks
-    kind = ELEMENTS[block.name]
-    rule = rule_for(kind.shape.cell, 8)
-    N, _ = tabulate(kind.shape, rule)
-    total = np.zeros_like(mesh.points)
-    for start in range(0, len(block), 2000):
-        nodes = block.nodes[start : start + 2000]
-        placed = kind(mesh.points[nodes], rule)
-        forces = N.T @ (force(N @ mesh.points[nodes]) * placed.dV[..., None])
-        np.add.at(total, nodes, forces)
-    return total
-
-
-def face_forces(mesh: Mesh, where: Mask, traction: Callable[[Array, Array], Array]) -> Array:
-    """Return ∫ N t dA (n, 3) over boundary faces among nodes; `traction` takes places and normals."""
-    total = np.zeros_like(mesh.points)
-    for faces in mesh.faces(where):
-        assert faces.shape is not None
-        rule = face_rule(faces.shape)
-        N, _ = tabulate(faces.shape, rule)
-        X = mesh.points[faces.nodes]
-        vectors = area_vectors(faces.shape, X, rule)
-        area = np.linalg.norm(vectors, axis=-1, keepdims=True)
-        np.add.at(total, faces.nodes, N.T @ (traction(N @ X, vectors / area) * area))
-    return total

@@ -10,18 +10,12 @@ from kratos_lite.analysis.model import Model
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.mesh.generators import box
-from kratos_lite.model.loads.nodal import NodalForces
+from kratos_lite.model.loads.surface import Pressure
 from kratos_lite.registry import remembered
 from kratos_lite.typing import Array
-from kratos_lite.verification.meshes import (
-    element,
-    face_forces,
-    is_quadratic,
-    kind_of,
-    on_plane,
-    shaped,
-)
-from kratos_lite.verification.problem import Problem, static, stress_at
+from kratos_lite.verification.meshes import element, is_quadratic, kind_of, shaped
+from kratos_lite.verification.problem import Problem, stress_at
+from kratos_lite.verification.scenes import on_symmetry_planes
 
 STEEL = Isotropic3D(E=210e9, nu=0.3)
 PLATE = Isotropic3D(E=200e9, nu=0.3, density=8000.0)
@@ -41,12 +35,10 @@ def le10(kind: str) -> Model:
     model = Model(mesh, STEEL)
     x, y, z = mesh.points.T
     rim = np.abs((x / 3.25) ** 2 + (y / 2.75) ** 2 - 1) < 1e-6
-    model.fix(on_plane(mesh, 1, 0.0), "y")
-    model.fix(on_plane(mesh, 0, 0.0), "x")
+    on_symmetry_planes(model, "xy")
     model.fix(rim, "xy")
     model.fix(rim & (np.abs(z - 0.3) < 1e-9), "z")
-    top = on_plane(mesh, 2, 0.6)
-    model.add(NodalForces(face_forces(mesh, top, lambda X, n: -1e6 * n)))
+    model.add(Pressure("z+", 1e6))
     return model
 
 
@@ -72,16 +64,11 @@ def _frequency(number: int) -> Callable[[str], float]:
 
 
 PROBLEMS: list[Problem] = [
-    static("nafems/le10", "σ_yy at the point D of the thick plate LE10, 6 × 4 × 4 bricks, MPa",
-           "NAFEMS, test LE10", -5.38, le10, lambda result: stress_at((2, 0, 0.6), 1)(result) / 1e6),
+    Problem("nafems/le10", "σ_yy at the point D of the thick plate LE10, 6 × 4 × 4 bricks, MPa",
+            "NAFEMS, test LE10", -5.38, le10, stress_at((2, 0, 0.6), 1, 1e-6)),
     *(
-        Problem(
-            name=f"nafems/fv52_mode_{number}",
-            quantity=f"frequency {number} of FV52, {shape}, Hz",
-            source="NAFEMS-FV, test FV52",
-            reference=FREQUENCIES[number - 4],
-            of=_frequency(number),
-        )
+        Problem(f"nafems/fv52_mode_{number}", f"frequency {number} of FV52, {shape}, Hz",
+                "NAFEMS-FV, test FV52", FREQUENCIES[number - 4], None, _frequency(number))
         for number, shape in ((4, "bending"), (5, "bending"), (7, "bending"), (8, "in its plane"))
     ),
 ]  # fmt: skip

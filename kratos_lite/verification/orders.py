@@ -12,7 +12,7 @@ from kratos_lite.analysis.result import Result
 from kratos_lite.verification import fields, scenes
 from kratos_lite.verification.errors import norms
 from kratos_lite.verification.meshes import is_quadratic, kind_of
-from kratos_lite.verification.problem import Models, Of, Problem, static
+from kratos_lite.verification.problem import Models, Of, Problem
 
 DISPLACEMENT, ENERGY = 0, 1
 CELLS = {"tetrahedron": (12, 6), "pyramid": (8, 4), "wedge": (8, 4), "hexahedron": (8, 6)}
@@ -59,7 +59,7 @@ def _problem(word: str, norm: int, degree: int) -> Problem:
     linear = degree == 1
     takes: Of = (lambda kind: kind_of(kind).shape.degree < 2) if linear else _is_plain_quadratic
     what, order = ("displacement", degree + 1) if norm == DISPLACEMENT else ("energy", degree)
-    return static(
+    return Problem(
         f"order/{word}_{what}_{'linear' if linear else 'quadratic'}",
         f"order of the error of {'u (L2 norm)' if norm == DISPLACEMENT else 'σ (energy norm)'}, "
         f"manufactured solution, {word} cells",

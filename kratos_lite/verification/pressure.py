@@ -10,12 +10,12 @@ from kratos_lite.analysis.model import Model
 from kratos_lite.analysis.result import Result
 from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.mesh.generators import annulus
-from kratos_lite.model.loads.nodal import NodalForces
 from kratos_lite.model.loads.surface import Pressure
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Mask
 from kratos_lite.verification import scenes
-from kratos_lite.verification.meshes import element, face_forces, is_quadratic, on_plane, shaped
-from kratos_lite.verification.problem import Models, Problem, static, stress_at
+from kratos_lite.verification.meshes import element, is_quadratic, shaped
+from kratos_lite.verification.problem import Models, Problem, models_of, stress_at
+from kratos_lite.verification.scenes import in_plane_strain, on_symmetry_planes
 
 RADII = (3.0, 3.5, 4.2, 5.2, 6.75, 9.0)
 RATIOS = (0.3, 0.49, 0.499, 0.4999)
@@ -36,18 +36,17 @@ def thick_cylinder(nu: float) -> Models:
     def models(kind: str) -> Model:
         mesh = shaped(kind, (5, 9, 1), place)
         model = Model(mesh, Isotropic3D(E=1000.0, nu=nu))
-        model.fix(on_plane(mesh, 2, 0.0) | on_plane(mesh, 2, 1.0), "z")
-        model.fix(on_plane(mesh, 1, 0.0), "y")
-        model.fix(on_plane(mesh, 0, 0.0), "x")
-        inner = np.abs(_radius(mesh.points) - 3.0) < 1e-6
-        model.add(NodalForces(face_forces(mesh, inner, lambda X, n: -n)))
+        in_plane_strain(model)
+        on_symmetry_planes(model, "xy")
+        model.add(Pressure(_on_radius(mesh.points, 3.0), 1.0))
         return model
 
     return models
 
 
-def _radius(points: Array) -> Array:
-    return np.hypot(points[:, 0], points[:, 1])
+def _on_radius(points: Array, radius: float) -> Mask:
+    """Return a mask of the points on a radius."""
+    return np.abs(np.hypot(points[:, 0], points[:, 1]) - radius) < 1e-6
 
 
 def _inner(radius: float) -> Callable[[Result], float]:
@@ -55,7 +54,7 @@ def _inner(radius: float) -> Callable[[Result], float]:
 
     def measure(result: Result) -> float:
         X = result.mesh.points
-        chosen = np.abs(_radius(X) - radius) < 1e-6
+        chosen = _on_radius(X, radius)
         return float(((result.u[chosen] * X[chosen])[:, :2].sum(axis=1) / radius).mean())
 
     return measure
@@ -65,9 +64,9 @@ def cylinder(kind: str) -> Model:
     """Return a whole cylinder, radii 1 and 2, in plane strain, 4 × 24 × 1 bricks."""
     mesh = annulus(1.0, 2.0, 0.25, (4, 24, 1), element(kind))
     model = Model(mesh, scenes.UNIT)
-    model.fix(on_plane(mesh, 2, 0.0) | on_plane(mesh, 2, 0.25), "z")
-    model.fix(on_plane(mesh, 1, 0.0), "y")
-    model.fix(on_plane(mesh, 0, 0.0), "x")
+    in_plane_strain(model)
+    for axis, letter in enumerate("xy"):
+        model.fix(np.abs(mesh.points[:, axis]) < 1e-9, letter)
     model.add(Pressure("inner", 1.0))
     return model
 
@@ -80,20 +79,20 @@ def _sphere_radial(result: Result) -> float:
 
 PROBLEMS: list[Problem] = [
     *(
-        static(f"pressure/thick_cylinder_{nu:g}",
-               f"u_r at the inner radius 3, segments of 10°, five bricks along the radius, ν = {nu:g}",
-               "MacNeal, thick-walled cylinder; closed form of Lamé",
-               lame_cylinder(nu, 1000.0, 3.0, 9.0, 3.0), thick_cylinder(nu), _inner(3.0))
+        Problem(f"pressure/thick_cylinder_{nu:g}",
+                f"u_r at the inner radius 3, segments of 10°, five bricks along the radius, ν = {nu:g}",
+                "MacNeal, thick-walled cylinder; closed form of Lamé",
+                lame_cylinder(nu, 1000.0, 3.0, 9.0, 3.0), thick_cylinder(nu), _inner(3.0))
         for nu in RATIOS
     ),
-    static("pressure/lame_cylinder", "u_r at the inner radius 1, cylinder of 4 × 24 × 1 bricks",
-           "Lame, section 28", lame_cylinder(0.3, 1.0, 1.0, 2.0, 1.0), cylinder, _inner(1.0), 2e-3,
-           is_quadratic),
-    static("pressure/lame_cylinder_hoop", "σ_φφ at the node (1, 0, 0), the same",
-           "Lame, section 28", 5 / 3, cylinder, stress_at((1, 0, 0), 1)),
-    static("pressure/lame_sphere",
-           "mean |u| at the inner radius 1, an eighth of a hollow sphere, 3 blocks of 3 × 3 × 3 bricks",
-           "Lame, section 142", 0.8, lambda kind: scenes.sphere(kind, 3).model, _sphere_radial, 1.3e-2,
-           is_quadratic),
+    Problem("pressure/lame_cylinder", "u_r at the inner radius 1, cylinder of 4 × 24 × 1 bricks",
+            "Lame, section 28", lame_cylinder(0.3, 1.0, 1.0, 2.0, 1.0), cylinder, _inner(1.0), 2e-3,
+            is_quadratic),
+    Problem("pressure/lame_cylinder_hoop", "σ_φφ at the node (1, 0, 0), the same",
+            "Lame, section 28", 5 / 3, cylinder, stress_at((1, 0, 0), 1)),
+    Problem("pressure/lame_sphere",
+            "mean |u| at the inner radius 1, an eighth of a hollow sphere, 3 blocks of 3 × 3 × 3 bricks",
+            "Lame, section 142", 0.8, models_of(scenes.sphere, 3), _sphere_radial, 1.3e-2,
+            is_quadratic),
 ]  # fmt: skip
 """The rows of this family."""

@@ -6,11 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache
 from math import inf, isfinite
+from typing import Any
 
 from kratos_lite.analysis.model import Model
 from kratos_lite.analysis.result import Result
 from kratos_lite.errors import InputError, KratosLiteError
 from kratos_lite.verification.meshes import kind_of, nearest, short
+from kratos_lite.verification.scenes import Scene
 
 ELEMENTS = (
     *(f"KinematicLinear3D{n}N" for n in (4, 5, 6, 8)), "EnhancedStrain3D8N", "BBar3D8N",
@@ -23,34 +25,38 @@ GRADES = ((0.02, "A"), (0.1, "B"), (0.2, "C"), (0.5, "D"))
 PASS, FAIL, REFUSED = "pass", "FAIL", "refused"
 Of = Callable[[str], bool]
 """Whether something holds for an element, by its name."""
-Models = Callable[[str], Model | tuple[Model, ...]]
+Models = Callable[[str], "Model | tuple[Model, ...]"]
 """Returns one or several models of an element, by its name."""
+Point = tuple[float, float, float]
 
 
 def every(kind: str) -> bool:
-    """Return True: the problem is for every element."""
+    """Return True: something holds for every element."""
     return True
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Problem:
-    """A quantity with a known value."""
+    """A quantity with a known value, of one or several models at rest, or of an element alone."""
 
     name: str  # family/problem
     quantity: str  # with its unit
     source: str  # a key of SOURCES, and where it stands in there
     reference: float  # errors are relative to it, or absolute where it is 0
-    of: Callable[[str], float]  # takes the name of an element to the value
+    models: Models | None  # problems with the same ones share their results
+    measure: Callable[..., float]  # takes these results to the value; without models the name of an element
     tolerance: float | None = None  # up to which a row passes; all are graded without
     exact: Of = every  # elements that have to pass; others are graded
     takes: Of = every  # elements that it is for
-    models: Models | None = None  # of a static problem: rows of the same ones share their results
-    measure: Callable[..., float] | None = None  # takes these results to the value
 
     @property
     def cited(self) -> str:
         """The word of the source in `SOURCES`."""
         return self.source.replace(":", ",").partition(",")[0]
+
+    def value(self, element: str) -> float:
+        """Return the value for an element."""
+        return self.measure(*(solved(self.models, element) if self.models else (element,)))
 
     def error(self, value: float) -> float:
         """Return how far a value is from the reference."""
@@ -71,9 +77,9 @@ class Problem:
     def row(self, element: str) -> Row:
         """Find the value for an element; an error of the library becomes a row that fails."""
         try:
-            value, note = float(self.of(element)), ""
+            return Row(self, element, float(self.value(element)))
         except KratosLiteError as error:
-            value, note = float("nan"), str(error)
+            return Row(self, element, float("nan"), note=str(error))
         except Exception as error:
             if element in ELEMENTS:
                 raise
@@ -81,34 +87,32 @@ class Problem:
                 f"{element} raises {type(error).__name__}: {error}, in {self.name}; "
                 "'kratos-lite check' of its file says where"
             ) from error
-        return Row(self, element, value, note=note)
 
 
-def static(name: str, quantity: str, source: str, reference: float, models: Models,
-           measure: Callable[..., float], tolerance: float | None = None,
-           exact: Of = every, takes: Of = every) -> Problem:  # fmt: skip
-    """Return a problem whose answer follows from the displacements of one or several models at rest."""
-    return Problem(
-        name=name, quantity=quantity, source=source, reference=reference, models=models, measure=measure,
-        of=lambda element: measure(*solved(models, element)), tolerance=tolerance, exact=exact, takes=takes,
-    )  # fmt: skip
+def models_of(scene: Callable[..., Scene], *words: Any, **options: Any) -> Models:
+    """Return what makes the model of a scene, given all but its element."""
+    return lambda element: scene(element, *words, **options).model
 
 
-def models_of(models: Models, element: str) -> tuple[Model, ...]:
-    """Return the models of a problem for an element, one or several, as a tuple."""
-    made = models(element)
-    return (made,) if isinstance(made, Model) else made
+def as_tuple(models: Model | tuple[Model, ...]) -> tuple[Model, ...]:
+    """Return one or several models as a tuple."""
+    return models if isinstance(models, tuple) else (models,)
 
 
 @lru_cache(maxsize=1)
 def solved(models: Models, element: str) -> tuple[Result, ...]:
     """Return the results of the models of a problem; others that have the same models share them."""
-    return tuple(model.solve("direct") for model in models_of(models, element))
+    return tuple(model.solve("direct") for model in as_tuple(models(element)))
 
 
-def stress_at(place: tuple[float, float, float], component: int) -> Callable[[Result], float]:
-    """Return a function: a stress at the node at a place, a mean over the elements around it."""
-    return lambda result: float(result.stress("averaged")[nearest(result.mesh, place), component])
+def displacement_at(place: Point, axis: int, scale: float = 1.0) -> Callable[[Result], float]:
+    """Return what measures a displacement at the node at a place, times a scale."""
+    return lambda result: scale * float(result.u[nearest(result.mesh, place), axis])
+
+
+def stress_at(place: Point, component: int, scale: float = 1.0) -> Callable[[Result], float]:
+    """Return what measures a stress at the node at a place, a mean over the elements around it."""
+    return lambda result: scale * float(result.stress("averaged")[nearest(result.mesh, place), component])
 
 
 @dataclass(frozen=True)
@@ -142,8 +146,3 @@ class Row:
     def kind(self) -> str:
         """Short name of the element, such as ``8N``."""
         return short(self.element)
-
-
-def cell_is(*cells: str) -> Of:
-    """Return whether an element has one of these cells."""
-    return lambda kind: kind_of(kind).shape.cell in cells

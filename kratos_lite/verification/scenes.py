@@ -10,25 +10,27 @@ from kratos_lite.analysis.model import Model
 from kratos_lite.analysis.nodal_loads import external_loads
 from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.mesh.generators import box
-from kratos_lite.model.loads.body import Gravity
-from kratos_lite.model.loads.nodal import NodalForces
+from kratos_lite.model.loads.body import BodyForce, Gravity
 from kratos_lite.model.loads.surface import Pressure, Traction
 from kratos_lite.typing import Array
 from kratos_lite.verification import fields
-from kratos_lite.verification.meshes import (
-    body_forces,
-    element,
-    joined,
-    octant,
-    on_boundary,
-    on_plane,
-    plane,
-    straight,
-)
+from kratos_lite.verification.meshes import element, joined, octant, on_boundary, straight
 
 UNIT = Isotropic3D(E=1.0, nu=0.3)
 """Of the scenes whose solution does not depend on E."""
 SOIL = Isotropic3D(E=210e6, nu=0.3, density=7620.0)
+
+
+def on_symmetry_planes(model: Model, axes: str) -> None:
+    """Fix the lower side along each of some axes in the direction of that axis."""
+    for axis in axes:
+        model.fix(f"{axis}-", axis)
+
+
+def in_plane_strain(model: Model) -> None:
+    """Fix both sides normal to z in that direction."""
+    model.fix("z-", "z")
+    model.fix("z+", "z")
 
 
 @dataclass
@@ -55,9 +57,8 @@ def manufactured(kind: str, n: int, distortion: float = 0.0) -> Scene:
 
     mesh = straight(kind, (n, n, n), place)
     model = Model(mesh, UNIT)
-    side = on_boundary(mesh)
-    model.fix(side, field=fields.manufactured)
-    model.add(NodalForces(body_forces(mesh, lambda X: fields.manufactured_force(X, UNIT.E, UNIT.nu))))
+    model.fix(on_boundary(mesh), field=fields.manufactured)
+    model.add(BodyForce(lambda X: fields.manufactured_force(X, UNIT.E, UNIT.nu)))
     return Scene("manufactured", kind, n, model, fields.manufactured)
 
 
@@ -65,14 +66,13 @@ def sphere(kind: str, n: int) -> Scene:
     """Return an eighth of a hollow sphere, radii 1 and 2, under inner pressure."""
     mesh = octant(n, kind, lambda X: 2 * X / np.linalg.norm(X, axis=1, keepdims=True))
     model = Model(mesh, UNIT)
-    for axis, letter in enumerate("xyz"):
-        model.fix(plane(axis, 0.0), letter)
+    on_symmetry_planes(model, "xyz")
     model.add(Pressure(np.abs(np.linalg.norm(mesh.points, axis=1) - 1) < 1e-9, 1.0))
     return Scene("sphere", kind, n, model, fields.hollow_sphere(UNIT.E, UNIT.nu, 1.0, 2.0, 1.0))
 
 
 def bending(kind: str, n: int) -> Scene:
-    """Return a bar 4 × 1 × 1 in pure bending: its root held exactly, σ_xx = E k y on its end."""
+    """Return a bar 4 × 1 × 1 in pure bending: its root as in the exact field, σ_xx = E k y on its end."""
     k = 0.01
     mesh = box((4, 1, 1), (4 * n, n, n), element(kind), origin=(0, -0.5, -0.5))
     model = Model(mesh, UNIT)
@@ -92,14 +92,15 @@ def cook(kind: str, n: int, material: Isotropic3D | None = None, plane_stress: b
 
     mesh = straight(kind, (n, n, 1), place)
     model = Model(mesh, material or Isotropic3D(E=240.565, nu=0.3))
-    model.fix(on_plane(mesh, 0, 0.0), "xy")
-    model.fix(on_plane(mesh, 2, 0.0) | (on_plane(mesh, 2, 1.0) & (not plane_stress)), "z")
-    model.add(Traction(on_plane(mesh, 0, 48.0), (0.0, 100 / 16, 0.0)))
+    model.fix("x-", "xy")
+    for side in ("z-",) if plane_stress else ("z-", "z+"):
+        model.fix(side, "z")
+    model.add(Traction("x+", (0.0, 100 / 16, 0.0)))
     return Scene("cook", kind, n, model)
 
 
 def l_domain(kind: str, n: int) -> Scene:
-    """Return an L in plane strain; its outer sides held at the exact displacement, singular at its corner."""
+    """Return an L in plane strain, the exact displacement prescribed on its outer sides."""
     corners = ((0, 0, 0), (-1, 0, 0), (0, -1, 0))
     mesh = joined([box((1, 1, 0.5), (n, n, 1), element(kind), origin=at) for at in corners])
     model = Model(mesh, UNIT)
@@ -107,8 +108,7 @@ def l_domain(kind: str, n: int) -> Scene:
     model.fix(
         lambda X: (np.abs(np.abs(X[:, :2]) - 1) < 1e-9).any(axis=1), "xy", field=lambda X: exact(X)[:, :2]
     )
-    model.fix("z-", "z")
-    model.fix("z+", "z")
+    in_plane_strain(model)
     return Scene("l_domain", kind, n, model, exact)
 
 
@@ -121,8 +121,7 @@ def cavity(kind: str, n: int) -> Scene:
         lambda X: (np.abs(X - 3) < 1e-9).any(axis=1),
         field=lambda X: np.where(np.abs(X) < 1e-9, 0.0, exact(X)),
     )
-    for axis, letter in enumerate("xyz"):
-        model.fix(plane(axis, 0.0), letter)
+    on_symmetry_planes(model, "xyz")
     return Scene("cavity", kind, n, model, exact)
 
 
@@ -135,20 +134,16 @@ def cantilever(kind: str, n: int) -> Scene:
     return Scene("cantilever", kind, n, model)
 
 
-def cube(kind: str, n: int, size: float = 1.0) -> Scene:
+def cube(kind: str, n: int) -> Scene:
     """Return the gravity cube on rollers: u_z = -ρ g (L z - z²/2) / M."""
-    mesh = box((size,) * 3, (n, n, n), element(kind))
-    return on_rollers(Model(mesh, SOIL), kind, n)
+    return on_rollers(Model(box(cells=(n, n, n), element=element(kind)), SOIL), kind, n)
 
 
 def on_rollers(model: Model, kind: str = "", n: int = 0) -> Scene:
     """Return a box on rollers under its own weight, with its exact field."""
     g, material = 9.81, SOIL
-    for side, axis in ((0, "x"), (1, "y")):
-        ends = model.mesh.points[:, side].min(), model.mesh.points[:, side].max()
-        for end in ends:
-            model.fix(on_plane(model.mesh, side, end), axis)
-    model.fix(on_plane(model.mesh, 2, model.mesh.points[:, 2].min()), "z")
+    for side in ("x-", "x+", "y-", "y+", "z-"):
+        model.fix(side, side[0])
     model.add(Gravity((0.0, 0.0, -g)))
     height = float(np.ptp(model.mesh.points[:, 2]))
 

@@ -8,7 +8,7 @@ from kratos_lite.analysis.error_estimate import SAFETY
 from kratos_lite.assembly.recovery import Recovery
 from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.verification import fields, scenes
-from kratos_lite.verification.meshes import body_forces, on_boundary, straight
+from kratos_lite.verification.meshes import on_boundary, straight
 
 KINDS = ["4N", "5N", "6N", "8N", "10N", "13N", "15N", "20N", "27N"]
 E, NU = 1.0, 0.3
@@ -44,7 +44,7 @@ def clamped_cube(kind, n):
     mesh = straight(kind, (n, n, n), lambda X: X)
     model = kl.Model(mesh, kl.Isotropic3D(E=E, nu=NU))
     model.fix(on_boundary(mesh))
-    model.add(kl.NodalForces(body_forces(mesh, force)))
+    model.add(kl.BodyForce(force))
     return model
 
 

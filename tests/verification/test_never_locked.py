@@ -7,7 +7,7 @@ from known_page import rows_of_page, value_ratio
 import kratos_lite as kl
 from kratos_lite.verification import scenes
 from kratos_lite.verification.concentrations import SOFT
-from kratos_lite.verification.meshes import face_forces, nearest, on_plane, short
+from kratos_lite.verification.meshes import nearest, short
 
 ENHANCED = {
     "macneal_harder/straight_rectangular_in_plane": (0.98, 1.0),
@@ -66,8 +66,7 @@ def pressed_block(element, n):
     for side in ("x-", "y-", "z-"):
         model.fix(side, side[0])
     model.fix("z+", "xy")
-    loaded = on_plane(mesh, 2, 1.0) & (mesh.points[:, :2] < 0.5 + 1e-9).all(axis=1)
-    model.add(kl.NodalForces(face_forces(mesh, loaded, lambda X, normal: -normal)))
+    model.add(kl.Pressure(lambda X: (X[:, 2] == 1) & (X[:, :2] < 0.5 + 1e-9).all(axis=1), 1.0))
     result = model.solve("direct")
     return float((result.loads * result.u).sum())
 

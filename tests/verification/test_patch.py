@@ -16,7 +16,7 @@ def test_nodal_stress_of_a_linear_field_is_exact(nodes):
     result = patch.held(warped(named(nodes), 3, amount=0.24), patch.linear).solve()
     stress = result.stress("node")
     np.testing.assert_allclose(stress, patch.constant(result.mesh.points), rtol=1e-11)
-    assert not on_boundary(result.mesh).all()
+    assert len(on_boundary(result.mesh)) < result.mesh.n_nodes
 
 
 @pytest.mark.parametrize("solver", ["dense", "direct", "amg"])

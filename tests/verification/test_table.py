@@ -89,7 +89,7 @@ def test_straight_cantilevers_agree_with_an_independent_program(nodes):
     forms, loads = ("rectangular", "trapezoidal", "parallelogram"), ("extension", "in_plane", "out_of_plane")
     for form, wanted in zip(forms, BEAM[nodes], strict=True):
         problems = [PROBLEMS[f"macneal_harder/straight_{form}_{load}"] for load in loads]
-        ratios = [p.of(f"KinematicLinear3D{nodes}N") / p.reference for p in problems]
+        ratios = [p.value(f"KinematicLinear3D{nodes}N") / p.reference for p in problems]
         np.testing.assert_allclose(ratios, wanted, rtol=0, atol=0.0006)
 
 
@@ -97,7 +97,7 @@ def test_bricks_in_the_thick_cylinder_agree_with_an_independent_program():
     flat = np.sin(np.radians(10)) / np.radians(10)  # the pressure of 8-node bricks acts on plane faces
     for nu, wanted in ((0.3, (0.9908, 0.9996, 0.9998)), (0.4999, (0.0534, 0.8793, 0.8793))):
         problem = PROBLEMS[f"pressure/thick_cylinder_{nu}"]
-        ratios = [problem.of(f"KinematicLinear3D{n}N") / problem.reference for n in (8, 20, 27)]
+        ratios = [problem.value(f"KinematicLinear3D{n}N") / problem.reference for n in (8, 20, 27)]
         assert ratios == pytest.approx(np.array(wanted) * (flat, 1, 1), abs=5e-4)
 
 
