@@ -24,7 +24,7 @@ import kratos_lite as kl
 from benchmarks import scenes
 from benchmarks.driver import ROOT, load, save
 from benchmarks.programs import FORMULATIONS
-from benchmarks.programs.adaptive import geometry_of, scene_of
+from benchmarks.programs.adaptive import geometry_of
 from benchmarks.tables import Row, table
 from kratos_lite import voigt
 from kratos_lite.errors import KratosLiteError
@@ -146,7 +146,7 @@ def effectivity(names: Sequence[str] | None, kinds: Sequence[str] | None) -> Non
 
 def make(name: str, kind: str, n: int, grading: float = 1.0) -> Scene:
     """Return a scene, its cells smaller towards the planes x = 0 and y = 0 by a power of the places."""
-    scene = scene_of(name, kind, n)
+    scene = scenes.make(name, kind, n)
     if grading == 1.0:
         return scene
     old, X = scene.model, scene.model.mesh.points.copy()

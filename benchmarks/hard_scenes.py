@@ -171,13 +171,6 @@ MAKERS: dict[str, Maker] = {
 }
 
 
-def _scene(name: str) -> Callable[[str, int], Scene]:
-    return lambda kind, n: Scene(name, kind, n, MAKERS[name](kind, n))
-
-
-HARD = {name: _scene(name) for name in MAKERS}
-
-
 def system(scene: Scene) -> dict[str, Array]:
     """Return the matrix of the free components of a scene in 3 × 3 blocks, its load, and its nodes."""
     model = scene.model

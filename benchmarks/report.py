@@ -10,7 +10,20 @@ import numpy as np
 from benchmarks import ale, stall
 from benchmarks.curves import CLOCKS, cheapest, summary
 from benchmarks.motion import MOTIONS, SOLFEC
-from benchmarks.tables import NUMPY, OURS, THEIRS, Row, error, megabytes, ratio, seconds, table
+from benchmarks.tables import (
+    NUMPY,
+    OURS,
+    THEIRS,
+    Row,
+    by_place,
+    error,
+    label,
+    megabytes,
+    place_of,
+    ratio,
+    seconds,
+    table,
+)
 
 UNLIKE = 1e-4
 """Relative difference of displacements above which a solver has not solved the problem."""
@@ -27,25 +40,6 @@ def linear_solver(row: Row) -> float | None:
 def of(rows: Iterable[Row], group: str) -> list[Row]:
     """Return the rows of a group that hold measurements."""
     return [row for row in rows if row["group"] == group and "failed" not in row]
-
-
-def by_place(rows: Iterable[Row]) -> dict[tuple[str, str, int], dict[str, Row]]:
-    """Return the rows of each scene, kind and size by program."""
-    found: dict[tuple[str, str, int], dict[str, Row]] = defaultdict(dict)
-    for row in rows:
-        found[place_of(row)][row["program"]] = row
-    return dict(found)
-
-
-def place_of(row: Row) -> tuple[str, str, int]:
-    """Return scene, kind and size of a row."""
-    return row["scene"], row["kind"], row["n"]
-
-
-def label(place: tuple[str, str, int]) -> str:
-    """Return the name of a scene, kind and size."""
-    scene, kind, n = place
-    return " ".join(word for word in (scene, kind, f"n = {n}" if n else "") if word)
 
 
 # ---- goal rows -------------------------------------------------------------------------------------

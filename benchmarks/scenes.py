@@ -6,21 +6,21 @@ Every program gets the same discrete problem: nodes, elements, fixed components 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 import kratos_lite as kl
 from benchmarks.cases import write_for_kratos
-from benchmarks.hard_scenes import HARD, system, weighty
+from benchmarks.hard_scenes import MAKERS, system, weighty
 from benchmarks.programs import ALL, FORMULATIONS
 from kratos_lite.typing import Array
-from kratos_lite.verification import concentrations
 from kratos_lite.verification import scenes as shared
+from kratos_lite.verification.concentrations import hole
 from kratos_lite.verification.meshes import element, joined, shaped
 from kratos_lite.verification.pressure import lame_cylinder
-from kratos_lite.verification.scenes import UNIT, Scene, bending, cavity, cube, l_domain, manufactured, sphere
+from kratos_lite.verification.scenes import UNIT, Scene
 
 KINDS = (*ALL, *FORMULATIONS)
 SOLID = kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0)
@@ -62,26 +62,6 @@ def write_system(scene: Scene, folder: Path) -> Path:
     return path
 
 
-def cook(kind: str, n: int) -> Scene:
-    """Return Cook's membrane in plane strain, with its energy."""
-    return replace(shared.cook(kind, n), energy=ENERGIES["cook"])
-
-
-def cantilever(kind: str, n: int) -> Scene:
-    """Return the cantilever of MacNeal & Harder, with its energy."""
-    return replace(shared.cantilever(kind, n), energy=ENERGIES["cantilever"])
-
-
-def hole_incompressible(kind: str, n: int) -> Scene:
-    """Return the plate with a hole, nearly incompressible."""
-    return replace(concentrations.hole(kind, n, nu=0.4999), name="hole_incompressible")
-
-
-def hole(kind: str, n: int) -> Scene:
-    """Return the plate with a hole."""
-    return concentrations.hole(kind, n)
-
-
 def cylinder(kind: str, n: int) -> Scene:
     """Return a quarter of a thick cylinder, radii 1 and 3, under inner pressure in plane strain."""
 
@@ -102,74 +82,70 @@ def cylinder(kind: str, n: int) -> Scene:
     return Scene("cylinder", kind, n, model, exact)
 
 
-def box_under_gravity(kind: str, n: int) -> kl.Model:
+def block(kind: str, n: int) -> kl.Model:
     """Return the unit block of n³ cells, clamped at its bottom, under gravity in three directions."""
     return weighty(kl.box(cells=(n, n, n), element=element(kind)), material=SOLID)
-
-
-def block(kind: str, n: int) -> Scene:
-    """Return the block under gravity with its energy."""
-    return Scene("block", kind, n, box_under_gravity(kind, n), energy=ENERGIES["block"])
 
 
 # ---- scenes for what can be skipped ------------------------------------------------------------------
 
 
-def two_bodies(kind: str, n: int, loaded: int = 2) -> Scene:
+def two_bodies(kind: str, n: int, loaded: int = 2) -> kl.Model:
     """Return two clamped blocks apart from each other, of which the first or both carry a load."""
     mesh = joined([kl.box(cells=(n, n, n), element=element(kind), origin=(2.0 * i, 0, 0)) for i in range(2)])
     model = kl.Model(mesh, SOLID)
     model.fix("z-")
     model.add(kl.Traction(lambda X: (X[:, 2] == 1) & (X[:, 0] < 1.5 * loaded), (1e3, 0.0, -1e3)))
-    return Scene("two_bodies", kind, n, model)
+    return model
 
 
-def half_unloaded(kind: str, n: int) -> Scene:
-    """Return the same with one of them unloaded: it need not be solved."""
-    return replace(two_bodies(kind, n, 1), name="half_unloaded")
-
-
-def unloaded(kind: str, n: int) -> Scene:
+def unloaded(kind: str, n: int) -> kl.Model:
     """Return the clamped block without any load."""
-    model = box_under_gravity(kind, n)
+    model = block(kind, n)
     model.loads.clear()
-    return Scene("unloaded", kind, n, model)
+    return model
 
 
-def unreferenced(kind: str, n: int) -> Scene:
+def unreferenced(kind: str, n: int) -> kl.Model:
     """Return the clamped block with as many nodes again that belong to no element."""
     mesh = kl.box(cells=(n, n, n), element=element(kind))
-    more = kl.Mesh(np.vstack([mesh.points, mesh.points + 5.0]), mesh.blocks)
-    return Scene("unreferenced", kind, n, weighty(more, material=SOLID))
+    return weighty(kl.Mesh(np.vstack([mesh.points, mesh.points + 5.0]), mesh.blocks), material=SOLID)
 
 
-def warped(kind: str, n: int) -> Scene:
+def warped(kind: str, n: int) -> kl.Model:
     """Return the clamped block with its inner nodes moved, so that no Jacobian is constant."""
     mesh = kl.box(cells=(n, n, n), element=element(kind))
     X = mesh.points
     points = X + 0.1 / n * (np.sin(7 * np.pi * X) * np.sin(5 * np.pi * X[:, [1, 2, 0]]))
-    return Scene("warped", kind, n, weighty(kl.Mesh(points, mesh.blocks), material=SOLID))
+    return weighty(kl.Mesh(points, mesh.blocks), material=SOLID)
 
 
-def held(kind: str, n: int) -> Scene:
+def held(kind: str, n: int) -> kl.Model:
     """Return the block with all nodes of its lower half constrained."""
-    model = box_under_gravity(kind, n)
+    model = block(kind, n)
     model.fix(model.mesh.points[:, 2] < 0.5 + 1e-9)
-    return Scene("held", kind, n, model)
+    return model
 
 
-ENERGIES: dict[str, float | None] = {"cook": 457.481, "cantilever": 0.215581, "block": 6.8668}
+ENERGIES = {"cook": 457.481, "cantilever": 0.215581, "block": 6.8668}
 """J, of the exact solutions, good to 1e-4: from ``python -m benchmarks references`` (27N, extrapolated)."""
-SCENES: dict[str, Callable[[str, int], Scene]] = {
+SCENES: dict[str, Callable[[str, int], Scene | kl.Model]] = {
     made.__name__: made
     for made in (
-        manufactured, sphere, bending, cook, l_domain, cavity, hole, hole_incompressible, cylinder,
-        cantilever, block, cube, two_bodies, half_unloaded, unloaded, unreferenced, warped, held,
+        shared.manufactured, shared.sphere, shared.bending, shared.cook, shared.l_domain, shared.cavity,
+        shared.cantilever, shared.cube,
+        hole, cylinder, block, two_bodies, unloaded, unreferenced, warped, held,
     )
-} | HARD  # fmt: skip
+} | {
+    "hole_incompressible": partial(hole, nu=0.4999),
+    "half_unloaded": partial(two_bodies, loaded=1),  # one of the two need not be solved
+    **MAKERS,
+}  # fmt: skip
 """Every scene by name."""
 
 
 def make(name: str, kind: str, n: int) -> Scene:
     """Return a scene by name, element kind and size."""
-    return replace(SCENES[name](FORMULATIONS.get(kind, kind), n), kind=kind)
+    made = SCENES[name](FORMULATIONS.get(kind, kind), n)
+    model, exact = (made.model, made.exact) if isinstance(made, Scene) else (made, None)
+    return Scene(name, kind, n, model, exact, ENERGIES.get(name))

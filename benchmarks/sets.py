@@ -10,9 +10,8 @@ from benchmarks import ale, cases
 from benchmarks.driver import Run
 from benchmarks.programs import PROGRAMS
 from benchmarks.scenes import KINDS
-from benchmarks.tables import ADAPTIVE, NUMPY, OURS, THEIRS
+from benchmarks.tables import ADAPTIVE, NUMPY, OURS, THEIRS, Place
 
-Place = tuple[str, str, int]
 CURVED = ("sphere", "cavity", "hole_incompressible")
 """Scenes where quadratic elements have curved edges."""
 CELLS = {

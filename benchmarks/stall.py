@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Callable, Sequence
 
 from benchmarks import hard_scenes
 from benchmarks.driver import Run
 from benchmarks.programs import SOLVERS
-from benchmarks.tables import OURS, Row, error, megabytes, ratio, seconds, table
+from benchmarks.tables import OURS, Place, Row, by_place, error, megabytes, ratio, seconds, table
 
 UNKNOWNS = 60_000
 """About so many are solved for if nothing else is asked for."""
@@ -44,7 +43,6 @@ layer of cells or three; `contrast` is 1e6, in layers or balls; `links` tie node
 that do not fit, or hanging ones; `block_nu_4999` has ν = 0.4999. Goals: at most
 40 iterations, 3 times the time and 1.5 times the memory of the block, 0.25 of the best other."""
 MOST_ITERATIONS, MOST_TIME, MOST_MEMORY, MOST_OF_OTHERS = 40, 3.0, 1.5, 0.25
-Place = tuple[str, str, int]
 
 
 def cells(kind: str, unknowns: float) -> int:
@@ -77,9 +75,7 @@ def runs(
 
 def tables(rows: Sequence[Row]) -> str:
     """Return what kratos_lite takes beside its block, and beside the other solvers."""
-    found: dict[Place, dict[str, Row]] = defaultdict(dict)
-    for row in rows:
-        found[row["scene"], row["kind"], row["n"]][row["program"]] = row
+    found = by_place(rows)
     ours = {place: here[OURS] for place, here in found.items() if OURS in here}
     return "\n".join(filter(None, (_ours(ours), _peers(found), _missed(ours, found))))
 

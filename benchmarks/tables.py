@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from typing import Any
 
 Row = dict[str, Any]
+Place = tuple[str, str, int]
+"""Scene, element kind and size."""
 OURS, ADAPTIVE, NUMPY, THEIRS = "kratos_lite", "kratos_lite adaptive", "kratos_lite NumPy", "Kratos"
 
 
@@ -45,3 +48,22 @@ def megabytes(value: float | None) -> str:
 def error(value: float | None) -> str:
     """Return a relative error in one digit."""
     return "" if value is None else f"{value:.0e}"
+
+
+def by_place(rows: Iterable[Row]) -> dict[Place, dict[str, Row]]:
+    """Return the rows of each scene, kind and size by program."""
+    found: dict[Place, dict[str, Row]] = defaultdict(dict)
+    for row in rows:
+        found[place_of(row)][row["program"]] = row
+    return dict(found)
+
+
+def place_of(row: Row) -> Place:
+    """Return scene, kind and size of a row."""
+    return row["scene"], row["kind"], row["n"]
+
+
+def label(place: Place) -> str:
+    """Return the name of a scene, kind and size."""
+    scene, kind, n = place
+    return " ".join(word for word in (scene, kind, f"n = {n}" if n else "") if word)

@@ -23,12 +23,12 @@ def work(job: Job) -> Array:
     """Do the job; the true error is found on the final mesh, outside the time."""
     with job.phase("import"):
         import kratos_lite as kl
-        from benchmarks import scenes  # noqa: F401
+        from benchmarks import scenes
         from kratos_lite.verification import errors
     job.answer["version"] = kl.__version__
     name = job.given["scene"]
     with job.phase("read"):
-        scene = scene_of(name, job.kind, job.given["n"])
+        scene = scenes.make(name, job.kind, job.given["n"])
         geometry = geometry_of(name, scene.model.mesh)
     with job.phase("solve"):
         result = scene.model.solve(error=job.given["goal"], geometry=geometry)
@@ -42,18 +42,6 @@ def work(job: Job) -> Array:
             found = {"displacement": off, "energy": off**0.5}
         job.answer["errors"] = found
     return np.asarray(result.u)
-
-
-def scene_of(name: str, kind: str, n: int) -> Any:
-    """Return a scene whose force is known everywhere, not at the nodes of one mesh."""
-    import kratos_lite as kl
-    from benchmarks import scenes
-    from kratos_lite.verification import fields
-
-    scene = scenes.make(name, kind, n)
-    if name == "manufactured":
-        scene.model.loads[:] = [kl.BodyForce(lambda X: fields.manufactured_force(X, E=1.0, nu=0.3))]
-    return scene
 
 
 def geometry_of(name: str, mesh: Any) -> dict[str, Callable[[Array], Array]]:

@@ -33,19 +33,23 @@ SPLITS: dict[str, list[list[int]]] = {
 """Cells of one brick by family; tetrahedra lie around its diagonal 0-6, corner 8 is its center."""
 
 
-def _grid(cells: Counts, with_centers: bool, low: Counts, high: Counts) -> tuple[Array, Ints]:
-    """Return points of the unit cube and bricks (m, 8 or 9), of those between two corners of the grid."""
+def _grid(cells: Counts, low: Counts, high: Counts) -> tuple[Array, Ints]:
+    """Return points of the unit cube and bricks (m, 8), of those between two corners of the grid."""
     axes = [np.arange(a, b + 1) / n for n, a, b in zip(cells, low, high, strict=True)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     number = np.arange(len(points)).reshape([len(axis) for axis in axes])
     ends = [(slice(0, -1), slice(1, None))[i] for i in (0, 1)]
     corners = [number[ends[i], ends[j], ends[k]].ravel() for i, j, k in (Hexahedron8.nodes > 0).astype(int)]
-    bricks = np.stack(corners, axis=1)
-    if with_centers:
-        centers = np.arange(len(bricks)) + len(points)
-        points = np.vstack([points, points[bricks].mean(axis=1)])
-        bricks = np.column_stack([bricks, centers])
-    return points, bricks
+    return points, np.stack(corners, axis=1)
+
+
+def cut_bricks(points: Array, bricks: Ints, shape: type[Shape]) -> tuple[Array, Ints]:
+    """Return points and cells (m, k) of a shape, with straight edges, into which bricks (b, 8) are cut."""
+    split = np.array(SPLITS[shape.cell])
+    if shape.cell == "pyramid":
+        bricks = np.column_stack([bricks, np.arange(len(bricks)) + len(points)])
+        points = np.vstack([points, points[bricks[:, :8]].mean(axis=1)])
+    return raise_order(points, bricks[:, split].reshape(-1, split.shape[1]), shape)
 
 
 def counts_of(cells: Sequence[int]) -> Counts:
@@ -93,9 +97,7 @@ def unit_cells(
     high = cells if high is None else high
     i, j, k = (b - a for a, b in zip(low, high, strict=True))
     _check_size((i, j, k), shape)
-    points, bricks = _grid(cells, shape.cell == "pyramid", low, high)
-    split = np.array(SPLITS[shape.cell])
-    return raise_order(points, bricks[:, split].reshape(-1, split.shape[1]), shape)
+    return cut_bricks(*_grid(cells, low, high), shape)
 
 
 def _unit_mesh(cells: Sequence[int], element: str) -> tuple[Array, dict[str, Ints]]:

@@ -11,10 +11,9 @@ from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.surface import area_vectors
 from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.mesh import Block, Mesh
-from kratos_lite.mesh.centers import raise_order
-from kratos_lite.mesh.generators import SPLITS, box
+from kratos_lite.mesh.generators import SPLITS, box, cut_bricks
 from kratos_lite.shapes import Shape
-from kratos_lite.testing.report import Measured
+from kratos_lite.testing.report import Measured, difference
 from kratos_lite.testing.rules import VOLUME
 from kratos_lite.typing import Array, Ints, Mask
 
@@ -77,11 +76,7 @@ def patch(
     points, bricks = mesh.points.copy(), mesh.blocks[0].nodes.astype(np.int64)
     inner = ((points > 0) & (points < size)).all(axis=1)
     points[inner] += np.random.default_rng(3).uniform(-move, move, (int(inner.sum()), 3))
-    split = np.array(SPLITS[shape.cell])
-    if split.max() == 8:
-        bricks = np.column_stack([bricks, np.arange(len(bricks)) + len(points)])
-        points = np.vstack([points, points[bricks[:, :8]].mean(axis=1)])
-    return raise_order(points, bricks[:, split].reshape(-1, split.shape[1]), shape)
+    return cut_bricks(points, bricks, shape)
 
 
 def unbuildable(shape: type[Shape]) -> str:
@@ -119,11 +114,13 @@ def on_box(points: Array) -> Mask:
 
 def errors(cells: KinematicLinear, u: Array, exact: Array, stress: Array) -> tuple[float, float]:
     """Return the largest errors of u (m, k, 3) and of its stress at the Gauss points, relative, two-sided."""
-    computed = cells.stress(MATERIAL.C, u)
-    return (
-        float(np.abs(u - exact).max() / np.abs(exact).max()),
-        float(np.abs(computed - stress).max() / np.abs(stress).max()),
-    )
+    return difference(u, exact), difference(cells.stress(MATERIAL.C, u), stress)
+
+
+def reproduced(field: str, of_u: float, of_stress: float) -> Measured:
+    """Return errors of u and stress that rounding alone may make."""
+    text = f"{field}: u is off by {of_u:.3g} (limit 1e-13), the stress by {of_stress:.3g} (1e-12)"
+    return Measured(np.maximum(10 * of_u, of_stress), 1e-12, text)
 
 
 def linear_patch(element: Element) -> Measured | str:
@@ -135,9 +132,9 @@ def linear_patch(element: Element) -> Measured | str:
     exact = 0.5e-3 * points @ (np.ones((3, 3)) + np.eye(3))
     stress = np.array([2000.0, 2000, 2000, 400, 400, 400])
     u = solve(assemble(element, points, nodes), on_box(points), exact, np.zeros_like(exact))
-    of_u, of_stress = errors(element(points[nodes]), u[nodes], exact[nodes], stress)
-    text = f"u in a distorted patch is off by {of_u:.3g} (limit 1e-13), the stress by {of_stress:.3g} (1e-12)"
-    return Measured(np.maximum(10 * of_u, of_stress), 1e-12, text)
+    cells = element(points[nodes])
+    at_points = np.broadcast_to(stress, (len(nodes), len(element.rule), 6))
+    return reproduced("a distorted patch", *errors(cells, u[nodes], exact[nodes], at_points))
 
 
 def quadratic_patch(element: Element) -> Measured | str:
@@ -164,9 +161,7 @@ def quadratic_patch(element: Element) -> Measured | str:
     u = solve(assemble(element, points, nodes), fixed, exact, f)
     gradient = np.einsum("ijk,mgk->mgij", H, cells.gauss_points())
     stress = MATERIAL.stress(voigt.symmetric_gradient(gradient))
-    of_u, of_stress = errors(cells, u[nodes], exact[nodes], stress)
-    text = f"quadratic u: u is off by {of_u:.3g} (limit 1e-13), the stress by {of_stress:.3g} (1e-12)"
-    return Measured(np.maximum(10 * of_u, of_stress), 1e-12, text)
+    return reproduced("quadratic u", *errors(cells, u[nodes], exact[nodes], stress))
 
 
 def shared_faces(element: Element) -> Measured | str:

@@ -8,8 +8,7 @@ import numpy as np
 
 from kratos_lite.elements import ELEMENTS, KinematicLinear
 from kratos_lite.mesh import Block, Mesh
-from kratos_lite.mesh.centers import raise_order
-from kratos_lite.mesh.generators import SPLITS, box
+from kratos_lite.mesh.generators import box, cut_bricks
 from kratos_lite.typing import Array, Ints, Rows
 
 COMPLETE = (10, 27)
@@ -57,12 +56,7 @@ def short(name: str) -> str:
 
 def split(points: Array, bricks: Ints | Rows, kind: str) -> Mesh:
     """Return bricks (m, 8) split into elements of one kind with straight edges."""
-    shape, corners = kind_of(kind).shape, np.asarray(bricks, dtype=np.int64)
-    if shape.cell == "pyramid":
-        corners = np.column_stack([corners, len(points) + np.arange(len(corners))])
-        points = np.vstack([points, points[corners[:, :8]].mean(axis=1)])
-    cells = np.array(SPLITS[shape.cell])
-    points, nodes = raise_order(points, corners[:, cells].reshape(-1, cells.shape[1]), shape)
+    points, nodes = cut_bricks(points, np.asarray(bricks, dtype=np.int64), kind_of(kind).shape)
     return Mesh(points, [Block(element(kind), nodes)])
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from known_page import PAGE, rows_of_page
+from known_page import PAGE, rows_of_page, value_ratio
 
 import kratos_lite as kl
 from kratos_lite.cli import main
@@ -86,18 +86,18 @@ BEAM = {
 
 @pytest.mark.parametrize("nodes", sorted(BEAM))
 def test_straight_cantilevers_agree_with_an_independent_program(nodes):
-    forms, loads = ("rectangular", "trapezoidal", "parallelogram"), ("extension", "in_plane", "out_of_plane")
-    for form, wanted in zip(forms, BEAM[nodes], strict=True):
-        problems = [PROBLEMS[f"macneal_harder/straight_{form}_{load}"] for load in loads]
-        ratios = [p.value(f"KinematicLinear3D{nodes}N") / p.reference for p in problems]
+    for form, wanted in zip(("rectangular", "trapezoidal", "parallelogram"), BEAM[nodes], strict=True):
+        names = [
+            f"macneal_harder/straight_{form}_{load}" for load in ("extension", "in_plane", "out_of_plane")
+        ]
+        ratios = [value_ratio(name, f"KinematicLinear3D{nodes}N") for name in names]
         np.testing.assert_allclose(ratios, wanted, rtol=0, atol=0.0006)
 
 
 def test_bricks_in_the_thick_cylinder_agree_with_an_independent_program():
     flat = np.sin(np.radians(10)) / np.radians(10)  # the pressure of 8-node bricks acts on plane faces
     for nu, wanted in ((0.3, (0.9908, 0.9996, 0.9998)), (0.4999, (0.0534, 0.8793, 0.8793))):
-        problem = PROBLEMS[f"pressure/thick_cylinder_{nu}"]
-        ratios = [problem.value(f"KinematicLinear3D{n}N") / problem.reference for n in (8, 20, 27)]
+        ratios = [value_ratio(f"pressure/thick_cylinder_{nu}", f"KinematicLinear3D{n}N") for n in (8, 20, 27)]
         assert ratios == pytest.approx(np.array(wanted) * (flat, 1, 1), abs=5e-4)
 
 
@@ -121,24 +121,24 @@ def test_tetrahedra_in_a_segment_of_the_cylinder_agree_with_an_independent_progr
     assert found == pytest.approx(wanted * flat, abs=5e-4)
 
 
-@pytest.mark.parametrize("nodes", [10, 13, 15, 20, 27])
+@pytest.mark.parametrize("nodes", [15, 27])
 def test_energy_and_loads_of_a_sphere_and_a_cylinder_under_pressure(nodes):
-    sphere, bound = scenes.sphere(f"{nodes}N", 3).model.solve(), {15: 4e-3, 20: 2e-3, 27: 2e-3}
-    assert sphere.energy() == pytest.approx(0.5 * 0.8 * np.pi / 2, rel=bound.get(nodes, 1.3e-2))
+    sphere = scenes.sphere(f"{nodes}N", 3).model.solve()
+    assert sphere.energy() == pytest.approx(0.5 * 0.8 * np.pi / 2, rel=4e-3)
     np.testing.assert_allclose(sphere.report.total_load, np.pi / 4, rtol=5e-4)
     cylinder = pressure.cylinder(f"{nodes}N").solve()
     assert cylinder.energy() == pytest.approx(0.5 * 1.906666667 * 2 * np.pi * 0.25, rel=2e-3)
     np.testing.assert_allclose(cylinder.report.total_load, 0, atol=1e-13)
-    if nodes == 27:
-        at = nearest(cylinder.mesh, (1, 0, 0))
-        assert cylinder.stress("node")[at, 0] == pytest.approx(-1, rel=0.05)
+    at = nearest(cylinder.mesh, (1, 0, 0))
+    assert cylinder.stress("node")[at, 0] == pytest.approx(-1, rel=0.05)
 
 
 # ---- grades ------------------------------------------------------------------------------------------
 
 
 def row(value, **options):
-    given = {"name": "a/b", "quantity": "q", "source": "Hooke", "reference": 2.0, "of": lambda kind: value}
+    given = {"name": "a/b", "quantity": "q", "source": "Hooke", "reference": 2.0}
+    given |= {"models": None, "measure": lambda kind: value}
     return Problem(**given | options).row("KinematicLinear3D8N")
 
 
@@ -160,10 +160,10 @@ def test_a_tolerance_is_met_or_not_whatever_the_sign_and_no_number_fails():
 
 
 def test_an_error_of_the_library_is_a_row_that_fails_with_its_words():
-    def of(kind):
+    def measure(kind):
         raise kl.MeshError("element 1 is inverted\nand more")
 
-    failed = row(None, of=of)
+    failed = row(None, measure=measure)
     assert failed.failed
     assert "element 1 is inverted" in page.line(failed)
     assert "more" not in page.line(failed)
@@ -218,38 +218,35 @@ class {name}(KinematicLinear):
 """
 
 
+def own_element(name, more=""):
+    Path("own.py").write_text(
+        OWN.format(name=name, more=more and f"    def B(self, xi):\n        return {more}")
+    )
+
+
 def test_an_element_of_ones_own_gets_the_same_rows(folder, capsys):
-    Path("own.py").write_text(OWN.format(name="My8N", more=""))
+    own_element("My8N")
     assert main(["verify", "own.py", "element", "patch", "-o", "own.json"]) == 0
     rows = {row["problem"]: row for row in json.loads(Path("own.json").read_text())["rows"]}
     assert set(rows) == {p.name for p in chosen(["element", "patch"]) if ELEMENTS[3] in p.elements()}
     assert {row["element"] for row in rows.values()} == {"My8N"}
-    bent = PROBLEMS["element/bending"].row("KinematicLinear3D8N").value
-    assert rows["element/bending"]["value"] == pytest.approx(bent, rel=1e-12)
+    bent = value_ratio("element/bending", "KinematicLinear3D8N")
+    assert rows["element/bending"]["value"] == pytest.approx(bent, rel=1e-3)
     assert "My8N" not in kl.ELEMENTS
     assert " pass" in capsys.readouterr().out.splitlines()[-1]
 
 
-def test_a_broken_element_of_ones_own_fails_with_exit_code_1(folder, capsys):
-    more = "    def B(self, xi):\n        return super().B(xi) * 1.01"
-    Path("own.py").write_text(OWN.format(name="Stiff8N", more=more))
-    assert main(["verify", "own.py", "element/uniaxial", "--element", "Stiff8N", "-o", "own.md"]) == 1
-    assert "FAIL" in capsys.readouterr().out
+def test_rows_of_a_broken_element_that_fail_stand_first_with_exit_code_1(folder, capsys):
+    own_element("Stiff8N", "super().B(xi) * 1.01")
+    assert main(["verify", "own.py", "element", "--element", "Stiff8N", "-o", "own.md"]) == 1
+    failed = [" FAIL" in line for line in capsys.readouterr().out.splitlines()[1:-1]]
+    assert 0 < sum(failed) < len(failed)
+    assert failed == sorted(failed, reverse=True)
     assert "| uniaxial | Stiff8N |" in Path("own.md").read_text()
 
 
-def test_rows_that_fail_stand_first(folder, capsys):
-    more = "    def B(self, xi):\n        return super().B(xi) * 1.01"
-    Path("own.py").write_text(OWN.format(name="Stiff8N", more=more))
-    assert main(["verify", "own.py", "element"]) == 1
-    told = capsys.readouterr().out.splitlines()[1:-1]
-    failed = [" FAIL" in line for line in told]
-    assert 0 < sum(failed) < len(failed)
-    assert failed == sorted(failed, reverse=True)
-
-
 def test_an_error_of_ones_own_element_is_named_with_exit_code_2(folder, capsys):
-    Path("own.py").write_text(OWN.format(name="Zero8N", more="    def B(self, xi):\n        return 1 / 0"))
+    own_element("Zero8N", "1 / 0")
     assert main(["verify", "own.py", "element/uniaxial"]) == 2
     err = capsys.readouterr().err
     assert "error: Zero8N raises ZeroDivisionError: division by zero, in element/uniaxial" in err
