@@ -105,7 +105,7 @@ def magnitude(material: LinearMaterial) -> Measured | str:
         return "C is not positive definite"
     low, high = young_moduli(material)
     text = f"Young's moduli along the axes are {low:.3g} … {high:.3g} Pa; "
-    if not SOFTEST <= low <= high <= STIFFEST:
+    if not SOFTEST * (1 - 1e-9) <= low <= high <= STIFFEST * (1 + 1e-9):
         return Measured(1, 0, f"{text}bodies have {SOFTEST:g} … {STIFFEST:g}: is C a compliance?")
     is_soft = material.density > HEAVY and high < HARD
     return Measured(float(is_soft), 0, f"{text}too soft for {material.density:g} kg/m³: are they in MPa?")
