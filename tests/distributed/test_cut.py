@@ -50,8 +50,11 @@ def test_each_part_has_all_elements_at_its_own_nodes(element):
     model = kl.Model(kl.box(cells=(4, 3, 3), element=element), STEEL)
     model.fix("x-")
     model.constrain((40, "y"), {(7, "x"): 0.5, (45, "z"): 2.0})
+    model.constrain((50, "x"), {(3, "y"): 2.0})  # of a prescribed one alone: no equation
     groups, nodes = model.element_groups(), np.arange(model.mesh.n_nodes)
     whole = cut.Cut(model.mesh.points, groups, model.supports.constraint_map(nodes), 3)
+    assert whole.held[50].tolist() == [True, False, False]
+    assert not whole.held[40].any()
     assert np.array_equal(np.sort(np.concatenate(whole.own)), np.flatnonzero(~whole.held.all(axis=1)))
     K = model.matrices().K.toarray().reshape(len(nodes), 3, -1, 3)
     dependents = []

@@ -654,6 +654,18 @@ MUTATIONS = [
         "w - height * slope, w + height * slope",
         PLATE,
     ),
+    # ---- dependents of prescribed and of free degrees of freedom over ranks
+    *(
+        Mutation("distributed/cut.py", old, new, "tests/distributed/test_cut.py -k own_nodes")
+        for old, new in (
+            ("self.held.flat[self._dependents[0]] = False", "pass"),
+            (
+                "self.held = ~self.free",
+                "self.held = ~self.free & (self.free.any(axis=1, keepdims=True) == 0)",
+            ),
+            ("constraints.free[entries.col[chosen]]", "entries.col[chosen]"),
+        )
+    ),
     # ---- the plan of solution: both sides of each threshold
     *(
         Mutation("solvers/plan.py", old, new, "tests/solvers/test_plan.py")
