@@ -659,10 +659,6 @@ MUTATIONS = [
         Mutation("distributed/cut.py", old, new, "tests/distributed/test_cut.py -k own_nodes")
         for old, new in (
             ("self.held.flat[self._dependents[0]] = False", "pass"),
-            (
-                "self.held = ~self.free",
-                "self.held = ~self.free & (self.free.any(axis=1, keepdims=True) == 0)",
-            ),
             ("constraints.free[entries.col[chosen]]", "entries.col[chosen]"),
         )
     ),
