@@ -1,5 +1,7 @@
 """Solve a problem by kratos_lite and by the reference, and measure how far apart they are."""
 
+import itertools
+
 import numpy as np
 
 import kratos_lite as kl
@@ -22,16 +24,11 @@ def material_of(C, density, constants):
 
 def model_of(problem):
     """Return the problem as a model, with one block for each run of cells of a kind."""
-    blocks, start = [], 0
-    for e, cell in enumerate([*problem.cells, (0, (), 0)]):
-        if e and cell[0] != problem.cells[start][0]:
-            part = problem.cells[start:e]
-            name = f"KinematicLinear3D{part[0][0]}N"
-            ids = np.arange(start + 1, e + 1)
-            nodes = np.array([nodes for _, nodes, _ in part], dtype=np.int32)
-            properties = np.array([material + 1 for _, _, material in part])
-            blocks.append(kl.Block(name, nodes, ids, properties, kl.ELEMENTS[name].shape))
-            start = e
+    blocks, number = [], itertools.count(1)
+    for kind, cells in itertools.groupby(problem.cells, key=lambda cell: cell[0]):
+        _, nodes, materials = zip(*cells, strict=True)
+        ids = [next(number) for _ in nodes]
+        blocks.append(kl.Block(f"KinematicLinear3D{kind}N", nodes, ids, np.array(materials) + 1))
     used = {material for _, _, material in problem.cells}
     materials = {number + 1: material_of(*problem.materials[number]) for number in used}
     model = kl.Model(kl.Mesh(problem.points, blocks), materials)

@@ -74,16 +74,8 @@ def random_kinds(rng, boxes, order):
     kinds = {box: str(rng.choice(names)) for box in boxes}
     for box in boxes:
         for side in range(6):
-            other = neighbor(box, side)
-            if (
-                other in kinds
-                and split(kinds[box], side) != split(kinds[other], side)
-                and "center"
-                not in (
-                    kinds[box],
-                    kinds[other],
-                )
-            ):
+            other = kinds.get(neighbor(box, side), "center")
+            if "center" not in (kinds[box], other) and split(kinds[box], side) != split(other, side):
                 kinds[box] = "center"
     return kinds
 
@@ -113,8 +105,8 @@ def fill(points, cells, corners, kind, box, kinds):
             low, high = min(face), max(face)
             others = [i for i in face if i not in (low, high)]
             for other in others:
-                cells.append((4, oriented(points, corners[low], corners[high], corners[other], corners)))
-                cells[-1] = (4, (*cells[-1][1], center))
+                face_nodes = oriented(points, corners[low], corners[high], corners[other], corners)
+                cells.append((4, (*face_nodes, center)))
         else:
             cells.append((5, (a, b, c, d, center)))
     return np.vstack([points, points[corners].mean(axis=0)])

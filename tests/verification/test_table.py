@@ -82,6 +82,8 @@ BEAM = {
     10: ((0.993, 0.962, 0.957), (0.994, 0.945, 0.943), (0.994, 0.951, 0.945)),
 }
 """Displacement of the end / truth, by an independent program: extension, in plane, out of plane."""
+DIGITS = 1.1e-3
+"""Two roundings: that program tells three digits after the point, the page four in all."""
 
 
 @pytest.mark.parametrize("nodes", sorted(BEAM))
@@ -91,14 +93,14 @@ def test_straight_cantilevers_agree_with_an_independent_program(nodes):
             f"macneal_harder/straight_{form}_{load}" for load in ("extension", "in_plane", "out_of_plane")
         ]
         ratios = [value_ratio(name, f"KinematicLinear3D{nodes}N") for name in names]
-        np.testing.assert_allclose(ratios, wanted, rtol=0, atol=0.0006)
+        np.testing.assert_allclose(ratios, wanted, rtol=0, atol=DIGITS)
 
 
 def test_bricks_in_the_thick_cylinder_agree_with_an_independent_program():
     flat = np.sin(np.radians(10)) / np.radians(10)  # the pressure of 8-node bricks acts on plane faces
     for nu, wanted in ((0.3, (0.9908, 0.9996, 0.9998)), (0.4999, (0.0534, 0.8793, 0.8793))):
         ratios = [value_ratio(f"pressure/thick_cylinder_{nu}", f"KinematicLinear3D{n}N") for n in (8, 20, 27)]
-        assert ratios == pytest.approx(np.array(wanted) * (flat, 1, 1), abs=5e-4)
+        assert ratios == pytest.approx(np.array(wanted) * (flat, 1, 1), abs=DIGITS)
 
 
 @pytest.mark.parametrize(
