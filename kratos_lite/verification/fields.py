@@ -33,47 +33,28 @@ def gradient(field: Field, X: Array) -> Array:
 # ---- S2, manufactured ------------------------------------------------------------------------------
 
 
-def _sine(t: Array) -> tuple[Array, Array, Array]:
-    """Return sin πt and its first two derivatives."""
-    s, c = np.sin(np.pi * t), np.cos(np.pi * t)
-    return s, np.pi * c, -(np.pi**2) * s
-
-
-def _bump(t: Array) -> tuple[Array, Array, Array]:
-    """Return t (1 - t) and its first two derivatives."""
-    return t * (1 - t), 1 - 2 * t, np.full_like(t, -2.0)
-
-
-def _factors(X: Array) -> list[list[tuple[Array, Array, Array]]]:
-    """Return for each component its three factors f(x), g(y), h(z) with their derivatives."""
-    x, y, z = np.moveaxis(X, -1, 0)
-    ex = np.exp(x)
-    return [
-        [_sine(x), _sine(y), _sine(z)],
-        [_sine(x), _sine(y), _bump(z)],
-        [(ex, ex, ex), _bump(y), _sine(z)],
-    ]
-
-
-def _derivative(factors: list[tuple[Array, Array, Array]], orders: Array) -> Array:
-    return factors[0][orders[0]] * factors[1][orders[1]] * factors[2][orders[2]]
-
-
 def manufactured(X: Array) -> Array:
     """Return (s s s, s s z(1-z), e^x y(1-y) s) with s = sin πt."""
-    return np.stack([f[0][0] * f[1][0] * f[2][0] for f in _factors(X)], axis=-1)
+    x, y, z = np.moveaxis(X, -1, 0)
+    sx, sy, sz = (np.sin(np.pi * t) for t in (x, y, z))
+    return np.stack([sx * sy * sz, sx * sy * z * (1 - z), np.exp(x) * y * (1 - y) * sz], axis=-1)
 
 
 def manufactured_force(X: Array, E: float, nu: float) -> Array:
     """Return the body force -(λ + μ) ∇ div u - μ Δu in N/m³ that makes `manufactured` exact."""
-    lam, mu = lame(E, nu)
-    parts, axes = _factors(X), np.eye(3, dtype=int)
-    force = []
-    for i in range(3):
-        div = sum(_derivative(parts[k], axes[k] + axes[i]) for k in range(3))
-        laplace = sum(_derivative(parts[i], 2 * axes[j]) for j in range(3))
-        force.append(-(lam + mu) * div - mu * laplace)
-    return np.stack(force, axis=-1)
+    (lam, mu), pi = lame(E, nu), np.pi
+    x, y, z = np.moveaxis(X, -1, 0)
+    (sx, sy, sz), (cx, cy, cz) = ([of(pi * t) for t in (x, y, z)] for of in (np.sin, np.cos))
+    u, v, w = np.moveaxis(manufactured(X), -1, 0)
+    e, q = np.exp(x), z * (1 - z)
+    # div u = π cx sy sz + π sx cy q + π e y (1 - y) cz
+    grad_div = [
+        pi**2 * (cx * cy * q - u) + pi * e * y * (1 - y) * cz,
+        pi**2 * (cx * cy * sz - v) + pi * e * (1 - 2 * y) * cz,
+        pi**2 * (cx * sy * cz - w) + pi * sx * cy * (1 - 2 * z),
+    ]
+    laplacian = [-3 * pi**2 * u, -2 * pi**2 * v - 2 * sx * sy, (1 - pi**2) * w - 2 * e * sz]
+    return np.asarray(-(lam + mu) * np.stack(grad_div, axis=-1) - mu * np.stack(laplacian, axis=-1))
 
 
 # ---- S3, S5, S7, S8 ---------------------------------------------------------------------------------
