@@ -9,7 +9,7 @@ from typing import Any
 
 from sphinx.util.docutils import SphinxDirective
 
-from kratos_lite.cli.options import EXIT_CODES, build_parser
+from kratos_lite.cli.parser import EXIT_CODES, build_parser
 
 
 def setup(app: Any) -> dict[str, bool]:

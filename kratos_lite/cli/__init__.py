@@ -11,7 +11,8 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 
-from kratos_lite.cli.options import build_parser, with_values
+from kratos_lite.cli import commands
+from kratos_lite.cli.parser import build_parser, with_values
 from kratos_lite.cli.ranks import share
 
 EXIT_BAD_INPUT, EXIT_INTERNAL, EXIT_INTERRUPTED = 2, 1, 130
@@ -73,15 +74,6 @@ def _run(words: Sequence[str]) -> int:
     options.rest = rest
     if rest and options.command != "bench":
         parser.refuse(options.command, rest)
-    from kratos_lite.cli import commands
-    from kratos_lite.errors import InputError
-
-    if getattr(options, "backend", None) == "petsc":
-        from kratos_lite.cli.apply_options import refuse_serial_options  # `info` does without it
-
-        refuse_serial_options(options)
-    elif getattr(options, "petsc", None) is not None:
-        raise InputError("--petsc belongs to --backend petsc; add that, too")
     code = int(getattr(commands, options.command)(options))
     if sys.stdout:
         sys.stdout.flush()  # a full disk shows here rather than after the end of the program

@@ -1,16 +1,17 @@
-"""What each command does."""
+"""What each command does; the help shows the docstrings, a line and examples."""
 
 from __future__ import annotations
 
 import os
 import sys
 from argparse import Namespace
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from kratos_lite.cli.progress import shown
+from kratos_lite.cli.options import only, read_values
 from kratos_lite.errors import InputError, ModelError, SolveError
 
 if TYPE_CHECKING:
@@ -24,14 +25,9 @@ ROOT = Path(__file__).resolve().parents[2]
 """The source checkout, if the package is used from one."""
 
 
-def solve(options: Namespace) -> int:
-    """Run what an input and the options describe, print the summary, write the requested files."""
-    use_threads(options.threads)
-    return _within_numbers(_solve, options, perf_counter())
-
-
-def _within_numbers(action: Callable[..., int], options: Namespace, *more: Any) -> int:
-    """Do something with an input; an overflow or NaN becomes a readable error."""
+@contextmanager
+def _within_numbers(options: Namespace) -> Iterator[None]:
+    """Find the input and do something with it; an overflow or NaN becomes a readable error."""
     import numpy as np
 
     from kratos_lite.io.formats import input_file
@@ -39,7 +35,7 @@ def _within_numbers(action: Callable[..., int], options: Namespace, *more: Any) 
     options.input = str(input_file(options.input))
     try:
         with np.errstate(over="raise", invalid="raise", divide="raise"):
-            return action(options, *more)
+            yield
     except (FloatingPointError, OverflowError):
         raise SolveError(
             f"{options.input}: numbers exceed what a computer holds (1.8e308); "
@@ -47,48 +43,68 @@ def _within_numbers(action: Callable[..., int], options: Namespace, *more: Any) 
         ) from None
 
 
-def use_threads(count: int | None) -> None:
-    """Tell the kernels, which are loaded later, how many threads to use."""
-    if count is not None:
-        if count < 1:
-            raise InputError(f"--threads {count}: a number of threads, 1 or more, is needed")
-        os.environ["KRATOS_LITE_THREADS"] = str(count)
+def solve(options: Namespace) -> int:
+    """Solve what a file describes, at rest or in time, and print a summary.
 
-
-def _solve(options: Namespace, clock: float) -> int:
-    from kratos_lite.cli.apply_options import case_of
-    from kratos_lite.cli.ranks import part_files_of, solve_parts
-    from kratos_lite.io.run import run
-    from kratos_lite.solvers.direct import reserve_buffers
-
-    reserve_buffers()
-    seconds = {"import": perf_counter() - clock}
+    kratos-lite solve examples/cantilever --json result.json
+    kratos-lite solve wheel.mdpa --fix hub:xyz --rotation z:30 --picture wheel.png
+    kratos-lite solve bridge.mdpa --modes 10 -o modes.pvd --picture modes.png
+    kratos-lite solve tower.mdpa --fix z-:xyz --traction z+:1e4,0,0 --time 1e-3:500:10 -o swing.pvd
+    kratos-lite solve examples/bodies/thrown_box.py -o out/box.pvd -o out/box.csv --picture out/box.png
+    kratos-lite solve box.py --steps 500 -o second.csv --restart half.npz
+    mpirun -n 4 kratos-lite solve bridge.mdpa --backend petsc -o bridge.pvtu
+    kratos-lite solve part.msh --material E=2e11,nu=0.3 --fix base:xyz --traction top:0,0,-1e5 -o part.vtu
+    """
     clock = perf_counter()
-    if part_files_of(options):
-        summary, written = solve_parts(options)
-        _print([] if options.quiet else [*summary, *(f"{'written':<22}{path}" for path in written)])
-        return 0
-    with shown("read", options.progress) as progress:
-        case = case_of(options)
-        seconds["read"] = perf_counter() - clock
-        outcome = run(case, progress)
-    if outcome.result is not None:
-        outcome.result.report.seconds = {**seconds, **outcome.result.report.seconds}
-    try:  # a file that fails loses no summary, and a terminal that fails loses no file
-        with shown("evaluate", options.progress):
-            summary = [] if options.quiet else outcome.summary(verbose=options.verbose)
-        _print(summary)
-    except OSError:
-        _write(outcome, options)
-        raise
-    return _write(outcome, options)
+    _read_options(options)
+    with _within_numbers(options):
+        from kratos_lite.cli.apply_options import case_of
+        from kratos_lite.cli.ranks import part_files_of, solve_parts
+        from kratos_lite.io.run import run
+        from kratos_lite.solvers.direct import reserve_buffers
+        from kratos_lite.view.progress import in_terminal
+
+        reserve_buffers()
+        seconds = {"import": perf_counter() - clock}
+        clock = perf_counter()
+        if part_files_of(options):
+            summary, written = solve_parts(options)
+            _print([] if options.quiet else [*summary, *map(_written, written)])
+            return 0
+        with in_terminal("read", options.progress) as progress:
+            case = case_of(options)
+            seconds["read"] = perf_counter() - clock
+            outcome = run(case, progress)
+        if outcome.result is not None:
+            outcome.result.report.seconds = {**seconds, **outcome.result.report.seconds}
+        try:  # a file that fails loses no summary, and a terminal that fails loses no file
+            with in_terminal("evaluate", options.progress):
+                summary = [] if options.quiet else outcome.summary(verbose=options.verbose)
+            _print(summary)
+        except OSError:
+            _write(outcome, options)
+            raise
+        return _write(outcome, options)
+
+
+def _read_options(options: Namespace) -> None:
+    """Read the values of options, and tell the kernels, which are loaded later, how many threads to use."""
+    if options.backend == "petsc":
+        from kratos_lite.cli.apply_options import refuse_serial_options
+
+        refuse_serial_options(options)
+    read_values(options)
+    if options.threads is not None:
+        os.environ["KRATOS_LITE_THREADS"] = str(options.threads)
 
 
 def _write(outcome: Outcome, options: Namespace) -> int:
     """Write what the end gives, compare it with expected values, and say both; return the exit code."""
-    with shown("write", options.progress):
+    from kratos_lite.view.progress import in_terminal
+
+    with in_terminal("write", options.progress):
         written, expected = outcome.write(), outcome.compare()
-    _print([] if options.quiet else [f"{'written':<22}{path}" for path in written])
+    _print([] if options.quiet else list(map(_written, written)))
     _print(expected)
     missed = any(" failed " in line for line in expected)
     report = None if outcome.result is None else outcome.result.report
@@ -97,31 +113,34 @@ def _write(outcome: Outcome, options: Namespace) -> int:
     return EXIT_VALUE_MISSED if missed else 0
 
 
+def _written(path: str) -> str:
+    return f"{'written':<22}{path}"
+
+
 def _print(lines: list[str]) -> None:
     if lines:
-        print("\n".join(lines))
-        if sys.stdout:
-            sys.stdout.flush()
+        print("\n".join(lines), flush=True)
 
 
 def info(options: Namespace) -> int:
-    """Describe a model file; of a run file or script, its case."""
-    return _within_numbers(_info, options)
+    """Describe a file without solving it.
 
+    kratos-lite info beam.mdpa
+    kratos-lite info examples/bodies/pendulum.py
+    """
+    with _within_numbers(options):
+        from kratos_lite.io.formats import ending, read_document
 
-def _info(options: Namespace) -> int:
-    from kratos_lite.io.formats import ending
+        if ending(options.input) in (".json", ".py"):
+            from kratos_lite.io.files import read_case
+            from kratos_lite.io.run import describe_case
 
-    if ending(options.input) in (".json", ".py"):
-        from kratos_lite.io.files import read_case
-        from kratos_lite.io.run import describe_case
+            print(describe_case(read_case(options.input)))
+        else:
+            from kratos_lite.io.describe import describe
 
-        print(describe_case(read_case(options.input, strict=not options.lenient)))
-    else:
-        from kratos_lite.io.describe import describe
-
-        print(describe(_document(options)))
-    return 0
+            print(describe(read_document(options.input, strict=not options.lenient)))
+        return 0
 
 
 def _document(options: Namespace) -> Document:
@@ -146,39 +165,41 @@ def _document(options: Namespace) -> Document:
 
 
 def check(options: Namespace) -> int:
-    """Report what keeps a file from being solved with these options, and what is doubtful."""
-    use_threads(options.threads)
-    return _within_numbers(_check, options)
+    """Report what keeps a file from being solved with these options; or all problems of elements in a .py.
 
+    kratos-lite check beam.mdpa
+    kratos-lite check examples/bodies/thrown_box.py
+    kratos-lite check part.msh --material E=210e9,nu=0.3 --fix bottom:xyz --pressure top:1e5
+    mpirun -n 4 kratos-lite check bridge.mdpa --backend petsc
+    kratos-lite check my_element.py
+    """
+    _read_options(options)
+    with _within_numbers(options):
+        from kratos_lite.cli.apply_options import case_of, refuse
 
-def _check(options: Namespace) -> int:
-    from kratos_lite.cli.apply_options import OF_MODELS, case_of, refuse
+        path = Path(options.input)
+        if path.suffix == ".py":
+            from kratos_lite.io.script import is_script
 
-    path = Path(options.input)
-    if path.suffix == ".py":
-        from kratos_lite.io.script import is_script
-
-        if not is_script(path):
-            refuse(options, OF_MODELS, f"is for models; {path} defines elements and materials")
-            return _check_python(path)
-
-    case = case_of(options)
-    needs, warnings = _needs(case)
-    what = f"{path}: {_what(case)}{f', {case.time}' if case.time else ''}"
-    lines = [f"{what}, {'cannot be solved' if needs else 'no errors'}"]
-    if case.is_of_model and (extent := dict(case.model.mesh.table()).get("extent")):
-        lines.append(f"extent   {extent}")
-    lines += [f"error    {text}" for text in needs]
-    lines += [f"note     {text}" for text in warnings]
-    _print([] if options.quiet else lines)
-    return EXIT_UNSOLVABLE if needs else 0
+            if not is_script(path):
+                refuse(options, only("models"), f"is for models; {path} defines elements and materials")
+                return _check_python(path)
+        case = case_of(options)
+        needs, warnings = _needs(case)
+        what = f"{path}: {_what(case)}{f', {case.time}' if case.time else ''}"
+        lines = [f"{what}, {'cannot be solved' if needs else 'no errors'}"]
+        if case.is_of_model and (extent := dict(case.model.mesh.table()).get("extent")):
+            lines.append(f"extent   {extent}")
+        lines += [f"error    {text}" for text in needs]
+        lines += [f"note     {text}" for text in warnings]
+        _print([] if options.quiet else lines)
+        return EXIT_UNSOLVABLE if needs else 0
 
 
 def _what(case: Case) -> str:
     if not case.is_of_model:
         return f"{case.body.kind} body"
-    mesh = case.model.mesh
-    return f"{mesh.n_nodes} nodes, {mesh.n_elements} elements"
+    return f"{case.model.mesh.n_nodes} nodes, {case.model.mesh.n_elements} elements"
 
 
 def _needs(case: Case) -> tuple[list[str], list[str]]:
@@ -218,21 +239,22 @@ def _check_python(path: Path) -> int:
 
 
 def convert(options: Namespace) -> int:
-    """Convert a file."""
-    return _within_numbers(_convert, options)
+    """Convert a model file to another format.
 
+    kratos-lite convert beam.elem beam.mdpa
+    kratos-lite convert beam.mdpa beam.vtu
+    """
+    with _within_numbers(options):
+        from kratos_lite.io.formats import write_document
+        from kratos_lite.io.outputs import check_targets
 
-def _convert(options: Namespace) -> int:
-    from kratos_lite.io.formats import write_document
-    from kratos_lite.io.outputs import check_targets
-
-    document = _document(options)
-    check_targets([Path(options.input), Path(document.mesh.source)], [options.output])
-    lost = write_document(options.output, document)
-    print(f"{options.output}: {_counts(options.output, document.mesh)}")
-    for text in (*lost, *document.notes):
-        print(f"note     {text}")
-    return 0
+        document = _document(options)
+        check_targets([Path(options.input), Path(document.mesh.source)], [options.output])
+        lost = write_document(options.output, document)
+        print(f"{options.output}: {_counts(options.output, document.mesh)}")
+        for text in (*lost, *document.notes):
+            print(f"note     {text}")
+        return 0
 
 
 def _counts(path: str, mesh: Mesh) -> str:
@@ -247,7 +269,12 @@ def _counts(path: str, mesh: Mesh) -> str:
 
 
 def verify(options: Namespace) -> int:
-    """Compare elements with what is known."""
+    """Compare elements with closed forms and published values.
+
+    kratos-lite verify
+    kratos-lite verify patch macneal_harder --element 3D8N --element 3D20N
+    kratos-lite verify my_element.py -o my_element.md
+    """
     from kratos_lite.cli.verification import run
 
     return run(options)
@@ -262,6 +289,5 @@ def bench(options: Namespace) -> int:
             f"there are no benchmarks in {ROOT}; they come with the source only: "
             "clone the repository and install it with 'pip install -e .'"
         )
-    return subprocess.run(
-        [sys.executable, "-m", "benchmarks", *options.rest], cwd=ROOT, check=False
-    ).returncode
+    words = [sys.executable, "-m", "benchmarks", *options.rest]
+    return subprocess.run(words, cwd=ROOT, check=False).returncode

@@ -1,16 +1,43 @@
-"""The parser of the command line: its errors are short and name what was likely meant."""
+"""The parser of the command line, whose errors are short and name what was likely meant."""
 
 from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Sequence
-from typing import NoReturn
+from collections.abc import Iterable, Sequence
+from typing import Any, NoReturn
 
+from kratos_lite import __version__
+from kratos_lite.cli import commands
+from kratos_lite.cli.options import GROUPS, Option
 from kratos_lite.errors import nearest
 
-COMMANDS = {"march": "solve, with --time STEP:STEPS", "run": "solve"}
-"""Words for which a command of another name does what is likely meant."""
+EXIT_CODES = """exit codes:
+  0    done
+  1    a defect of kratos-lite, or a row of verify that fails
+  2    bad input, or an output that cannot be written
+  3    solved, but an expected value of the run file, or the requested error, is not reached
+  130  interrupted with Ctrl-C; 143 by SIGTERM"""
+MODEL = ".mdpa, an .elem set or its stem, ProjectParameters.json or its folder, or a mesh that meshio reads"
+SCRIPT = "a .py script with a case, or with body, dt and steps"
+TARGET = ".mdpa, .elem, .vtu or any format of meshio, chosen by the extension"
+COMMANDS = {
+    "solve": {"input": f"{MODEL}; or {SCRIPT}"},
+    "info": {"input": f"{MODEL}; or {SCRIPT}"},
+    "check": {"input": f"{MODEL}; {SCRIPT}; or a .py file that defines elements or materials"},
+    "convert": {"input": MODEL, "output": TARGET},
+    "verify": {
+        "names": "problems, families or patterns such as '*cylinder*' (all); .py files of own elements"
+    },
+}
+"""Commands, and what stands behind each without a name."""
+DEBUG = Option("--debug", None, "show the traceback of an error")
+LENIENT = Option("--lenient", None, "accept .mdpa rows that are broken over lines")
+OF_VERIFY = (
+    Option("--element", "NAME", "only this one, such as 3D8N; may be given several times (all)", many=True),
+    Option("-o --output", "OUT", "write the table as .md or .json"),
+    Option("--list", None, "list the problems and their sources instead"),
+)
 
 
 class Formatter(argparse.RawDescriptionHelpFormatter):
@@ -36,11 +63,8 @@ class Parser(argparse.ArgumentParser):
     def _hint(self, message: str) -> str:
         """Return the known choice or command nearest to what is wrong."""
         choice = re.search(r"invalid choice: '([^']*)' \(choose from (.*)\)", message)
-        if not choice:
-            return ""
-        other = COMMANDS.get(choice[1], "") if "COMMAND" in message else ""
-        known = re.findall(r"[\w-]+", choice[2])
-        return f". Did you mean {other}?" if other else f".{nearest(choice[1], known)}".removesuffix(".")
+        known = re.findall(r"[\w-]+", choice[2]) if choice else []
+        return f".{nearest(choice[1], known)}".removesuffix(".") if choice else ""
 
     def refuse(self, command: str, rest: Sequence[str]) -> NoReturn:
         """Say which words a command does not know, what they are near to, and end."""
@@ -56,16 +80,70 @@ class Parser(argparse.ArgumentParser):
     def _unknown(self, command: str, word: str) -> str:
         """Return what an option may mean that a command does not have."""
         name = word.lstrip("-")
-        options = {
-            of: [known[2:] for known in parser._option_string_actions if known.startswith("--")]
-            for of, parser in self._commands().items()
-        }
+        options = {of: [o[2:] for o in p._option_string_actions] for of, p in self._commands().items()}
         homes = [of for of, names in options.items() if name in names]
-        hint = re.sub(r"\b(called|mean|or) ", r"\1 --", nearest(name, options[command]))
+        hint = re.sub(r"\b(called|mean|or) ", r"\1 --", nearest(name, filter(None, options[command])))
         if homes and not hint:
             hint = f" {command} does not take it; {' and '.join(homes)} {'does' if len(homes) == 1 else 'do'}"
-        return f"{word}: there is no such option.{hint}" if not homes else f"{word}:{hint}"
+        return f"{word}:{hint}" if homes else f"{word}: there is no such option.{hint}"
 
     def _commands(self) -> dict[str, Parser]:
         (commands,) = (a for a in self._actions if isinstance(a, argparse._SubParsersAction))
         return dict(commands.choices)
+
+
+def build_parser() -> Parser:
+    """Return the parser of all commands."""
+    description = "Finite elements for solids: from an input file to displacements and stresses."
+    style: dict[str, Any] = {"formatter_class": Formatter}
+    parser = Parser(prog="kratos-lite", description=description, epilog=EXIT_CODES, **style)
+    parser.add_argument("--version", action="version", version=f"kratos-lite {__version__}")
+    case = Parser(add_help=False, **style)
+    for title, options in GROUPS.items():
+        _add(case.add_argument_group(title), options)
+    subparsers = parser.add_subparsers(prog="kratos-lite", dest="command", required=True, metavar="COMMAND")
+    for name, words in COMMANDS.items():
+        text, _, examples = (getattr(commands, name).__doc__ or "").partition("\n\n")
+        command = subparsers.add_parser(
+            name,
+            help=text[:1].lower() + text[1:].rstrip("."),
+            description=text,
+            epilog=f"examples:\n{re.sub('^ *', '  ', examples.strip(), flags=re.M)}",
+            parents=[case] if name in ("solve", "check") else [],
+            **style,
+        )
+        # "-1,0,0" and "-z:30" are values, not options
+        command._negative_number_matcher = re.compile(r"-([\d.]|[xyz]:)")
+        for word, meaning in words.items():
+            command.add_argument(word, help=meaning, nargs="*" if word == "names" else None)
+        _add(command, (*(OF_VERIFY if name == "verify" else [LENIENT]), DEBUG))
+    # All its words, also --help, are for the program that it runs.
+    subparsers.add_parser("bench", help="run the benchmarks of a source checkout", add_help=False)
+    return parser
+
+
+def _add(group: Any, options: Iterable[Option]) -> None:
+    for option in options:
+        settings: dict[str, Any] = {"action": "append", "default": []} if option.many else {}
+        if option.form is None:
+            settings["action"] = "store_true"
+        elif "|" in option.form:
+            settings["choices"] = option.form.split("|")
+        else:
+            settings["metavar"] = option.form
+        group.add_argument(*option.names.split(), help=option.help, **settings)
+
+
+def with_values(words: Sequence[str]) -> list[str]:
+    """Return the words with options of PETSc, which begin with a dash, joined to ``--petsc``.
+
+    >>> with_values(["solve", "a.mdpa", "--petsc", "-ksp_view"])
+    ['solve', 'a.mdpa', '--petsc=-ksp_view']
+    """
+    joined: list[str] = []
+    for word in words:
+        if joined[-1:] == ["--petsc"]:
+            joined[-1] = f"--petsc={word}"
+        else:
+            joined.append(word)
+    return joined

@@ -6,7 +6,7 @@ import os
 from argparse import Namespace
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from kratos_lite.errors import InputError
 
@@ -25,8 +25,6 @@ In the script of a Slurm job, outside srun, there is no SLURM_STEP_NUM_TASKS.
 """
 COMMANDS = ("solve", "check")
 """Commands that ranks share."""
-OF_PARTS = (".pvtu",)
-"""Results that many processes write together."""
 
 
 def launched(environment: Mapping[str, str] | None = None) -> tuple[int, int, int]:
@@ -112,36 +110,29 @@ def solve_parts(options: Namespace) -> tuple[list[str], list[str]]:
     """Let each rank solve its part; return the lines of the summary and the files written."""
     from kratos_lite.distributed.communicator import started
 
-    found: tuple[list[str], list[str]] = started().run(_solve_part, options)
-    return found
+    lines: tuple[list[str], list[str]] = started().run(_solve_part, options)
+    return lines
 
 
 def _solve_part(ranks: Alone, options: Namespace) -> tuple[list[str], list[str]]:
     from kratos_lite.analysis.part_analysis import solve_part
     from kratos_lite.cli.apply_options import case_of
     from kratos_lite.distributed.partition import Partition
+    from kratos_lite.io.outputs import check_outputs
+    from kratos_lite.io.run import check_case
     from kratos_lite.io.runners.outcome import Outcome
     from kratos_lite.io.writers.pieces import write_pieces
 
     with ranks.agree_on_errors():
         case = case_of(options, part=ranks.rank)
-        _check(case)
-    model = case.model
-    given = case.solver, case.tolerance, None, options.petsc
-    result = solve_part(model, Partition(ranks, model.mesh), *given)
+        check_case(case)
+        check_outputs(case)
+        for path in case.outputs.paths():
+            if not path.endswith(".pvtu"):
+                text = "no process has the whole of a mesh in part files; write -o OUT.pvtu"
+                raise InputError(f"{path}: {text}")
+    mesh = case.model.mesh
+    result = solve_part(case.model, Partition(ranks, mesh), case.solver, case.tolerance, None, case.petsc)
     for path in case.outputs.results:
         write_pieces(path, result, case.outputs.mode or "binary")
     return Outcome(case, result.table()).summary(verbose=options.verbose), case.outputs.results
-
-
-def _check(case: Any) -> None:
-    """Raise InputError for what a case in parts cannot have: time, modes, other outputs than pieces."""
-    from kratos_lite.io.outputs import check_outputs
-    from kratos_lite.io.run import check_case
-
-    check_case(case)
-    check_outputs(case)
-    outputs = case.outputs
-    for path in (*outputs.results, outputs.json, outputs.picture):
-        if path is not None and not str(path).endswith(OF_PARTS):
-            raise InputError(f"{path}: no process has the whole of a mesh in part files; write -o OUT.pvtu")

@@ -8,7 +8,6 @@ from contextlib import ExitStack, nullcontext
 from pathlib import Path
 
 from kratos_lite.atomic import write_whole
-from kratos_lite.cli.progress import shown
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.errors import InputError
 from kratos_lite.testing.files import MODULE, REGISTRIES, beside, run_module
@@ -16,6 +15,7 @@ from kratos_lite.verification import page
 from kratos_lite.verification.meshes import short
 from kratos_lite.verification.problem import ELEMENTS, Row
 from kratos_lite.verification.table import chosen, verify
+from kratos_lite.view.progress import in_terminal
 
 EXIT_FAILED = 1
 
@@ -61,7 +61,7 @@ def _printed(names: list[str], elements: list[str]) -> list[Row]:
     width = max([9, *(len(short(name)) + 1 for name in elements or ELEMENTS)])
     print(page.header(width))
     try:
-        with shown() as progress:
+        with in_terminal() as progress:
             for row in verify(names, elements, progress):
                 rows.append(row)
                 if row.failed:

@@ -40,6 +40,16 @@ def watched(progress: Progress | None, phase: str = "") -> Iterator[Progress | N
         yield line
 
 
+@contextmanager
+def in_terminal(phase: str = "", always: bool = False) -> Iterator[Line | None]:
+    """Give a line that shows progress where standard error is a terminal, or `always`; None elsewhere."""
+    if not (always or sys.stderr.isatty()):
+        yield None
+        return
+    with Line(Terminal(), phase, patience=0.0 if always else PATIENCE) as line:
+        yield line
+
+
 def _of_notebook() -> Callable[[str], None] | None:
     """Return what writes a line in a notebook or in an IPython terminal, or None outside of both."""
     shell = getattr(sys.modules["IPython"], "get_ipython", lambda: None)()

@@ -233,7 +233,7 @@ def test_bad_targets_are_refused_before_the_run(run, folder):
     assert run("solve", "box.py", "-o", "o.vtu").refuses("o.vtu: states in time are written")
     assert run("solve", "box.py", "--state", "o.csv").refuses("o.csv: the ending must be .npz")
     assert run("solve", "box.py", "-o", "o.npz", "--state", "o.npz").refuses("another output")
-    assert run("solve", "box.py", "--steps", "0").refuses("--steps must be a whole number ≥ 1; got 0")
+    assert run("solve", "box.py", "--steps", "0").refuses("--steps: a whole number ≥ 1 is needed; got '0'")
     assert names(folder) == ["box.py"]
 
 

@@ -30,7 +30,6 @@ GUST = Path(__file__).parents[2] / "examples" / "tower" / "gust.py"
         (["solve", "a.json", "--gravity", "0", "0", "-9.81"], "joined by commas, as in --gravity 0,0,-9.81"),
         (["solve", "a.json", "b.json"], "'b.json' is one word too many"),
         (["convert", "a.mdpa", "b.vtu", "--lenent"], "Did you mean --lenient?"),
-        (["march", "a.json"], "Did you mean solve, with --time STEP:STEPS?"),
         (["slove", "a.json"], "Did you mean solve?"),
         (["solve", "a.json", "--solver", "direkt"], "Did you mean direct?"),
     ],

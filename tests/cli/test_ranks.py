@@ -52,7 +52,9 @@ def test_other_commands_do_not_mind_copies(beam, run, monkeypatch):
 
 
 def test_options_of_petsc_belong_to_the_backend(beam, run):
-    assert run("solve", "beam.mdpa", "--petsc", "-ksp_view").refuses("--petsc belongs to --backend petsc")
+    assert run("solve", "beam.mdpa", "--petsc", "-ksp_view").refuses(
+        "--petsc belongs to --backend; give that too"
+    )
 
 
 @pytest.mark.parametrize(
