@@ -114,18 +114,15 @@ def drawn_points(scene: Scene, subject: Subject) -> Array:
 
 
 def factor_of(subjects: Sequence[Subject], wanted: float | None) -> float:
-    """Return the factor on displacements: by default at least 1, the largest being a tenth of the body."""
+    """Return the factor on displacements: by default 1, 2 or 5 times a power of ten, at least 1.
+
+    With it the largest displacement is at most a tenth of the body.
+    """
     if wanted is not None:
         return wanted
-    return min(
-        (exaggeration(s.mesh.points, s.u) for s in subjects if s.u is not None and s.u.any()), default=1.0
-    )
-
-
-def exaggeration(X: Array, u: Array) -> float:
-    """Return 1, 2 or 5 times a power of ten, at least 1, that makes the displacement a tenth of the body."""
-    wanted = 0.1 * np.linalg.norm(np.ptp(X, axis=0)) / np.linalg.norm(u, axis=1).max()
-    return max(1.0, rounded(float(wanted)))
+    moved = [(s.mesh.points, s.u) for s in subjects if s.u is not None and s.u.any()]
+    tenths = [0.1 * np.linalg.norm(np.ptp(X, axis=0)) / np.linalg.norm(u, axis=1).max() for X, u in moved]
+    return min((max(1.0, rounded(float(tenth))) for tenth in tenths), default=1.0)
 
 
 def colors_of(subjects: Sequence[Subject], clim: tuple[float, float] | None) -> Any:

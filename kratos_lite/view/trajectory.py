@@ -47,7 +47,8 @@ def trajectory_figure(path: Path, view: View | None, title: str, size: tuple[flo
     figure, (axes,), inch = fitted(
         window[1] - window[0], np.ones(2), size, lambda inch: _laid_out(path, rows, window, inch, title)
     )
-    for strength, x, marks in zip(_strengths(path), path.positions, path.marks, strict=True):
+    strengths = np.linspace(1, FADED, len(path.positions))[::-1].tolist()
+    for strength, x, marks in zip(strengths, path.positions, path.marks, strict=True):
         facets = facets_of(path.mesh, x, None, rows, most=MANY // len(path.positions))
         ink = (*INK[:3], INK[3] * strength)
         draw_facets(axes, rows, facets, colored(facets, strength=strength), ink).set_clip_on(False)
@@ -55,11 +56,6 @@ def trajectory_figure(path: Path, view: View | None, title: str, size: tuple[flo
     axes.plot(*(path.centers @ rows[:2].T).T, color=PATH, lw=1.2, zorder=3)
     axes.plot(*(path.centers[[0, -1]] @ rows[:2].T).T, ".", color=PATH, ms=6, zorder=3)
     return figure
-
-
-def _strengths(path: Path) -> list[float]:
-    count = len(path.positions)
-    return [float(s) for s in np.linspace(FADED, 1, count)] if count > 1 else [1.0]
 
 
 def _laid_out(

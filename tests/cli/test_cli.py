@@ -1,6 +1,5 @@
 """The command line as a person uses it: commands, options, files in and out, and what goes wrong."""
 
-import gzip
 import io
 import json
 import os
@@ -97,38 +96,12 @@ def test_gravity_cube_from_the_shell(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["cube.json", "cube.vtu"]
 
 
-def test_vtu_holds_the_fields_under_their_names(run, folder):
-    meshio = pytest.importorskip("meshio")
-    assert run("solve", GRAVITY_CUBE, "-o", "cube.vtu", "-q").code == 0
-    found = meshio.read("cube.vtu")
-    assert found.point_data["DISPLACEMENT"][:, 2].min() == pytest.approx(-SINKS, rel=1e-12)
-    fields = {"REACTION", "CAUCHY_STRESS_VECTOR", "VON_MISES_STRESS", "NODE_ID"}
-    assert fields <= found.point_data.keys()
-    assert {"CAUCHY_STRESS_VECTOR", "VON_MISES_STRESS", "ELEMENT_ID"} <= found.cell_data.keys()
-
-
-def test_picture_is_a_png(run, folder):
+def test_a_picture_and_numbers_of_a_vtu_file_stored_as_asked(run, folder):
     pytest.importorskip("matplotlib")
-    done = run("solve", GRAVITY_CUBE, "--picture", "cube.png")
-    assert done.code == 0
-    assert "written               cube.png" in done.out
+    done = run("solve", GRAVITY_CUBE, "-q", "-o", "cube.vtu", "--vtu", "ascii", "--picture", "cube.png")
+    assert (done.code, done.out, done.err) == (0, "", "")
+    assert b'format="ascii"' in Path("cube.vtu").read_bytes()
     assert Path("cube.png").read_bytes().startswith(b"\x89PNG")
-
-
-@pytest.mark.parametrize("mode", ["binary", "compressed", "ascii"])
-def test_numbers_of_a_vtu_file_are_stored_as_asked(run, folder, mode):
-    run("solve", GRAVITY_CUBE, "-q", "-o", "plain.vtu", "--json", "cube.json")
-    assert run("solve", GRAVITY_CUBE, "-q", "-o", "cube.vtu", "--vtu", mode).code == 0
-    content = Path("cube.vtu").read_bytes()
-    assert (b"compressor=" in content, b'format="ascii"' in content) == (
-        mode == "compressed",
-        mode == "ascii",
-    )
-    assert (content == Path("plain.vtu").read_bytes()) == (mode == "binary")
-    meshio = pytest.importorskip("meshio")
-    np.testing.assert_array_equal(
-        meshio.read("cube.vtu").point_data["DISPLACEMENT"], displacement("cube.json")
-    )
 
 
 def test_a_mode_of_vtu_files_needs_such_a_file(run, folder):
@@ -158,18 +131,6 @@ def test_bench_runs_the_benchmarks_of_the_checkout_with_all_words(run, folder, m
     )
     assert run("bench", "run", "--cells", "3", "--help", "-q").code == 5
     assert Path("said").read_text() == "['run', '--cells', '3', '--help', '-q']"
-
-
-def test_unknown_options_of_other_commands_are_refused(run, folder):
-    done = run("info", GRAVITY_CUBE, "--cells")
-    assert done.code == 2
-    assert done.err.splitlines()[0] == "error: --cells: there is no such option."
-
-
-def test_quiet_prints_nothing(run, folder):
-    done = run("solve", GRAVITY_CUBE, "-q", "--json", "cube.json")
-    assert (done.code, done.out, done.err) == (0, "", "")
-    assert displacement("cube.json")[:, 2].min() == pytest.approx(-SINKS, rel=1e-12)
 
 
 @pytest.mark.parametrize("ending", ["vtu", "msh", "mdpa"])
@@ -204,47 +165,24 @@ def test_material_by_property_and_by_law(run, box):
     assert same(displacement("out.json"), model.solve().displacement())
 
 
-@pytest.mark.parametrize("solver", ["auto", "dense", "direct", "amg"])
-def test_all_solvers_agree(run, box, solver):
-    words = ["--gravity", "0,0,-9.81", "--solver", solver, "--tolerance", "1e-12", "--json", "out.json"]
-    assert run("solve", "box.vtu", *HELD, *words).code == 0
+def test_elem_set_by_any_of_its_files_or_its_stem(run, box):
     model = held(box)
     model.add(kl.Gravity((0.0, 0.0, -9.81)))
-    assert same(displacement("out.json"), model.solve().displacement(), 1e-9)
+    kl.write("set.elem", model)
+    for name in ("set", "set.elem", "set.node"):
+        assert run("solve", name, "--json", "set.json").code == 0
+        assert same(displacement("set.json"), model.solve().displacement())
 
 
-def test_elem_set_by_hand_by_any_of_its_files_or_its_stem(run, folder):
-    X = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
-    rows = ", ".join(f"[{i}, {x}, {y}, {z}]" for i, (x, y, z) in enumerate(X, start=1))
-    Path("tet.node").write_text(f"NODES = NodesList([{rows}])\n")
-    Path("tet.elem").write_text("ELEMENTS[1] = KinematicLinear3D4N([1,2,3,4],1);\n")
-    Path("tet.prop").write_text(
-        "PROPERTIES[1][DENSITY] = 1200.0;\nPROPERTIES[1][YOUNG_MODULUS] = 1e6;\n"
-        "PROPERTIES[1][POISSON_RATIO] = 0.25;\nPROPERTIES[1][GRAVITY] = [0, 0, -10];\n"
-    )
-    fixed = [f"NODES[{n}].Fix(DISPLACEMENT_{axis});\n" for n in (1, 2, 3) for axis in "XYZ"]
-    Path("tet.cond").write_text("".join(fixed))
-    Path("tet.init").write_text("")
-    weight = 1200 * 10 / 6
-    for name in ("tet", "tet.elem", "tet.node"):
-        done = run("solve", name, "--json", "tet.json")
-        assert (done.code, done.err) == (0, "")
-        found = json.loads(Path("tet.json").read_text())
-        assert found["total_load"][2] == pytest.approx(-weight, rel=1e-12)
-        # K_zz of the apex is (λ + 2μ) V = 1.2e6 / 6 with λ = μ = 0.4e6; it carries a quarter of the weight.
-        assert found["displacement"]["4"][2] == pytest.approx(-weight / 4 / (1.2e6 / 6), rel=1e-12)
-
-
-@pytest.mark.parametrize("word", ["standard", "enhanced", "b_bar", "non_locking"])
-def test_the_formulation_of_the_elements_is_an_option(run, box, word):
-    words = ["--traction", "z+:1e5,0,0", "--formulation", word, "--json", "out.json"]
+def test_the_formulation_of_the_elements_is_an_option(run, box):
+    words = ["--traction", "z+:1e5,0,0", "--formulation", "b_bar", "--json", "out.json"]
     assert run("solve", "box.vtu", *HELD, *words).code == 0
-    model = kl.Model(box, LAW, formulation=word)
+    model = kl.Model(box, LAW, formulation="b_bar")
     model.fix("z-")
     model.add(kl.Traction("z+", (1e5, 0.0, 0.0)))
     assert same(displacement("out.json"), model.solve().displacement())
     found = json.loads(Path("out.json").read_text())
-    assert found["formulation"].startswith(f"{word}, as asked for: ")
+    assert found["formulation"].startswith("b_bar, as asked for: ")
 
 
 SCRIPT = """import kratos_lite as kl
@@ -287,13 +225,6 @@ def test_options_win_over_the_script(run, box):
     assert not Path("file.json").exists()
 
 
-def test_gzipped_input(run, folder):
-    Path("cube.mdpa.gz").write_bytes(gzip.compress(GRAVITY_CUBE.read_bytes()))
-    done = run("solve", "cube.mdpa.gz", "--json", "cube.json")
-    assert (done.code, done.err) == (0, "")
-    assert displacement("cube.json")[:, 2].min() == pytest.approx(-SINKS, rel=1e-12)
-
-
 def test_broken_rows_are_read_when_asked_for(run, folder):
     text = GRAVITY_CUBE.read_text().replace("    1 0 0 0\n", "    1 0 0\n    0\n")
     Path("broken.mdpa").write_text(text)
@@ -314,13 +245,6 @@ def test_info_tells_what_is_in_a_file(run, folder):
         "DENSITY 7620, YOUNG_MODULUS 2.1e+08, POISSON_RATIO 0.3, VOLUME_ACCELERATION [0, 0, -9.81] (line 6)",
     ):
         assert text in done.out
-
-
-def test_check_of_a_good_file(run, folder):
-    done = run("check", GRAVITY_CUBE)
-    assert (done.code, done.err) == (0, "")
-    assert done.out.splitlines()[0] == f"{GRAVITY_CUBE}: 125 nodes, 64 elements, no errors"
-    assert "error" not in done.out.replace("no errors", "")
 
 
 def test_check_tells_warnings_and_what_is_missing(run, folder):
@@ -385,7 +309,6 @@ def test_check_ends_with_2_where_solve_does_and_says_the_same(run, box, command,
     assert said in done.out + done.err
 
 
-@pytest.mark.parametrize("command", ["check", "solve"])
 @pytest.mark.parametrize(
     ("name", "slip", "line"),
     [
@@ -395,17 +318,11 @@ def test_check_ends_with_2_where_solve_does_and_says_the_same(run, box, command,
         ("DENSITY", "DENSTY", 7),
     ],
 )
-def test_a_misspelt_variable_of_a_file_is_named_with_the_right_word(run, folder, command, name, slip, line):
+def test_a_misspelt_variable_of_a_file_is_named_with_the_right_word(run, folder, name, slip, line):
     Path("cube.mdpa").write_text(GRAVITY_CUBE.read_text().replace(name, slip))
-    assert run(command, "cube.mdpa").refuses(
+    assert run("check", "cube.mdpa").refuses(
         f"cube.mdpa:{line}: unknown variable {slip}. Did you mean {name}?"
     )
-
-
-def test_all_misspelt_variables_are_named_at_once(run, folder):
-    text = GRAVITY_CUBE.read_text().replace("DENSITY", "density").replace("DISPLACEMENT_Z", "DISPLACEMENTZ")
-    Path("cube.mdpa").write_text(text)
-    assert run("check", "cube.mdpa").refuses("mean DENSITY?\n", "mean DISPLACEMENT_Z?")
 
 
 def test_a_variable_of_another_application_is_a_note(run, folder):
@@ -494,8 +411,11 @@ def test_help_of_each_command_shows_an_example(run, command):
     assert f"examples:\n  kratos-lite {command} " in done.out
 
 
-def test_help_tells_the_exit_codes(run):
+def test_help_tells_commands_and_exit_codes(run):
     told = run("--help").out
+    assert run("--version").out == f"kratos-lite {kl.__version__}\n"
+    for command in COMMANDS:
+        assert f"\n    {command} " in told
     for line in ("0    done", "1    a defect", "2    bad input", "3    solved, but", "130  interrupted"):
         assert f"\n  {line}" in told
 
@@ -508,14 +428,6 @@ def test_a_terminal_that_knows_ascii_only_shows_codes(box):
     done = process("solve", "--help", env=ascii_only)
     assert (done.returncode, done.stderr) == (0, "")
     assert "m/s\\xb2" in done.stdout
-
-
-def test_help_names_all_commands_and_version_is_told(run):
-    told = run("--help")
-    assert told.code == 0
-    for command in COMMANDS:
-        assert f"\n    {command} " in told.out
-    assert run("--version").out == f"kratos-lite {kl.__version__}\n"
 
 
 # ---- what goes wrong -------------------------------------------------------------------------------
@@ -725,13 +637,7 @@ def test_a_folder_without_permission_is_refused(run, box):
     assert run("solve", "box.vtu", *HELD, "-o", "shut/out.vtu").refuses("shut/out.vtu: cannot be written")
 
 
-def test_debug_shows_where_an_error_came_from(box):
-    done = process("solve", "none.mdpa", "--debug")
-    assert done.returncode == 1
-    assert "Traceback" in done.stderr
-
-
-@pytest.mark.parametrize("command", [("solve", *HELD), ("info",), ("check",)], ids=lambda words: words[0])
+@pytest.mark.parametrize("command", [("solve", *HELD), ("info",)], ids=lambda words: words[0])
 def test_a_full_disk_behind_the_output_is_an_error_in_one_line(box, command):
     if not Path("/dev/full").exists():
         pytest.skip("no /dev/full on this system")
@@ -787,14 +693,6 @@ def test_the_material_of_a_part_wins_in_either_order(run, box):
     first, second, alone = (displacement(f"{number}.json") for number in range(3))
     assert np.array_equal(first, second)
     assert np.array_equal(first, alone)
-
-
-def test_a_conversion_counts_what_is_in_the_file(run, box):
-    assert run("convert", "box.mdpa", "a.mdpa").out.startswith("a.mdpa: 27 nodes, 8 elements, 6 parts\n")
-    for name in ("a.elem", "a.vtu"):
-        done = run("convert", "box.mdpa", name)
-        assert done.out.startswith(f"{name}: 27 nodes, 8 elements\n")
-        assert "left out: " in done.out
 
 
 def test_a_mesh_in_mm_is_scaled(run, box):
@@ -994,7 +892,7 @@ def test_every_bad_file_is_in_a_table(malformed):
 @pytest.mark.parametrize("name", ACCEPTED)
 @pytest.mark.parametrize(
     "words",
-    [["solve", "--fix", "z-:xyz"], ["check", "--fix", "z-:xyz"], ["info"]],
+    [["solve", "--fix", "z-:xyz"], ["info"]],
     ids=lambda words: words[0],
 )
 def test_an_odd_file_that_can_be_read_is_read(run, bad, name, words):
@@ -1007,9 +905,8 @@ def test_an_odd_file_that_can_be_read_is_read(run, bad, name, words):
 
 
 @pytest.mark.parametrize("name", REFUSED | DESCRIBED)
-@pytest.mark.parametrize("words", [["solve", "--fix", "z-:xyz"], ["check"]], ids=lambda words: words[0])
-def test_a_bad_file_is_refused_with_place_and_cause(run, bad, name, words):
-    assert run(*words, bad / name).refuses(name, (REFUSED | DESCRIBED)[name])
+def test_a_bad_file_is_refused_with_place_and_cause(run, bad, name):
+    assert run("check", bad / name).refuses(name, (REFUSED | DESCRIBED)[name])
 
 
 @pytest.mark.parametrize("name", REFUSED)
@@ -1022,12 +919,6 @@ def test_a_file_that_means_nonsense_is_described(run, bad, name):
     done = run("info", bad / name)
     assert (done.code, done.err) == (0, "")
     assert "nodes       8\n" in done.out
-
-
-@pytest.mark.parametrize("name", REFUSED)
-def test_a_bad_file_is_not_converted(run, bad, name):
-    assert run("convert", bad / name, "out.vtu").refuses(name, REFUSED[name])
-    assert not list(Path().iterdir())
 
 
 # ---- progress ----------------------------------------------------------------------------------------
@@ -1091,11 +982,9 @@ def test_an_error_asked_for_that_is_missed_ends_with_exit_code_3(run, tmp_path, 
     assert Path("fine.vtu").exists()
 
 
-@pytest.mark.parametrize("share", ["0", "100%", "-1%", "much", "1.5", "nan", "1_0%"])
+@pytest.mark.parametrize("share", ["0", "100%", "much", "nan"])
 def test_an_error_that_is_no_share_is_refused(run, tmp_path, monkeypatch, share):
     monkeypatch.chdir(tmp_path)
     kl.write("bar.vtu", kl.box())
     done = run("solve", "bar.vtu", "--material", "E=1e9,nu=0.3", f"--error={share}")
-    assert done.refuses(
-        "--error: ", "is not a finite number" if share in ("much", "nan", "1_0%") else "below 1"
-    )
+    assert done.refuses("--error: ", "is not a finite number" if share in ("much", "nan") else "below 1")

@@ -182,21 +182,6 @@ def test_check_and_info(run, folder):
         assert run(command, "box.py").refuses("box.py:6: AttributeError: ", "'Gravty'")
 
 
-def test_a_script_is_a_scene(run, folder):
-    with open("spin.py", "w") as file:
-        file.write(
-            "import kratos_lite as kl\n"
-            "body = kl.RigidBody(kl.box(), kl.Isotropic3D(1e6, 0.3, 1000.0))\n"
-            "body.set_velocity(angular=(0, 0, 1))\n"
-            "dt, steps, every = 0.1, 10, 5\n"
-        )
-    done = run("solve", "spin.py", "-o", "spin.csv")
-    assert done.rows["body"] == "rigid, 6 velocities, momentum_conserving"
-    assert len((folder / "spin.csv").read_text().splitlines()) == 4
-    assert run("check", "spin.py").out == "spin.py: rigid body, 10 steps of 0.1 s, no errors\n"
-    assert "1000 kg" in run("info", "spin.py").out
-
-
 def test_a_script_sees_no_options_of_the_command(run, folder, monkeypatch):
     with open("spin.py", "w") as file:
         file.write(
@@ -247,24 +232,10 @@ def test_what_bodies_do_not_take_is_refused(run, folder):
         kl.read("box.py")
 
 
-def test_time_of_a_body_is_that_of_the_option(run, folder):
-    done = run("solve", "box.py", "--time", "0.01:4:2", "-o", "a.npz")
-    assert done.rows["time"] == "0 … 0.04 s, 4 steps"
-    assert np.load("a.npz")["step"].tolist() == [0, 2, 4]
-
-
 def test_debug_shows_the_traceback(run, folder):
     write("kl.Rigit()\n")
     with pytest.raises(kl.InputError, match="Rigit"):
         run("solve", "box.py", "--debug")
-
-
-def test_help_names_every_output(run):
-    done = run("solve", "--help")
-    assert done.code == 0
-    for word in ("-o", "-o", "-o", "--picture", "--state", "--restart", "examples:"):
-        assert word in done.out
-    assert "give them new names" in " ".join(done.out.split())
 
 
 @pytest.mark.parametrize("command", ["info", "check"])

@@ -11,8 +11,6 @@ import pytest
 from children import interrupted
 
 import kratos_lite as kl
-from kratos_lite.io.files import read_case
-from kratos_lite.io.run import prepare
 
 MATERIAL = {"E": 3e10, "nu": 0.2, "density": 2500.0}
 SCENE = """import kratos_lite as kl
@@ -123,17 +121,6 @@ def test_a_restart_goes_on_bit_by_bit(run, folder):
         for name in ("time", "step", "u", "v", "a"):
             assert np.array_equal(whole[name][2:], b[name])
             assert np.array_equal(whole[name][2:], c[name])
-
-
-def test_the_case_gives_the_transient(folder):
-    write(time="1e-3, 20, 5, integrator=kl.HHT()")
-    case = read_case("run.py")
-    assert str(case.time) == "20 steps of 0.001 s by hht(-0.05)"
-    *_, end = prepare(case)[1]
-    assert np.array_equal(end.u, integrated(tower(), integrator=kl.HHT())[-1].u)
-    write("case = kl.Case(tower)\n")
-    with pytest.raises(kl.ModelError, match=r"not in time; give it a kl\.TimeIntegration"):
-        prepare(read_case("run.py"))
 
 
 # ---- outputs -------------------------------------------------------------------------------------

@@ -11,9 +11,6 @@ from kratos_lite.io.json_file import parse_json, read_json
 @pytest.mark.parametrize(
     "text",
     [
-        "null",
-        "true",
-        '"a"',
         "-0",
         "1.5e-3",
         "9223372036854775807",
@@ -38,13 +35,11 @@ def test_comments_are_skipped_as_kratos_does():
         ('{"a": 1,}', ":1:9", "'}'"),
         ("[1,\n2,\n]", ":3:1", "found ']'"),
         ('{"a": NaN}', "", "NaN is not a number in JSON"),
-        ("[-Infinity]", "", "-Infinity is not a number in JSON"),
         ("[1e999]", "", "1e999 is too large"),
         ('{"E": 1.0,\n "E": 2.0}', "", "duplicate key 'E'"),
         ("12345678901234567890", "", "of 20 digits is too long"),
         ("01", ":1:2", "Extra data; found '1'"),
         ("1_000", ":1:2", "Extra data; found '_000'"),
-        ("0x10", ":1:2", "Extra data"),
         ("[.5]", ":1:2", "Expecting value; found '.5]'"),
         ("[True]", ":1:2", "Expecting value"),
         ("{'a': 1}", ":1:2", "Expecting property name enclosed in double quotes"),

@@ -5,7 +5,8 @@ import pytest
 from kratos_lite.io.formats.mdpa.values import KINDS
 from kratos_lite.io.kratos.properties import USED
 from kratos_lite.io.kratos.variables import LOADING, VECTORS
-from kratos_lite.io.names import misspelt
+from kratos_lite.io.names import SOLIDS, misspelt
+from kratos_lite.shapes import SHAPES
 
 WORDS = {*USED, *LOADING, *VECTORS}
 
@@ -38,3 +39,10 @@ def test_a_letter_or_two_missing_wrong_or_exchanged_are_a_slip(slip, meant):
 )
 def test_variables_that_kratos_has_are_no_slips(name):
     assert misspelt(name, WORDS) is None
+
+
+def test_it_has_every_solid_shape_of_the_library():
+    solids = {shape for shape in SHAPES.values() if shape.nodes.shape[1] == 3}
+    own = {shape for shape in solids if shape.__module__.startswith("kratos_lite.shapes.")}
+    assert {nodes: SHAPES[name] for nodes, name in SOLIDS.items()} == {len(s.nodes): s for s in own}
+    assert len(SOLIDS) == len(own)

@@ -1,8 +1,7 @@
-"""Scripts: what they define, how they go on after a restart, and what is refused with its place."""
+"""Scripts: what they define, and what is refused with its place."""
 
 import re
 
-import numpy as np
 import pytest
 
 import kratos_lite as kl
@@ -68,20 +67,6 @@ def test_a_script_may_define_a_case(script, tmp_path):
     case = read_case(path)
     assert (case.analysis, case.files) == ("modal", [path, tmp_path / "box.mdpa"])
     assert kl.read(path).notes == case.model.notes
-
-
-def test_a_restart_goes_on_as_if_nothing_had_been(script, tmp_path):
-    end = last(prepare(read_case(script(BOX + "steps = 20\n")))[1])
-    half = last(prepare(read_case(script(BOX)))[1])
-    kl.write(tmp_path / "half.npz", half)
-    state = str(tmp_path / "half.npz")
-    body, states = prepare(
-        read_case(script(f"{BOX}case = kl.Case(body, kl.TimeIntegration(dt, 10, restart={state!r}))\n"))
-    )
-    assert body.step == 10
-    state = last(states)
-    assert (state.time, state.step) == (end.time, end.step)
-    np.testing.assert_array_equal(state.q, end.q)
 
 
 def test_a_step_that_is_too_long_has_its_place(script):

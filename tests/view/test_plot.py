@@ -8,7 +8,7 @@ import pytest
 
 import kratos_lite as kl
 from kratos_lite.shapes import SHAPES
-from kratos_lite.view.camera import VIEWS, rows_of, window_of
+from kratos_lite.view.camera import OBLIQUE, VIEWS, rows_of, window_of
 from kratos_lite.view.facets import facets_of
 from kratos_lite.view.plane import clip_facets, cut_cells, plane_of
 from kratos_lite.view.rulers import extent
@@ -119,12 +119,17 @@ def test_displacements_of_a_mesh_have_names(result):
 # ---- camera ----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("view", [*VIEWS, (30, 20), (120, -40), (0, 90), (1, 2, 3), (0, 0, -1)])
+@pytest.mark.parametrize("view", [None, *VIEWS, (30, 20), (120, -40), (0, 90), (1, 2, 3), (0, 0, -1)])
 def test_cameras_are_right_handed_with_z_up(view):
-    rows = rows_of(view, np.eye(3))
+    rows = rows_of(view, np.array([[0.0, 0.0, 0.0], [9.0, 1.0, 0.1]]))
     assert np.abs(rows @ rows.T - np.eye(3)).max() < 1e-14
     assert abs(np.linalg.det(rows) - 1) < 1e-14
     assert rows[1, 2] >= 0
+
+
+def test_reference_cells_are_seen_by_a_nearly_right_handed_camera():
+    assert np.abs(OBLIQUE @ OBLIQUE.T - np.eye(3)).max() < 0.02
+    assert np.linalg.det(OBLIQUE) > 0.9
 
 
 def test_a_side_is_seen_from_outside():

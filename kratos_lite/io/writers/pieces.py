@@ -18,7 +18,6 @@ from kratos_lite.atomic import replacing
 from kratos_lite.distributed.communicator import ALONE, Alone
 from kratos_lite.distributed.partition import Partition
 from kratos_lite.io.formats.vtu import HEAD, checked, described, escaped, writer_of
-from kratos_lite.io.writers.endings import piece_of
 from kratos_lite.typing import Numbers
 
 if TYPE_CHECKING:
@@ -49,6 +48,15 @@ def write_pieces(path: str | Path, result: Result, mode: str = "binary") -> None
             write = writer_of(piece, result.mesh, *data, mode)
             with open(files.enter_context(replacing(piece)), "r+b") as file:
                 write(file)
+
+
+def piece_of(path: str | Path, number: int) -> Path:
+    """Return the `.vtu` file of one part of a `.pvtu` file.
+
+    >>> piece_of("out/beam.pvtu", 3).name
+    'beam_3.vtu'
+    """
+    return Path(path).with_name(f"{Path(path).stem}_{number}.vtu")
 
 
 def _index(data: Fields, pieces: list[str]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -18,54 +18,16 @@ from kratos_lite.typing import Array
 
 OF_BODIES = (
     "time [s]",
-    "kinetic energy [J]",
-    "internal energy [J]",
-    "potential energy [J]",
-    "energy [J]",
+    *(f"{name} [J]" for name in ("kinetic energy", "internal energy", "potential energy", "energy")),
     "external work [J]",
     *(f"mass center {axis} [m]" for axis in "xyz"),
     *(f"linear momentum {axis} [kg m/s]" for axis in "xyz"),
     *(f"angular momentum {axis} [kg m2/s]" for axis in "xyz"),
 )
 """Columns of a table: energy is the sum of the three before it, angular momentum about the mass center."""
-OF_MODELS = (
-    "time [s]",
-    "energy [J]",
-    "largest displacement [m]",
-    *(f"total reaction {axis} [N]" for axis in "xyz"),
-)
+TOTALS = ("time [s]", "energy [J]", "largest displacement [m]")
+OF_MODELS = (*TOTALS, *(f"total reaction {axis} [N]" for axis in "xyz"))
 """Columns of a table of a transient."""
-
-
-class Recorded(Protocol):
-    """What is recorded of a subject in time.
-
-    Attributes
-    ----------
-    columns : of a table.
-    names : of arrays, attributes of a state.
-    """
-
-    columns: tuple[str, ...]
-    names: tuple[str, ...]
-
-    def now(self) -> Any:
-        """Return the state of the subject as it is now."""
-
-    def checked(self, state: Any) -> State:
-        """Return a state of the subject; InputError for another."""
-
-    def mesh(self) -> Mesh:
-        """Return the mesh that is shown."""
-
-    def fields(self, state: Any) -> tuple[dict[str, Array], dict[str, Array]]:
-        """Return fields of nodes and of elements by their Kratos names."""
-
-    def row(self, state: Any) -> Array:
-        """Return the row of a table, by `columns`."""
-
-    def extra(self) -> dict[str, Array]:
-        """Return arrays that belong to no state."""
 
 
 class RecordedBody:
@@ -152,6 +114,10 @@ class RecordedModel:
     def extra(self) -> dict[str, Array]:
         """Return nothing."""
         return {}
+
+
+Recorded: TypeAlias = "RecordedBody | RecordedModel"
+"""What is recorded of a subject in time; its `names` of arrays are attributes of a state."""
 
 
 def recorded(subject: Body | TransientAnalysis, path: str | Path) -> Recorded:

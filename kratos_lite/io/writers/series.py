@@ -2,38 +2,41 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+import numpy as np
+
 from kratos_lite.analysis.transient import TransientAnalysis
-from kratos_lite.atomic import refuse_nan, write_arrays, write_whole
+from kratos_lite.atomic import refuse_nan, write_arrays
 from kratos_lite.bodies import Body
 from kratos_lite.errors import InputError
 from kratos_lite.io.formats.vtu import check_mode, write_pvd, write_vtu
 from kratos_lite.io.writers.endings import check_series
 from kratos_lite.io.writers.recorded import Recorded, arrays_of, recorded
+from kratos_lite.io.writers.table import write_table
 from kratos_lite.typing import Array
 from kratos_lite.validation import path_of
 
 
-class Writer(ABC):
-    """One kind of file of a series."""
+class Arrays:
+    """Numbers of each state as arrays, one row for each state; other kinds of files take states likewise."""
 
     def __init__(self, path: Path, subject: Recorded, mode: str) -> None:
         self.path, self.subject, self.mode = path, subject, mode
+        self.states: list[Any] = []
 
-    @abstractmethod
     def add(self, state: Any) -> None:
         """Take one state."""
+        self.states.append(state)
 
-    @abstractmethod
     def write(self) -> None:
         """Write what all states together make, as a whole or not at all."""
+        write_arrays(self.path, arrays_of(self.subject, self.states))
 
 
-class Frames(Writer):
+class Frames(Arrays):
     """Meshes, one for each state, and their index."""
 
     def __init__(self, path: Path, subject: Recorded, mode: str) -> None:
@@ -55,7 +58,7 @@ class Frames(Writer):
         write_pvd(self.path, self.frames)
 
 
-class Table(Writer):
+class Table(Arrays):
     """Numbers as text, one line for each state."""
 
     def __init__(self, path: Path, subject: Recorded, mode: str) -> None:
@@ -71,24 +74,7 @@ class Table(Writer):
 
     def write(self) -> None:
         """Write the lines."""
-        lines = [",".join(self.subject.columns), *(",".join(map(repr, row.tolist())) for row in self.rows)]
-        write_whole(self.path, ("\n".join(lines) + "\n").encode())
-
-
-class Arrays(Writer):
-    """Numbers of each state as arrays, one row for each state."""
-
-    def __init__(self, path: Path, subject: Recorded, mode: str) -> None:
-        super().__init__(path, subject, mode)
-        self.states: list[Any] = []
-
-    def add(self, state: Any) -> None:
-        """Keep a state."""
-        self.states.append(state)
-
-    def write(self) -> None:
-        """Write the arrays."""
-        write_arrays(self.path, arrays_of(self.subject, self.states))
+        write_table(self.path, dict(zip(self.subject.columns, np.transpose(self.rows), strict=True)))
 
 
 class Page(Arrays):
@@ -105,7 +91,7 @@ class Page(Arrays):
         write_states_page(self.path, self.subject, self.states)
 
 
-KINDS: dict[str, type[Writer]] = {".pvd": Frames, ".html": Page, ".csv": Table, ".npz": Arrays}
+KINDS: dict[str, type[Arrays]] = {".pvd": Frames, ".html": Page, ".csv": Table, ".npz": Arrays}
 
 
 class SeriesWriter:
