@@ -86,7 +86,11 @@ def check_case(case: Case) -> None:
     if case.modes and case.time is not None:
         raise InputError("a case has natural frequencies or a time integration; give one of them")
     if case.backend == "petsc":
-        _check_statics(case)
+        if case.analysis in NOT_OF_PETSC:
+            what = NOT_OF_PETSC[case.analysis]
+            raise InputError(f"backend='petsc' solves statics; this case has {what}; leave it out")
+        if case.error is not None:
+            raise InputError("backend='petsc' solves on the mesh as it is; leave the requested error out")
     if isinstance(case.subject, Structure):
         return
     from kratos_lite.bodies import Body  # a model at rest starts quicker without it
@@ -99,16 +103,6 @@ def check_case(case: Case) -> None:
         )
     if case.time.integrator is not None or any(case.time.rayleigh) or case.time.lumped:
         raise InputError("a body has its own integrator, damping and mass: set them on the body")
-
-
-def _check_statics(case: Case) -> None:
-    """Raise InputError for a case that PETSc does not solve."""
-    if case.analysis in NOT_OF_PETSC:
-        raise InputError(
-            f"backend='petsc' solves statics; this case has {NOT_OF_PETSC[case.analysis]}; leave it out"
-        )
-    if case.error is not None:
-        raise InputError("backend='petsc' solves on the mesh as it is; leave the requested error out")
 
 
 def prepare(case: Case, progress: Progress | None = None) -> tuple[Any, Iterator[Any]]:

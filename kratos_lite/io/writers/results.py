@@ -23,31 +23,26 @@ def write_result(path: str | Path, result: Result, mode: str | None = None) -> N
     """Write a result by the ending of `path`: .vtu or .pvtu (in a mode), .vtk, .json, .html or .csv."""
     ending = Path(path).suffix.lower()
     check_result(path, mode)
-    if ending == ".pvtu":
-        from kratos_lite.io.writers.pieces import write_pieces  # rarely needed
-
-        write_pieces(path, result, mode or "binary")
-        return
     if ending == ".json":
         write_json(path, result)
-        return
-    if ending == ".csv":
+    elif ending == ".csv":
         write_table(path, result.columns())
-        return
-    if ending == ".html":
+    elif ending == ".html":
         from kratos_lite.io.writers.page.write import write_result_page  # rarely needed
 
         write_result_page(path, result)
-        return
-    points, cells = fields(result)
-    if ending == ".vtu":
+    elif ending == ".pvtu":
+        from kratos_lite.io.writers.pieces import write_pieces  # rarely needed
+
+        write_pieces(path, result, mode or "binary")
+    elif ending == ".vtu":
         from kratos_lite.io.formats.vtu import write_vtu
 
-        write_vtu(path, result.mesh, points, cells, mode or "binary")
+        write_vtu(path, result.mesh, *fields(result), mode or "binary")
     else:
         from kratos_lite.io.formats.meshio import write_meshio
 
-        write_meshio(path, result.mesh, points, cells)
+        write_meshio(path, result.mesh, *fields(result))
 
 
 def summary(result: Result) -> dict[str, Any]:
