@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kratos_lite.analysis.fields import Fields
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear
 from kratos_lite.errors import ModelError
@@ -18,7 +19,7 @@ from kratos_lite.model.supports import AXES
 from kratos_lite.typing import Array, Mask
 
 if TYPE_CHECKING:
-    from kratos_lite.analysis.quantities import Quantity, Solved
+    from kratos_lite.analysis.quantities import Quantity
     from kratos_lite.assembly.recovery import Recovery
 
 
@@ -185,7 +186,7 @@ SAME = 1e-6
 
 
 def error_of(
-    result: Solved,
+    result: Fields,
     quantity: Quantity,
     adjoint: Callable[[Array, Array], Array],
     fixed: Mask,
@@ -241,7 +242,7 @@ def _concentrated(sizes: Array) -> list[str]:
     ]
 
 
-def _shared(result: Solved, held: Mask, part: Mask) -> list[str]:
+def _shared(result: Fields, held: Mask, part: Mask) -> list[str]:
     """Return a warning where a support goes on beside the part whose reaction is asked for."""
     axis = int(part.any(axis=0).argmax())
     for block in result.mesh.boundary:

@@ -80,14 +80,6 @@ def _strain_energy_density(at: Any) -> Array:
     return (strain * stress).sum(axis=-1) / 2
 
 
-def _error_of_elements(result: Any) -> Array:
-    return np.asarray(result.error().per_element)
-
-
-def _principal_strains(strain: Array) -> Array:
-    return voigt.principal_values(strain * voigt.HALF_SHEAR)
-
-
 FIELDS: dict[str, Field] = {
     "displacement": Field(
         "displacement", "DISPLACEMENT", "m", "vector", INTERPOLATED, attrgetter("displacement"), symbol="u"
@@ -111,13 +103,15 @@ FIELDS: dict[str, Field] = {
         symbol="e", listed=False,
     ),
     "principal_strains": Field(
-        "principal strain", "", "", "principal", EVERYWHERE, _principal_strains, "strain", "e", listed=False
+        "principal strain", "", "", "principal", EVERYWHERE,
+        lambda strain: voigt.principal_values(strain * voigt.HALF_SHEAR), "strain", "e", listed=False,
     ),
     "strain_energy_density": Field(
         "strain energy density", "STRAIN_ENERGY", "J/m³", "scalar", INTEGRATED, _strain_energy_density
     ),
     "error": Field(
-        "estimated error", "ENERGY_NORM_ERROR", "√J", "scalar", ELEMENTS, _error_of_elements, log=True
+        "estimated error", "ENERGY_NORM_ERROR", "√J", "scalar", ELEMENTS, 
+        lambda result: result.error().per_element, log=True,
     ),
     "velocity": Field("velocity", "VELOCITY", "m/s", "vector", STATES, attrgetter("v")),
     "acceleration": Field("acceleration", "ACCELERATION", "m/s²", "vector", STATES, attrgetter("a")),
@@ -130,10 +124,24 @@ class Fields(Protocol):
     """What a result offers."""
 
     mesh: Mesh
+    groups: list[ElementGroup]
     u: Array
+    reactions: Array
 
     def field(self, name: str, at: str) -> Any:
         """Return a field at a place."""
+
+    def at(self, points: Array) -> Any:
+        """Return displacements and stresses at points."""
+
+    def stress_in(self, group: ElementGroup) -> Array:
+        """Return stresses (m, g, 6) in Pa at the Gauss points of elements."""
+
+    def stress_of_material(self, row: int) -> Array:
+        """Return recovered stresses (n, 6) in Pa at the nodes of the material of an element."""
+
+    def totals(self) -> tuple[float, float, int]:
+        """Return strain energy, largest von Mises stress of Gauss points and the index of its element."""
 
 
 def listed(place: str) -> dict[str, Field]:
@@ -185,11 +193,6 @@ class GaussPoints:
         """The elements, placed."""
         return self.group.at(self.points)
 
-    @cached_property
-    def N(self) -> Array:
-        """Shape functions (g, k)."""
-        return self.element._N(self.group.rule)
-
     @property
     def strain(self) -> Array:
         """ε (m, g, 6), engineering shear."""
@@ -209,62 +212,30 @@ class GaussPoints:
     @property
     def displacement(self) -> Array:
         """Displacement (m, g, 3) in m."""
-        return self.N @ self.u[self.group.nodes]
+        return self.element._N(self.group.rule) @ self.u[self.group.nodes]
 
     def mean(self, values: Array) -> Array:
         """Return the means over the volume of each element (m, ...) of values (m, g, ...)."""
         volume = volumes(self.points, self.group)
         return np.asarray(np.einsum("mg,mg...->m...", volume / volume.sum(axis=1, keepdims=True), values))
 
-    def elasticity(self) -> Array:
-        """Return C (m, g, 6, 6) in Pa of the material."""
-        return np.tile(self.group.material.C, (len(self.group), len(self.group.rule), 1, 1))
-
-    def jacobian(self) -> Array:
-        """Return det J (m, g) in m³."""
-        return self.element.dV / self.group.rule.weights
-
-    def weight(self) -> Array:
-        """Return γ det J (m, g) in m³."""
-        return self.element.dV
-
-    def place(self) -> Array:
-        """Return X (m, g, 3) in m."""
-        return self.element.gauss_points()
-
-    def reference_place(self) -> Array:
-        """Return ξ (m, g, 3)."""
-        return np.tile(self.group.rule.points, (len(self.group), 1, 1))
-
-    def B(self) -> Array:
-        """Return B (m, g, 6, 3k) in 1/m."""
-        return self.element._operator(self.group.material.C)
-
-
-def _stress_tensor(at: GaussPoints) -> Array:
-    return voigt.tensor(at.stress)
-
-
-def _strain_tensor(at: GaussPoints) -> Array:
-    return voigt.tensor(at.strain * voigt.HALF_SHEAR)
-
 
 QUANTITIES: dict[str, Callable[[GaussPoints], Array]] = {
     **{field.kratos: field.at for field in FIELDS.values() if field.kratos and "gauss" in field.where},
-    "CAUCHY_STRESS_TENSOR": _stress_tensor,
+    "CAUCHY_STRESS_TENSOR": lambda at: voigt.tensor(at.stress),
     "PK2_STRESS_VECTOR": FIELDS["stress"].at,
-    "PK2_STRESS_TENSOR": _stress_tensor,
+    "PK2_STRESS_TENSOR": lambda at: voigt.tensor(at.stress),
     "STRESSES": FIELDS["stress"].at,
-    "GREEN_LAGRANGE_STRAIN_TENSOR": _strain_tensor,
+    "GREEN_LAGRANGE_STRAIN_TENSOR": lambda at: voigt.tensor(at.strain * voigt.HALF_SHEAR),
     "STRAIN": FIELDS["strain"].at,
-    "CONSTITUTIVE_MATRIX": GaussPoints.elasticity,
-    "JACOBIAN": GaussPoints.jacobian,
-    "JACOBIAN_0": GaussPoints.jacobian,
-    "INTEGRATION_WEIGHT": GaussPoints.weight,
-    "INTEGRATION_COORDINATES": GaussPoints.place,
-    "INTEGRATION_POINT_GLOBAL": GaussPoints.place,
-    "INTEGRATION_POINT_LOCAL": GaussPoints.reference_place,
-    "STRAIN_INTERPOLATION_OPERATOR": GaussPoints.B,
+    "CONSTITUTIVE_MATRIX": lambda at: np.tile(at.group.material.C, (*at.element.dV.shape, 1, 1)),
+    "JACOBIAN": lambda at: at.element.dV / at.group.rule.weights,
+    "JACOBIAN_0": lambda at: at.element.dV / at.group.rule.weights,
+    "INTEGRATION_WEIGHT": lambda at: at.element.dV,
+    "INTEGRATION_COORDINATES": lambda at: at.element.gauss_points(),
+    "INTEGRATION_POINT_GLOBAL": lambda at: at.element.gauss_points(),
+    "INTEGRATION_POINT_LOCAL": lambda at: np.tile(at.group.rule.points, (len(at.group), 1, 1)),
+    "STRAIN_INTERPOLATION_OPERATOR": lambda at: at.element._operator(at.group.material.C),
 }
 """What is known at Gauss points by Kratos's names; strains are small, so that all stress measures agree.
 

@@ -3,30 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from kratos_lite.analysis.fields import Fields
 from kratos_lite.mesh import Mesh
 from kratos_lite.mesh.facets import reentrant_nodes
 from kratos_lite.typing import Array, Mask
 
 ACTS = 1e-6
 """Reaction, of the largest one, that is more than rounding."""
-
-
-@runtime_checkable
-class Solved(Protocol):
-    """What is read of a result."""
-
-    mesh: Mesh
-    reactions: Array
-
-    def totals(self) -> tuple[float, float, int]:
-        """Return energy, largest von Mises stress and the index of its element."""
-
-    def von_mises(self, at: str = "gauss") -> Any:
-        """Return von Mises stresses of each element."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +27,7 @@ class Peak:
         return f" {self.place}, where it may grow with each refinement{away}"
 
 
-def peak(result: Solved) -> Peak | None:
+def peak(result: Fields) -> Peak | None:
     """Return where the largest von Mises stress lies if it may have no limit there, else None."""
     mesh, element = result.mesh, result.totals()[2]
     places = {
@@ -57,7 +43,7 @@ def peak(result: Solved) -> Peak | None:
     away = ~_touching(mesh, near)
     if not away.any():
         return Peak(place)
-    stresses = np.array([np.max(points) for points in result.von_mises()])
+    stresses = np.array([np.max(points) for points in result.field("von_mises", "gauss")])
     return Peak(place, float(stresses[away].max()))
 
 

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from kratos_lite.analysis.fields import COMPONENTS
+from kratos_lite.analysis.fields import COMPONENTS, Fields
 from kratos_lite.assembly.element_groups import ElementGroup, add_nodal
 from kratos_lite.assembly.gauss_point_fields import body_force, volumes
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import ModelError
-from kratos_lite.mesh import Mesh, Where
-from kratos_lite.mesh.locate import Located
+from kratos_lite.mesh import Where
 from kratos_lite.model.loads.surface import Traction
 from kratos_lite.model.supports import AXES
 from kratos_lite.typing import Array
@@ -21,27 +20,6 @@ from kratos_lite.validation import choice, finite
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
-
-
-class Solved(Protocol):
-    """What quantities read of a `Result`."""
-
-    mesh: Mesh
-    groups: list[ElementGroup]
-    u: Array
-    reactions: Array
-
-    def at(self, points: ArrayLike) -> Any:
-        """Return displacements and stresses at points."""
-
-    def stress(self, at: str) -> Any:
-        """Return stresses (..., 6) in Pa of elements or recovered at nodes."""
-
-    def stress_in(self, group: ElementGroup) -> Array:
-        """Return stresses (m, g, 6) in Pa at the Gauss points of elements."""
-
-    def stress_of_material(self, row: int) -> Array:
-        """Return recovered stresses (n, 6) in Pa at the nodes of the material of an element."""
 
 
 class Quantity(ABC):
@@ -55,7 +33,7 @@ class Quantity(ABC):
     unit: ClassVar[str] = ""
 
     @abstractmethod
-    def value(self, result: Solved) -> float:
+    def value(self, result: Fields) -> float:
         """Return the value in a result.
 
         Parameters
@@ -72,7 +50,7 @@ class Quantity(ABC):
             The quantity does not fit the mesh.
         """
 
-    def load(self, result: Solved) -> Array:
+    def load(self, result: Fields) -> Array:
         """Return the load of the adjoint solution; 0 if the class has none.
 
         It is ∂Q/∂u; for a stress at a point, whose adjoint is too singular, that of the mean around it.
@@ -87,7 +65,7 @@ class Quantity(ABC):
         """
         return np.zeros_like(result.u)
 
-    def motion(self, result: Solved) -> Array:
+    def motion(self, result: Fields) -> Array:
         """Return by how much the adjoint solution displaces supports; 0 if the class does not.
 
         Parameters
@@ -100,7 +78,7 @@ class Quantity(ABC):
         """
         return np.zeros_like(result.u)
 
-    def local(self, result: Solved) -> Array:
+    def local(self, result: Fields) -> Array:
         """Return what the error of Q has beyond that of the mean that `load` is of; 0 if the class has none.
 
         Parameters
@@ -113,7 +91,7 @@ class Quantity(ABC):
         """
         return np.zeros(result.mesh.n_elements)
 
-    def spread(self, result: Solved) -> float:
+    def spread(self, result: Fields) -> float:
         """Return how far Q may be from the mean that `load` is of; 0 if the class has none.
 
         Parameters
@@ -125,6 +103,20 @@ class Quantity(ABC):
         float, in the unit of the value.
         """
         return 0.0
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(map(_text, vars(self).values()))})"
+
+
+def _text(value: object) -> str:
+    """Return a point, an axis or a part as text for messages."""
+    return (
+        repr(value)
+        if isinstance(value, str)
+        else str(value.tolist())
+        if isinstance(value, np.ndarray)
+        else "…"
+    )
 
 
 class DisplacementAt(Quantity):
@@ -158,19 +150,18 @@ class DisplacementAt(Quantity):
         self.point = finite(point, "a point", (3,))
         self.axis = choice(axis, "axis", AXES)
 
-    def value(self, result: Solved) -> float:
+    def value(self, result: Fields) -> float:
         """Return the displacement in m."""
-        return float(_located(result, self.point).interpolate(result.u)[AXES.index(self.axis)])
+        return float(
+            result.mesh.locate(self.point, required=True).interpolate(result.u)[AXES.index(self.axis)]
+        )
 
-    def load(self, result: Solved) -> Array:
+    def load(self, result: Fields) -> Array:
         """Return N (n, 3) of the element that contains the point, along the axis."""
         load = np.zeros_like(result.u)
-        nodes, weights = _located(result, self.point).nodes_and_weights()
+        nodes, weights = result.mesh.locate(self.point, required=True).nodes_and_weights()
         load[nodes, AXES.index(self.axis)] = weights
         return load
-
-    def __repr__(self) -> str:
-        return f"DisplacementAt({self.point.tolist()}, {self.axis!r})"
 
 
 class MeanDisplacement(Quantity):
@@ -202,11 +193,11 @@ class MeanDisplacement(Quantity):
     def __init__(self, part: Where, axis: str) -> None:
         self.part, self.axis = part, choice(axis, "axis", AXES)
 
-    def value(self, result: Solved) -> float:
+    def value(self, result: Fields) -> float:
         """Return the mean displacement in m."""
         return float((self.load(result) * result.u).sum())
 
-    def load(self, result: Solved) -> Array:
+    def load(self, result: Fields) -> Array:
         """Return ∫ N dA / A (n, 3) along the axis, or ∫ N dV / V.
 
         Raises
@@ -214,9 +205,9 @@ class MeanDisplacement(Quantity):
         ModelError
             The part has neither a face on the boundary nor an element.
         """
-        mesh = result.mesh
+        mesh, direction = result.mesh, np.eye(3)[AXES.index(self.axis)]
         if mesh.faces(self.part):
-            load = Traction(self.part, _unit(self.axis)).forces(mesh, result.groups)
+            load = Traction(self.part, direction).forces(mesh, result.groups)
             return load / load.sum()
         inside = np.zeros(mesh.n_nodes, dtype=bool)
         inside[mesh.nodes(self.part)] = True
@@ -224,16 +215,13 @@ class MeanDisplacement(Quantity):
         for group in result.groups:
             chosen = np.asarray(inside[group.nodes].all(axis=1))
             if chosen.any():
-                load += body_force(mesh.points, group.take(chosen), _unit(self.axis))
+                load += body_force(mesh.points, group.take(chosen), direction)
         if not load.any():
             raise ModelError(
                 f"{self}: the part has neither a face on the boundary nor an element; a mean needs one, "
                 "DisplacementAt takes a point"
             )
         return load / load.sum()
-
-    def __repr__(self) -> str:
-        return f"MeanDisplacement({_name(self.part)}, {self.axis!r})"
 
 
 class ReactionOf(Quantity):
@@ -267,18 +255,15 @@ class ReactionOf(Quantity):
     def __init__(self, part: Where, axis: str) -> None:
         self.part, self.axis = part, choice(axis, "axis", AXES)
 
-    def value(self, result: Solved) -> float:
+    def value(self, result: Fields) -> float:
         """Return the force in N."""
         return float(result.reactions[result.mesh.nodes(self.part), AXES.index(self.axis)].sum())
 
-    def motion(self, result: Solved) -> Array:
+    def motion(self, result: Fields) -> Array:
         """Return the displacement of the part by one, against the axis."""
         motion = np.zeros_like(result.u)
         motion[result.mesh.nodes(self.part), AXES.index(self.axis)] = -1.0
         return motion
-
-    def __repr__(self) -> str:
-        return f"ReactionOf({_name(self.part)}, {self.axis!r})"
 
 
 class StressAt(Quantity):
@@ -315,11 +300,11 @@ class StressAt(Quantity):
         known = isinstance(turned, str) and turned in COMPONENTS
         self.component = choice(turned if known else component, "component", COMPONENTS)
 
-    def value(self, result: Solved) -> float:
+    def value(self, result: Fields) -> float:
         """Return the stress in Pa."""
         return float(result.at(self.point).stress[COMPONENTS.index(self.component)])
 
-    def load(self, result: Solved) -> Array:
+    def load(self, result: Fields) -> Array:
         """Return ∫ B^T C dV / V (n, 3) of the component, of the elements around the point."""
         load, component = np.zeros_like(result.u), COMPONENTS.index(self.component)
         group = self._around(result)
@@ -328,52 +313,36 @@ class StressAt(Quantity):
         add_nodal(load, group.nodes, placed.internal_force(stress, C))
         return load
 
-    def local(self, result: Solved) -> Array:
+    def local(self, result: Fields) -> Array:
         """Return the difference of the error at the point, by recovered stresses, from its mean around."""
-        c, group = COMPONENTS.index(self.component), self._around(result)
-        located = _located(result, self.point)
-        recovered = result.stress_of_material(int(located.rows))
+        c, located = COMPONENTS.index(self.component), result.mesh.locate(self.point, required=True)
+        group, recovered, smooth, volume = self._recovered(result)
         at_point = float(located.interpolate(recovered)[c]) - self.value(result)
-        N, _ = tabulate(group.element.shape, group.rule)
-        volume = volumes(result.mesh.points, group)
-        off = recovered[group.nodes][..., c] @ N.T - result.stress("element")[group.rows, None, c]
+        off = smooth[..., c] - result.field("stress", "element")[group.rows, None, c]
         out = np.zeros(result.mesh.n_elements)
         out[located.rows] = at_point - (off * volume).sum() / volume.sum()
         return out
 
-    def spread(self, result: Solved) -> float:
+    def spread(self, result: Fields) -> float:
         """Return the root mean square of recovered less own stresses at Gauss points around the point.
 
         A component that happens to be recovered without a difference has half of the largest one's.
         """
-        group = self._around(result)
-        recovered = result.stress_of_material(int(_located(result, self.point).rows))[group.nodes]
-        N, _ = tabulate(group.element.shape, group.rule)
-        volume = volumes(result.mesh.points, group)[..., None]
-        squares = (N @ recovered - result.stress_in(group)) ** 2 * volume
+        group, _, smooth, volume = self._recovered(result)
+        squares = (smooth - result.stress_in(group)) ** 2 * volume[..., None]
         spread = np.sqrt(squares.sum(axis=(0, 1)) / volume.sum())
         return float(max(spread[COMPONENTS.index(self.component)], spread.max() / 2))
 
-    def _around(self, result: Solved) -> ElementGroup:
+    def _recovered(self, result: Fields) -> tuple[ElementGroup, Array, Array, Array]:
+        """Return the elements around, recovered stresses at nodes and Gauss points, and volumes of these."""
+        group = self._around(result)
+        nodal = result.stress_of_material(int(result.mesh.locate(self.point, required=True).rows))
+        N, _ = tabulate(group.element.shape, group.rule)
+        return group, nodal, N @ nodal[group.nodes], volumes(result.mesh.points, group)
+
+    def _around(self, result: Fields) -> ElementGroup:
         """Return the elements that share a corner with that of the point, of the same group."""
-        row = _located(result, self.point).rows
+        row = result.mesh.locate(self.point, required=True).rows
         group = next(group for group in result.groups if (group.rows == row).any())
         corners = group.nodes[:, : group.element.shape.corners]
         return group.take(np.asarray(np.isin(corners, corners[group.rows == row]).any(axis=1)))
-
-    def __repr__(self) -> str:
-        return f"StressAt({self.point.tolist()}, {self.component!r})"
-
-
-def _located(result: Solved, point: Array) -> Located:
-    """Return where a point lies in the mesh of a result."""
-    return result.mesh.locate(point, required=True)
-
-
-def _unit(axis: str) -> Array:
-    return np.eye(3)[AXES.index(axis)]
-
-
-def _name(part: Where) -> str:
-    """Return a part as text for messages."""
-    return repr(part) if isinstance(part, str) else "…"

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.analysis.fields import FIELDS, PARTS, Fields
-from kratos_lite.analysis.peak import Solved, peak
+from kratos_lite.analysis.peak import peak
 from kratos_lite.analysis.state import InTime, State
 from kratos_lite.errors import InputError, nearest
 from kratos_lite.mesh import Mesh
@@ -157,7 +157,7 @@ def _values(result: Fields | None, mesh: Mesh, u: Array | None, given: dict[str,
                 f"unit: the field {name!r} is shown in {named.unit or 'no unit'}, with a prefix; for another "
                 f"give an array in {short(unit)}, and its unit"
             )
-        if name == DEFAULT and isinstance(result, Solved) and (top := peak(result)):
+        if name == DEFAULT and result is not None and (top := peak(result)):
             return replace(named, title=f"{named.title}, largest {top.place}")
         return named
     if values is None:

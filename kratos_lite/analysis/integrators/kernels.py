@@ -44,12 +44,18 @@ class StepKernel:
 
     def finish(self, *arrays: Any, h: float, method: str, tolerance: float | None = None) -> None:
         """Take a step h of bodies q, u, the first of the arrays, in place, with the load at mid-step."""
-        tolerance, arrays = tolerance or self.tolerance, tuple(map(np.asarray, arrays))
-        failed = compiled(f"{self.word}_finish", *arrays, h, self.methods.index(method), tolerance)
+        arrays = tuple(map(np.asarray, arrays))
+        settings = h, self.methods.index(method), tolerance or self.tolerance
+        failed = compiled(f"{self.word}_finish", *arrays, *settings)
         if failed is NotImplemented:
-            failed = self.in_numpy(*arrays, h, method, tolerance)
+            failed = self.in_numpy(*arrays, h, method, settings[2])
         if failed >= 0:
             raise self._failure(method, arrays[0], failed, h)
+
+    def advance(self, body: Any, *loads: Array, h: float, count: int) -> None:
+        """Take steps h of a body under constant loads."""
+        how = {"method": body.integrator, "tolerance": body.tolerance, "work": body.external_work}
+        self.steps(body.q, body.u, *body.step_constants(), *loads, h=h, count=count, **how)
 
     def steps(
         self,
@@ -61,22 +67,22 @@ class StepKernel:
         work: Array | None = None,
     ) -> None:
         """Take steps h of bodies in place under constant loads, the last of the arrays; add up their work."""
-        tolerance, arrays = tolerance or self.tolerance, tuple(map(np.asarray, arrays))
-        number, u = self.methods.index(method), arrays[1]
+        arrays, settings = tuple(map(np.asarray, arrays)), (method, tolerance or self.tolerance, work)
+        u = arrays[1]
         most = max(1, AT_ONCE * u.shape[-1] // max(u.size, 1))
         for done in range(0, count, most):  # between calls Python handles signals
-            few = min(most, count - done)
-            failed = compiled(f"{self.word}_steps", *arrays, h, few, number, tolerance, work)
-            if failed is NotImplemented:
-                failed = self._steps_in_numpy(arrays, h, few, method, tolerance, work)
-            if failed[0] >= 0:
-                raise self._failure(method, arrays[0], failed[0], h, done + failed[1])
+            failed, step = self._some_steps(arrays, h, min(most, count - done), *settings)
+            if failed >= 0:
+                raise self._failure(method, arrays[0], failed, h, done + step)
 
-    def _steps_in_numpy(
+    def _some_steps(
         self, arrays: tuple[Any, ...], h: float, count: int, method: str, tolerance: float, work: Array | None
     ) -> tuple[int, int]:
-        """Take steps in NumPy; return the first body that failed, or -1, and in which step."""
-        u = arrays[1]
+        """Take steps; return the first body that failed, or -1, and in which step."""
+        number, u = self.methods.index(method), arrays[1]
+        ended: tuple[int, int] = compiled(f"{self.word}_steps", *arrays, h, count, number, tolerance, work)
+        if ended is not NotImplemented:
+            return ended
         for step in range(count):
             before = u.copy()
             load, failed = self.step_in_numpy(*arrays, h, method, tolerance)

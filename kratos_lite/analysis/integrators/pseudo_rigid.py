@@ -41,12 +41,7 @@ class _PseudoRigid(BodyIntegrator[PseudoRigidBody]):
 
     def free_steps(self, body: PseudoRigidBody, h: float, count: int) -> bool:
         """Take steps in the kernel."""
-        acceleration, spatial, _ = body.constant_loads()
-        constant = (*body.step_constants(), acceleration, spatial)
-        work, tolerance = body.external_work, body.tolerance
-        KERNEL.steps(
-            body.q, body.u, *constant, h=h, count=count, method=self.name, tolerance=tolerance, work=work
-        )
+        KERNEL.advance(body, *body.constant_loads()[:2], h=h, count=count)
         return True
 
     def step(self, body: PseudoRigidBody, h: float, v: Array) -> Array:
@@ -93,38 +88,17 @@ class PseudoRigidEnergyMomentum(_PseudoRigid):
     name = "energy_momentum"
 
 
-def _step(
-    q: Array,
-    u: Array,
-    euler: Array,
-    mass: Array,
-    volume: Array,
-    C: Array,
-    damping: Array,
-    acceleration: Array,
-    spatial: Array,
-    *numbers: Any,
-) -> tuple[Array, int]:
+def _step(q: Array, u: Array, *arguments: Any) -> tuple[Array, int]:
     """Take a step under constant loads; return the load, and the first body that failed or -1."""
+    euler, mass, *elastic, acceleration, spatial, h, method, tolerance = arguments
     load = np.broadcast_to(spatial, u.shape).copy()
     load[..., 9:] += mass[..., None] * acceleration
-    return load, _finish(q, u, load, euler, mass, volume, C, damping, *numbers)
+    return load, _finish(q, u, load, euler, mass, *elastic, h, method, tolerance)
 
 
-def _finish(
-    q: Array,
-    u: Array,
-    load: Array,
-    euler: Array,
-    mass: Array,
-    volume: Array,
-    C: Array,
-    damping: Array,
-    h: float,
-    method: str,
-    tolerance: float,
-) -> int:
+def _finish(q: Array, u: Array, load: Array, *arguments: Any) -> int:
     """Take a step in place, with the load at mid-step; return the first body that failed, or -1."""
+    euler, mass, volume, C, damping, h, method, tolerance = arguments
     F, U, f = q[..., :9], u[..., :9], load[..., :9]
     V, eta = volume[..., None, None], damping[..., None, None]
     going = np.zeros(q.shape[:-1], dtype=bool)

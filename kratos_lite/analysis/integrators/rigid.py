@@ -38,11 +38,7 @@ class _Rigid(BodyIntegrator[RigidBody]):
 
     def free_steps(self, body: RigidBody, h: float, count: int) -> bool:
         """Take steps in the kernel."""
-        constant = (*body.step_constants(), *body.constant_loads())
-        work, tolerance = body.external_work, body.tolerance
-        KERNEL.steps(
-            body.q, body.u, *constant, h=h, count=count, method=self.name, tolerance=tolerance, work=work
-        )
+        KERNEL.advance(body, *body.constant_loads(), h=h, count=count)
         return True
 
     def step(self, body: RigidBody, h: float, v: Array) -> Array:
@@ -110,41 +106,20 @@ def half_step(q: Array, u: Array, h: float) -> Array:
     return out
 
 
-def _step(
-    q: Array,
-    u: Array,
-    inertia: Array,
-    inverse: Array,
-    mass: Array,
-    acceleration: Array,
-    spatial: Array,
-    follower: Array,
-    h: float,
-    *numbers: Any,
-) -> tuple[Array, int]:
+def _step(q: Array, u: Array, *arguments: Any) -> tuple[Array, int]:
     """Take a step under constant loads; return the load, and the first body that failed or -1."""
+    *inertia, mass, acceleration, spatial, follower, h, method, tolerance = arguments
     qh, load = half_step(q, u, h), np.empty(u.shape)
     R = rotation_of(qh)
     load[..., :3] = transposed(R, spatial[..., :3]) + follower[..., :3]
     load[..., 3:] = mass[..., None] * acceleration + spatial[..., 3:] + apply(R, follower[..., 3:])
-    return load, _finish(q, u, qh, load, inertia, inverse, mass, h, *numbers)
+    return load, _finish(q, u, qh, load, *inertia, mass, h, method, tolerance)
 
 
-def _finish(
-    q: Array,
-    u: Array,
-    qh: Array,
-    load: Array,
-    inertia: Array,
-    inverse: Array,
-    mass: Array,
-    h: float,
-    method: str,
-    tolerance: float,
-) -> int:
+def _finish(q: Array, u: Array, qh: Array, load: Array, *arguments: Any) -> int:
     """Complete a step from q, u in place, with the load at qh; return the first body that failed, or -1."""
-    W, T, J = u[..., :3], load[..., :3], inertia
-    Rh = rotation_of(qh)
+    J, inverse, mass, h, method, tolerance = arguments
+    W, T, Rh = u[..., :3], load[..., :3], rotation_of(qh)
     with np.errstate(all="ignore"):
         p = transposed(exp(h / 2 * W), apply(J, W))
         Wh = apply(inverse, p + h / 2 * T)
