@@ -7,10 +7,13 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 if TYPE_CHECKING:
     import numpy as np
+    import numpy.typing as npt
     from numpy.typing import NDArray
 
 Array: TypeAlias = "NDArray[np.float64]"
 """Numbers."""
+ArrayLike: TypeAlias = "npt.ArrayLike"
+"""What NumPy makes an array of."""
 Complexes: TypeAlias = "NDArray[np.complex128]"
 """Complex numbers."""
 Ints: TypeAlias = "NDArray[np.int64]"

@@ -14,7 +14,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from time import perf_counter
-from typing import TypeAlias, TypeVar
+from typing import TypeAlias
 
 import numpy as np
 
@@ -36,31 +36,24 @@ from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array, Ints, Progress
 from kratos_lite.validation import number, short, whole_number
 
-S = TypeVar("S", bound=Structure)
 Geometry: TypeAlias = Mapping[str, Callable[[Array], Array]]
 """By part, a function that takes places (k, 3) near its true surface onto it."""
-LEAST = 1e-8
-"""Relative error that can be asked for: what rounding leaves of a solution."""
+LEAST = 1e-8  # relative error that can be requested: what rounding leaves of a solution
 BULK, BULK_FAR, FAR = 0.5, 0.8, 3.0
 """Fraction θ of the squared error that is cut, and that where the error is `FAR` times the one requested."""
-GROWTH = 1.2
-"""How many times more elements the next mesh has at least."""
+GROWTH = 1.2  # how many times more elements the next mesh has at least
 FLAT = 0.05
-"""Fraction of the error asked for that the stress may vary along a direction in which nothing is cut."""
-ROUGH, ROUGH_SHARE = 1e-5, 1e-3
-"""Relative residual of the meshes on the way at most, and as a fraction of the error asked for."""
-FAIR = 1e-3
-"""Fraction of the forces that such a mesh may miss to equilibrium; beyond it is solved in full."""
-STEPS = 25
-"""Meshes after which the accuracy counts as out of reach."""
-SCANT = 0.05
-"""Of a step that there must be room for."""
-BYTES = 6000
-"""Memory that an unknown may need; the largest mesh is one that fits into what is free."""
+"""Fraction of the requested error that the stress may vary along a direction in which nothing is cut."""
+ROUGH, ROUGH_FRACTION = 1e-5, 1e-3
+"""Relative residual of the meshes on the way at most, and as a fraction of the requested error."""
+FAIR = 1e-3  # fraction of the forces that such a mesh may miss to equilibrium; beyond it is solved in full
+STEPS = 25  # meshes after which the accuracy counts as out of reach
+SCANT = 0.05  # of a step that there must be room for
+BYTES = 6000  # that an unknown may need; the largest mesh is one that fits into what is free
 
 
 def solve_to(
-    model: S,
+    model: Structure,
     error: float,
     solver: str = "auto",
     tolerance: float = 1e-10,
@@ -69,7 +62,7 @@ def solve_to(
     geometry: Geometry | None = None,
     quantity: Quantity | None = None,
 ) -> Result:
-    """Solve a static model on meshes that become finer until the error is as small as asked for."""
+    """Solve a static model on meshes that become finer until the error is as small as requested."""
     aim = number(error, "error")
     if not LEAST <= aim < 1:
         raise InputError(f"error must be a fraction between {LEAST:g} and 1, such as 0.01; got {error!r}")
@@ -81,19 +74,20 @@ def solve_to(
         )
     check_quantity(quantity)
     level: Level | None = None
-    steps: list[RefinedMesh] = []
+    step: RefinedMesh | None = None
     history: list[RefinementStep] = []
-    missed, keep = "", None
-    rough = max(tolerance, min(ROUGH, ROUGH_SHARE * aim))
+    missed, keep, start = "", None, None
+    rough = max(tolerance, min(ROUGH, ROUGH_FRACTION * aim))
     warnings = [] if geometry else curved(model.mesh)
     while True:
-        start = perf_counter()
+        begin = perf_counter()
         analysis = StaticAnalysis(model, solver, tolerance, progress)
-        result, before = _solved(analysis, _started(level, steps), rough), level
-        level = _level(model, result, steps, before, quantity)
-        history.append(level.step(perf_counter() - start))
+        result = _solved(analysis, start, rough)
+        before, known = level, (model, result, step, level)
+        level = Level(*known) if quantity is None else QuantityLevel(*known, quantity)
+        history.append(level.refinement_step(perf_counter() - begin))
         if before is not None:
-            before.before = None  # the meshes before it are needed no more
+            before.before = None  # the meshes before it are not needed any more
         if level.reported <= aim and level.is_settled:
             break
         if keep is None and quantity is None and model.mesh.hanging is None and not _can_be_raised(model):
@@ -102,7 +96,7 @@ def solve_to(
         if step is None:
             missed = _missed(history, aim, most)
             break
-        steps, model = [step], _carried(model, step)
+        model, start = _model_on(model, step), step.interpolate(result.u)
         analysis.release()
     if result.report.iterations and rough > tolerance:
         result = analysis.solve(start=result.u)
@@ -113,28 +107,12 @@ def solve_to(
         ]
     if top := peak(result):
         warnings.append(f"the largest von Mises stress lies{top}")
-    report = result.report
+    report, (first, last) = result.report, (history[0].kinds, history[-1].kinds)
     report.history, report.error, report.error_asked = history, level.reported, aim
     report.error_of = "the energy norm" if quantity is None else str(quantity)
     report.warnings += warnings
-    if history[0].kinds != history[-1].kinds:
-        report.formulation = f"{history[-1].kinds}, raised from {history[0].kinds}"
+    report.formulation = f"{last}, raised from {first}" if first != last else report.formulation
     return result
-
-
-def _level(
-    model: Structure,
-    result: Result,
-    steps: Sequence[RefinedMesh],
-    before: Level | None,
-    quantity: Quantity | None,
-) -> Level:
-    """Return what is known of the error of a result, or of a quantity of it."""
-    if quantity is None:
-        return Level(model, result, steps, before)
-    level = QuantityLevel(model, result, steps, before, quantity)
-    level.check_value()
-    return level
 
 
 def _solved(analysis: StaticAnalysis, start: Array | None, rough: float) -> Result:
@@ -144,21 +122,9 @@ def _solved(analysis: StaticAnalysis, start: Array | None, rough: float) -> Resu
     return result if good else analysis.solve(start=result.u)
 
 
-def _started(level: Level | None, steps: Sequence[RefinedMesh]) -> Array | None:
-    """Return the solution of a level on the next mesh, or None without one."""
-    if level is None:
-        return None
-    u = level.result.u
-    for step in steps:
-        u = step.interpolate(u)
-    return u
-
-
 def check_quantity(quantity: Quantity | None) -> None:
     """Raise InputError for what is no quantity, or one that does not hold on finer meshes."""
-    if quantity is None:
-        return
-    if not isinstance(quantity, Quantity):
+    if not isinstance(quantity, Quantity | None):
         raise InputError(f"quantity must be one such as DisplacementAt; got {short(quantity)}")
     part = getattr(quantity, "part", "")
     if not (isinstance(part, str) or callable(part)):
@@ -250,8 +216,8 @@ def _can_be_raised(model: Structure) -> bool:
     )
 
 
-def _carried(model: S, step: RefinedMesh) -> S:
-    """Return a model after a step."""
+def _model_on(model: Structure, step: RefinedMesh) -> Structure:
+    """Return a model on the mesh after a step."""
     finer = refined(model, step)
     if step.mesh.n_elements == step.coarse.n_elements and model.formulation != "b_bar":
         finer.formulation = None  # quadratic elements: those that do not lock

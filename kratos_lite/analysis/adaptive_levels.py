@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -20,29 +19,23 @@ from kratos_lite.model.structure import Structure
 from kratos_lite.quadrature import Rule
 from kratos_lite.typing import Array, Ints
 
-CORRECTED = 1.25
-"""Safety of an estimate that a coarser mesh corrects."""
-MOST_CORRECTED = 1.3
-"""Times that it may exceed the estimate of its own mesh: short steps say little."""
-SETTLED = 0.9
-"""Fraction to which estimates must fall, so that they can be corrected."""
-AIM = 0.9
-"""Fraction of the error asked for at which the next mesh aims."""
+CORRECTED = 1.25  # safety of an estimate that a coarser mesh corrects
+MOST_CORRECTED = 1.3  # times that it may exceed the estimate of its own mesh: short steps say little
+SETTLED = 0.9  # fraction to which estimates must fall, so that they can be corrected
+AIM = 0.9  # fraction of the requested error at which the next mesh aims
 SINGULAR = 0.25
 """Fraction of its squared error that an element keeps when it is cut or becomes quadratic, from which the
 solution counts as singular there."""
-
-ROUNDING = 1e-10
-"""Fraction of the sizes that a quantity is the sum of, up to which its value is rounding."""
+ROUNDING = 1e-10  # fraction of the sizes that a quantity is the sum of, up to which its value is rounding
 
 
 @dataclass(eq=False)
 class Level:
-    """A model solved, and what is known of its error; the level before it, and the steps from there."""
+    """A model solved, and what is known of its error; the level before it, and the step from there."""
 
     model: Structure
     result: Result
-    steps: Sequence[RefinedMesh]
+    step: RefinedMesh | None
     before: Level | None
 
     @cached_property
@@ -71,11 +64,9 @@ class Level:
     def change(self) -> float:
         """‖u - u_H‖ in √J from the solution of the level before."""
         assert self.before is not None
-        old = self.before.result.u
-        for step in self.steps:
-            old = step.interpolate(old)
-        points = self.model.mesh.points
-        return float(np.sqrt(2 * totals(points, self.result.groups, self.result.u - old)[0]))
+        assert self.step is not None
+        change = self.result.u - self.step.interpolate(self.before.result.u)
+        return float(np.sqrt(2 * totals(self.model.mesh.points, self.result.groups, change)[0]))
 
     @property
     def is_nested(self) -> bool:
@@ -89,7 +80,7 @@ class Level:
             return self.estimate
         ratio = self.estimate / self.before.estimate
         if self.before.order == self.order:  # faster than cells shrink, the one before was too large
-            ratio = max(ratio, 2.0 ** -(self.order * float(self.cuts().max())))
+            ratio = max(ratio, 2.0**-self.order)
         if not ratio < SETTLED:
             return max(self.estimate, self.change)
         return self.change * ratio / float(np.sqrt(1 - ratio**2))
@@ -124,51 +115,26 @@ class Level:
         """Return the estimate in √J at which a mesh aims that is to reach a relative error."""
         return AIM * error / self.reported * self.estimate
 
-    def step(self, seconds: float) -> RefinementStep:
+    def refinement_step(self, seconds: float) -> RefinementStep:
         """Return the level as a step of the history."""
         kinds = dict.fromkeys(group.element.__name__ for group in self.result.groups)
-        return RefinementStep(
-            self.model.mesh.n_elements,
-            ", ".join(kinds),
-            self.result.report.unknowns,
-            self.reported,
-            seconds,
-        )
-
-    @cached_property
-    def parents(self) -> Ints:
-        """(m,) element of the level before of each element."""
-        parents = np.arange(self.before.model.mesh.n_elements) if self.before else np.zeros(0, dtype=np.int64)
-        for step in self.steps:
-            parents = parents[step.elements]
-        return parents
+        count, unknowns = self.model.mesh.n_elements, self.result.report.unknowns
+        return RefinementStep(count, ", ".join(kinds), unknowns, self.reported, seconds)
 
     def kept(self) -> Array:
         """Return the fraction of its squared error (m,) that each element keeps if it is cut."""
         smooth = 4.0**-self.order
         kept = np.full(len(self.squares), smooth)
-        if self.before is None:
+        if self.before is None or self.step is None:
             return kept
-        parents, old = self.parents, self.before.squares
+        parents, old = self.step.elements, self.before.squares
         if self.before.order < self.order:
-            left = self.squares / np.maximum(old[parents], np.finfo(float).tiny)
-            kept[left > SINGULAR] = 0.5
+            kept[self.squares > SINGULAR * old[parents]] = 0.5
             return kept
-        cuts, total = self.cuts(), np.bincount(parents, weights=self.squares)
-        most = np.zeros(len(old), dtype=np.int64)
-        np.maximum.at(most, parents, cuts)
-        left = (total / np.maximum(old, np.finfo(float).tiny)) ** (1 / np.maximum(most, 1))
-        count = np.bincount(parents)[parents]
-        heavy = (cuts > 0) & (cuts == most[parents]) & (self.squares * count > total[parents])
-        kept[heavy] = np.clip(left, smooth, 0.8)[parents[heavy]]
-        return kept
-
-    def cuts(self) -> Ints:
-        """Return how often elements (m,) have been cut since the level before."""
-        cuts = np.zeros(self.steps[0].coarse.n_elements, dtype=np.int64)
-        for step in self.steps:
-            cuts = cuts[step.elements] + (np.bincount(step.elements)[step.elements] > 1)
-        return cuts
+        count, total = np.bincount(parents)[parents], np.bincount(parents, weights=self.squares)
+        remaining = np.clip(total / np.maximum(old, np.finfo(float).tiny), smooth, 0.8)[parents]
+        heavy = (count > 1) & (self.squares * count > total[parents])
+        return np.where(heavy, remaining, kept)
 
 
 @dataclass(eq=False)
@@ -194,7 +160,7 @@ class QuantityLevel(Level):
             return not self.is_blind
         return self.before is not None and self.before.order == self.order
 
-    def check_value(self) -> None:
+    def __post_init__(self) -> None:
         """Raise ModelError if the value is rounding of what it is made of, and has no relative error."""
         result, load = self.result, np.abs(self.quantity.load(self.result))
         size = float(load.sum() * np.abs(result.u).max(initial=0.0))
@@ -237,17 +203,12 @@ def layer_direction(result: Result, allowed: float) -> Array | None:
 def _variation(result: Result, along: Ints) -> float:
     """Return ∫ Δσ : C⁻¹ : Δσ dV of the stress less its mean along an axis of each cell, in J."""
     total = 0.0
-    stress = result.stress("gauss")
     for group in result.groups:
-        mine = (
-            np.asarray([stress[row] for row in group.rows])
-            if isinstance(stress, list)
-            else stress[group.rows]
-        )
-        density = np.zeros(mine.shape[:2])
+        stress = result.stress_in(group)
+        density = np.zeros(stress.shape[:2])
         for axis in range(3):
             cells = along[group.rows] == axis
-            off = _off_mean(group.rule, axis) @ mine[cells]
+            off = _off_mean(group.rule, axis) @ stress[cells]
             density[cells] = ((off @ np.linalg.inv(group.material.C)) * off).sum(axis=-1)
         total += float((density * volumes(result.mesh.points, group)).sum())
     return total

@@ -12,12 +12,10 @@ from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Where
 from kratos_lite.model.structure import Structure
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, ArrayLike
 from kratos_lite.validation import finite
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
     from kratos_lite.analysis.result import Result
     from kratos_lite.analysis.state import State
 

@@ -61,8 +61,7 @@ NEGLIGIBLE, COARSE, FEW, FOCUS = 1e-9, 1.7, 8, 0.4
 mesh is coarse; elements that are few; much of the error, in the worst hundredth of elements."""
 CURVED = 10.0
 """Degrees from one face to the next at which a curved surface of straight cells is off by half a percent."""
-WORST = 3
-"""Least number of elements of that hundredth; meshes of less than twenty times as many have none."""
+WORST = 3  # least number of elements of that hundredth; meshes of less than twenty times as many have none
 
 
 def energy_error(

@@ -17,7 +17,7 @@ Source: GetFEM user documentation, ALE support for objects having a large rigid 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -26,11 +26,8 @@ from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.assembly.gauss_point_fields import in_order
 from kratos_lite.errors import InputError
 from kratos_lite.model.structure import Structure
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, ArrayLike
 from kratos_lite.validation import choice, finite, instance
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
 
 PLACES = ("node", "gauss")
 

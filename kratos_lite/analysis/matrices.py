@@ -13,11 +13,10 @@ from kratos_lite.assembly.gauss_point_fields import internal_load
 from kratos_lite.model.loads import ScaledLoad
 from kratos_lite.model.loads.body import BodyForce
 from kratos_lite.model.structure import Structure
-from kratos_lite.typing import Array, Ints
+from kratos_lite.typing import Array, ArrayLike, Ints
 from kratos_lite.validation import finite, flag, number
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
     from scipy.sparse import csr_array
 
 

@@ -21,8 +21,7 @@ from kratos_lite.solvers.plan import DENSE_MODES, stepped
 from kratos_lite.typing import Array, Complexes, Progress
 from kratos_lite.validation import instance, whole_number
 
-FEW = 40
-"""Up to this many unknowns there is nothing to iterate for."""
+FEW = 40  # up to this many unknowns there is nothing to iterate for
 
 
 def natural_modes(

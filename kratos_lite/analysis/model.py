@@ -11,13 +11,11 @@ from kratos_lite.analysis.static import StaticAnalysis
 from kratos_lite.errors import InputError
 from kratos_lite.model.loads import Load
 from kratos_lite.model.structure import Structure
-from kratos_lite.typing import Array, Complexes, Progress
+from kratos_lite.typing import Array, ArrayLike, Complexes, Progress
 from kratos_lite.view.progress import watched
 
 if TYPE_CHECKING:
     from pathlib import Path
-
-    from numpy.typing import ArrayLike
 
     from kratos_lite.analysis.matrices import LocalSystem, Matrices
     from kratos_lite.analysis.quantities import Quantity

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from kratos_lite.analysis.nodal_loads import initial_loads, stress_load
-from kratos_lite.analysis.report import Report, element_counts, vector
+from kratos_lite.analysis.report import element_counts, report_of, vector
 from kratos_lite.analysis.result import Result
-from kratos_lite.analysis.solution_checks import Phases, check_arguments, check_solution, metrics
+from kratos_lite.analysis.solution_checks import Phases, check_arguments, check_solution
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.distributed.partition import Partition
 from kratos_lite.distributed.petsc_system import PartSystem
@@ -122,16 +122,18 @@ def solve_part(
         work = partition.sum(checks.work_of(u[own], inner[own], external[own], reactions[own]))
         system.warnings += [] if initial is not None else checks.check_energy(work)
     found = [text for some in partition.gather(warnings) for text in some]
-    report = Report(
-        unknowns=system.unknowns,
-        total_load=partition.sum(external[own].sum(axis=0)),
-        total_reaction=partition.sum(reactions[own].sum(axis=0)),
-        **metrics(solution, (off, 0.0)),
+    totals = partition.sum(external[own].sum(axis=0)), partition.sum(reactions[own].sum(axis=0))
+    report = report_of(
+        model,
+        groups,
+        system.unknowns,
+        totals,
+        solution,
+        (off, 0.0),
         seconds=phase.seconds,
         warnings=[*dict.fromkeys(found), *system.warnings],
-        notes=list(dict.fromkeys(text for some in partition.gather(model.remarks()) for text in some)),
-        formulation=model.chosen(groups),
     )
+    report.notes = list(dict.fromkeys(text for some in partition.gather(report.notes) for text in some))
     result = PartResult(mesh, groups, u, reactions, external, report, model.initial_displacement)
     result.partition = partition
     return result

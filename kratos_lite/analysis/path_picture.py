@@ -18,12 +18,9 @@ from kratos_lite.view.marks import Marks
 from kratos_lite.view.scene import Subject
 from kratos_lite.view.trajectory import Path, trajectory_figure
 
-SHOWN = 6
-"""Positions in a picture."""
-CANDIDATES = 400
-"""States, evenly spread, among which they are chosen."""
-ALIKE = 0.02
-"""Fraction of its size that a body moves between positions that are worth drawing."""
+SHOWN = 6  # positions in a picture
+CANDIDATES = 400  # states, evenly spread, among which they are chosen
+ALIKE = 0.02  # fraction of its size that a body moves between positions that are worth drawing
 ENERGIES = ("kinetic", "internal", "potential", "sum")
 
 

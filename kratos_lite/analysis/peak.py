@@ -11,8 +11,7 @@ from kratos_lite.mesh import Mesh
 from kratos_lite.mesh.facets import reentrant_nodes
 from kratos_lite.typing import Array, Mask
 
-ACTS = 1e-6
-"""Reaction, of the largest one, that is more than rounding."""
+ACTS = 1e-6  # reaction, of the largest one, that is more than rounding
 
 
 @dataclass(frozen=True)

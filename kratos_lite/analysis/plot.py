@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kratos_lite.analysis.path_picture import moving_subjects, path_figure
 from kratos_lite.analysis.report import Report
@@ -17,6 +16,7 @@ from kratos_lite.bodies import Body
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.errors import InputError
 from kratos_lite.shapes import Shape
+from kratos_lite.typing import ArrayLike
 from kratos_lite.validation import number, short, whole_number
 from kratos_lite.view import canvas
 from kratos_lite.view.camera import View
@@ -24,8 +24,7 @@ from kratos_lite.view.curves import convergence_figure
 from kratos_lite.view.figure import figure_of
 from kratos_lite.view.reference_cell import element_figure
 
-OF_STATES = 120
-"""Frames of a film of many states."""
+OF_STATES = 120  # frames of a film of many states
 
 
 def plot(

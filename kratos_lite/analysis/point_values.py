@@ -108,10 +108,8 @@ class PointValues:
         return data_frame(self.columns())
 
 
-GAUSS_POINTS = 5
-"""On the part of a line in one element: exact to degree 9 of x σ."""
-ZERO = 1e-10
-"""Fraction of the largest stress that is drawn as 0: rounding."""
+GAUSS_POINTS = 5  # on the part of a line in one element: exact to degree 9 of x σ
+ZERO = 1e-10  # fraction of the largest stress that is drawn as 0: rounding
 
 
 class LineValues(PointValues):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -15,11 +15,8 @@ from kratos_lite.errors import ModelError
 from kratos_lite.mesh import Where
 from kratos_lite.model.loads.surface import Traction
 from kratos_lite.model.supports import AXES
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, ArrayLike
 from kratos_lite.validation import choice, finite
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
 
 
 class Quantity(ABC):

@@ -10,7 +10,9 @@ import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.mesh import Mesh
+from kratos_lite.model.structure import Structure
 from kratos_lite.native import described
+from kratos_lite.solvers.linear_solver import Solution
 from kratos_lite.tabular import Tabular
 from kratos_lite.typing import Array
 
@@ -102,8 +104,9 @@ class Report(Tabular):
 
     def load_rows(self, size: float = 0.0) -> list[tuple[str, str]]:
         """Return the rows of the summary about formulation, unknowns and loads, forces of `size` N in all."""
+        formulation = [("formulation", self.formulation)] if self.formulation else []
         return [
-            *([("formulation", self.formulation)] if self.formulation else []),
+            *formulation,
             ("unknowns", f"{self.unknowns}"),
             ("total load", f"{vector(self.total_load, size)} N"),
             ("total reaction", f"{vector(self.total_reaction, size)} N"),
@@ -134,23 +137,46 @@ class Report(Tabular):
         if not m:
             return []
         unit, size = m["unit"], max(map(abs, m["support_force"] + m["support_moment"]))
-        force, moment = (vector(np.array(m[f"support_{k}"]), size) for k in ("force", "moment"))
+        force, moment = (vector(m[f"support_{k}"], size) for k in ("force", "moment"))
         spin = f", {m['acceleration']:g} {unit[:-2]}/s²" if m["acceleration"] else ""
-        center = []
+        rows = [(m["kind"], f"{m['rate']:g} {unit}{spin} {vector(m['direction'])}")]
         if "center_velocity" in m:
-            velocity, gained = (vector(np.array(m[f"center_{k}"])) for k in ("velocity", "acceleration"))
-            center = [("center", f"velocity {velocity} m/s, acceleration {gained} m/s²")]
+            velocity, gained = (vector(m[f"center_{k}"]) for k in ("velocity", "acceleration"))
+            rows.append(("center", f"velocity {velocity} m/s, acceleration {gained} m/s²"))
+        mesh = f"{m['critical_rate']:.4g} {unit} on this mesh, " if m["critical_rate"] else ""
+        waves = f"about {m['critical_rate_of_waves']:.4g} {unit} by wave speeds"
         return [
-            (m["kind"], f"{m['rate']:g} {unit}{spin} {vector(np.array(m['direction']))}"),
-            *center,
-            (
-                "critical rate",
-                (f"{m['critical_rate']:.4g} {unit} on this mesh, " if m["critical_rate"] else "")
-                + f"about {m['critical_rate_of_waves']:.4g} {unit} by wave speeds, margin {m['margin']:.1%}",
-            ),
+            *rows,
+            ("critical rate", f"{mesh}{waves}, margin {m['margin']:.1%}"),
             ("force of supports", f"{force} N"),
             ("moment of supports", f"{moment} N m"),
         ]
+
+
+def report_of(
+    model: Structure,
+    groups: Sequence[ElementGroup],
+    unknowns: int,
+    totals: tuple[Array, Array],
+    solution: Solution,
+    balance: tuple[float | None, float | None] = (None, None),
+    notes: Sequence[str] = (),
+    **others: Any,
+) -> Report:
+    """Return the report of a solution, from total load and reaction and what they miss to equilibrium."""
+    return Report(
+        unknowns,
+        *totals,
+        solver=solution.method,
+        reason=solution.reason,
+        iterations=solution.iterations,
+        backward_error=solution.backward_error,
+        force_error=balance[0],
+        moment_error=balance[1],
+        notes=[*model.remarks(), *notes],
+        formulation=model.chosen(groups),
+        **others,
+    )
 
 
 def element_counts(mesh: Mesh, groups: Sequence[ElementGroup], formulation: str) -> dict[str, int]:
@@ -162,7 +188,7 @@ def element_counts(mesh: Mesh, groups: Sequence[ElementGroup], formulation: str)
     return {name: count for name, count in counts.items() if count}
 
 
-def vector(v: Array, size: float = 0.0) -> str:
+def vector(v: Array | Sequence[float], size: float = 0.0) -> str:
     """Return a vector for a summary; components that are rounding beside `size` are shown as 0."""
     small = np.where(np.abs(v) < 1e-12 * max(float(np.abs(v).max()), size, 1e-300), 0.0, v)
     return "(" + ", ".join(f"{c:.6g}" for c in small) + ")"

@@ -16,13 +16,11 @@ from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh, Where
 from kratos_lite.model.structure import Structure
 from kratos_lite.tabular import Tabular
-from kratos_lite.typing import Array, Numbers
+from kratos_lite.typing import Array, ArrayLike, Numbers
 from kratos_lite.validation import finite, flag, instance, whole_number
 
 if TYPE_CHECKING:
     from pathlib import Path
-
-    from numpy.typing import ArrayLike
 
     from kratos_lite.analysis.error_estimate import ErrorEstimate, QuantityError
     from kratos_lite.analysis.point_values import LineValues, PointValues

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import combinations
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 
@@ -51,18 +50,6 @@ def check_arguments(solver: str, tolerance: float) -> None:
     choice(solver, "solver", METHODS)
 
 
-def metrics(solution: Solution, balance: tuple[float, float]) -> dict[str, Any]:
-    """Return how a solution was found and how good it is, by the names of a `Report`."""
-    return {
-        "solver": solution.method,
-        "reason": solution.reason,
-        "iterations": solution.iterations,
-        "backward_error": solution.backward_error,
-        "force_error": balance[0],
-        "moment_error": balance[1],
-    }
-
-
 def initial_roundoff(model: Structure, norm: float, tolerance: float, forces: Array) -> float:
     """Return what rounding and the solver leave of the forces (n, 3) of an initial state, in N."""
     u0 = model.initial_displacement
@@ -99,14 +86,11 @@ def check_solution(solution: Solution, u: Array, balance: tuple[float, float]) -
         )
 
 
-LARGE = 0.1
-"""Displacement, as fraction of the diagonal of the body, from which it is not small."""
+LARGE = 0.1  # displacement, as fraction of the diagonal of the body, from which it is not small
 TINY = 1e-11
 """Displacement, as fraction of the diagonal, below which a load does nothing: 0.2 Pa on steel do more."""
-STRAINED = 0.05
-"""Strain from which it is not small."""
-SAMPLE = 500
-"""Elements whose strain is looked at, spread over the mesh."""
+STRAINED = 0.05  # strain from which it is not small
+SAMPLE = 500  # elements whose strain is looked at, spread over the mesh
 UNITLESS = 10.0
 """Young's modulus in Pa below all materials, gels included, so that models with it are without units."""
 GOLDEN = (5**0.5 - 1) / 2

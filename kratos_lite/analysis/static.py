@@ -18,7 +18,7 @@ from kratos_lite.analysis.prepared import (
     prepared,
     system_of,
 )
-from kratos_lite.analysis.report import Report
+from kratos_lite.analysis.report import report_of
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.solution_checks import (
     Phases,
@@ -27,7 +27,6 @@ from kratos_lite.analysis.solution_checks import (
     check_deformation,
     check_solution,
     initial_roundoff,
-    metrics,
 )
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model import checks
@@ -251,7 +250,19 @@ class StaticAnalysis:
                 warnings += checks.check_energy(work, 100 * noise * prescribed)
             warnings += checks.check_rounding(noise, case.external, initial, reactions, model.supports)
             warnings += check_deformation(model, state.groups, u)
-        report = self._report(case, solution, reactions, balance, warnings)
+        n_equations = 3 * int(state.used.sum()) - self._dirichlet.count
+        report = report_of(
+            model,
+            state.groups,
+            n_equations - len(model.supports.dependents()),
+            (case.external.sum(axis=0), reactions.sum(axis=0)),
+            solution,
+            balance,
+            state.free.notes(case.moving),
+            seconds=phase.seconds,
+            warnings=warnings,
+            skipped=self._skipped(case.moving),
+        )
         u0 = model.initial_displacement
         return Result(model.mesh, state.groups, u, reactions, case.external, report, u0, self)
 
@@ -289,28 +300,6 @@ class StaticAnalysis:
         system = self._equations_of(moving).system
         displaced, at_rest = (supports.constraint_map(system.nodes, u).c for u in (moved, 0.0 * moved))
         return system.solve(load, displaced - at_rest, max(self.tolerance, ADJOINT_TOLERANCE))[0]
-
-    def _report(
-        self,
-        case: LoadSet,
-        solution: Solution,
-        reactions: Array,
-        balance: tuple[float, float],
-        warnings: list[str],
-    ) -> Report:
-        model, state = self.model, self._state
-        n_equations = 3 * int(state.used.sum()) - self._dirichlet.count
-        return Report(
-            unknowns=n_equations - len(model.supports.dependents()),
-            total_load=case.external.sum(axis=0),
-            total_reaction=reactions.sum(axis=0),
-            **metrics(solution, balance),
-            seconds=case.phase.seconds,
-            warnings=warnings,
-            notes=[*model.remarks(), *state.free.notes(case.moving)],
-            skipped=self._skipped(case.moving),
-            formulation=model.chosen(state.groups),
-        )
 
     def _at_rest(self) -> Array:
         """Return displacements (n, 3) that are 0 but for what is prescribed."""

@@ -7,14 +7,13 @@ from kratos_lite.analysis.derived_quantities import motion_summary
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.modal import critical_rates, critical_rates_beside
 from kratos_lite.analysis.nodal_loads import initial_loads, stress_load
-from kratos_lite.analysis.report import Report
+from kratos_lite.analysis.report import report_of
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.solution_checks import (
     Phases,
     check_arguments,
     check_deformation,
     check_solution,
-    metrics,
 )
 from kratos_lite.model.checks import check_loads, equilibrium
 from kratos_lite.model.loads.base import equal_loads
@@ -34,10 +33,9 @@ def solve_steady(
     with phase("check"):
         e = EquationsOfMotion(model, free=False, steady=True, progress=progress)
         warnings, changing = list(e.warnings), []
+        rate = e.rates(0.0)[0]
         if e.terms is not None and not e.terms.motion.steady:
-            changing = [
-                f"the rate changes; this is the steady state of {e.rates(0.0)[0]:g}, as at the time 0"
-            ]
+            changing = [f"the rate changes; this is the steady state of {rate:g}, as at the time 0"]
         if e.terms is not None and not e.terms.motion.uniformly_accelerated:
             changing.append("the acceleration of the center changes; it is taken as at the time 0")
     with phase("load"):
@@ -63,21 +61,22 @@ def solve_steady(
         balance = equilibrium(model.mesh.points, nodal - inner, reactions, stresses)
         check_solution(solution, u, balance)
         critical = None
-        if e.terms is not None and e.rates(0.0)[0]:
+        if e.terms is not None and rate:
             if solution.method == "direct":
                 critical = _critical_rate(e, equations.factors if symmetric else None)
             limit = critical_rate_estimate(e.terms) if critical is None else critical
             warnings += near_critical(e.terms.motion, 0.0, limit, critical is not None)
-    report = Report(
-        unknowns=len(e.system.constraint_map.free),
-        total_load=nodal.sum(axis=0),
-        total_reaction=reactions.sum(axis=0),
-        **metrics(solution, balance),
+    report = report_of(
+        model,
+        e.groups,
+        len(e.system.constraint_map.free),
+        (nodal.sum(axis=0), reactions.sum(axis=0)),
+        solution,
+        balance,
+        changing,
         seconds=phase.seconds,
         warnings=warnings,
-        notes=[*model.remarks(), *changing],
-        formulation=model.chosen(e.groups),
-        skipped=["convective terms, as the rate is 0"] if not (e.rates(0.0)[0] or inertia.any()) else [],
+        skipped=["convective terms, as the rate is 0"] if not (rate or inertia.any()) else [],
     )
     u0 = model.initial_displacement
     result = Result(model.mesh, e.groups, e.system.scatter(u), reactions, nodal, report, u0)

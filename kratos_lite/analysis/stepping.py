@@ -22,10 +22,8 @@ from kratos_lite.validation import function_or_none, positive_step, short, takes
 from kratos_lite.view.progress import watched
 
 _log = logging.getLogger("kratos_lite")
-SAFETY = 0.95
-"""Fraction of the critical step that automatic substeps take."""
-MOST_SUBSTEPS = 1_000_000
-"""Parts of one step; more would take the time of a whole run until the first state."""
+SAFETY = 0.95  # fraction of the critical step that automatic substeps take
+MOST_SUBSTEPS = 1_000_000  # parts of one step; more would take the time of a whole run until the first state
 
 
 def integrate(
@@ -143,8 +141,7 @@ def _divergence(stepper: BodyStepper | TransientAnalysis, h: float) -> SolveErro
     )
 
 
-CHECKED = 100
-"""Steps after which the critical step is found anew, as the tangent may have stiffened."""
+CHECKED = 100  # steps after which the critical step is found anew, as the tangent may have stiffened
 
 
 class BodyStepper:

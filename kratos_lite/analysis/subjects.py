@@ -18,12 +18,9 @@ from kratos_lite.typing import Array, Numbers
 from kratos_lite.validation import finite, number, short
 from kratos_lite.view.scene import Options, Subject, Values, factor_of
 
-DEFAULT = "von_mises"
-"""What colors a result."""
-PERIOD = 24
-"""Frames of a period."""
-AMPLITUDE = 0.1
-"""Largest displacement of a mode as it is drawn, of the size of the body."""
+DEFAULT = "von_mises"  # what colors a result
+PERIOD = 24  # frames of a period
+AMPLITUDE = 0.1  # largest displacement of a mode as it is drawn, of the size of the body
 KINDS = (
     "a mesh, a model, a result, several of them, a body with states, a transient with states, the report of "
     "an adaptive solution, or the class of an element"
@@ -255,8 +252,7 @@ def _names() -> Iterator[tuple[str, tuple[str, int | None]]]:
                 yield field.symbol + part, (key, i)
 
 
-NAMES = dict(_names())
-"""Field and number of its part by each name; a vector itself is shown by its length."""
+NAMES = dict(_names())  # field and number of its part by each name; a vector itself is shown by its length
 MOTIONS = tuple(name for name, (field, _) in NAMES.items() if field == "displacement")
 """Those that need nothing but displacements."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from kratos_lite.analysis.integrators.base import INTEGRATORS, ModelIntegrator, 
 from kratos_lite.analysis.integrators.generalized_alpha import Newmark
 from kratos_lite.analysis.material_derivatives import acceleration_of_material, velocity_of_material
 from kratos_lite.analysis.modal import critical_rates
-from kratos_lite.analysis.report import Report
+from kratos_lite.analysis.report import report_of
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.solution_checks import check_deformation
 from kratos_lite.analysis.state import MODEL_FIELDS, State, check_state
@@ -22,19 +22,14 @@ from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model.loads.base import equal_loads
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.direct import one_thread
+from kratos_lite.solvers.linear_solver import Solution
 from kratos_lite.solvers.plan import REPEATED_LIMIT
-from kratos_lite.typing import Array, Progress
+from kratos_lite.typing import Array, ArrayLike, Progress
 from kratos_lite.validation import finite, flag, function_or_none
 
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-DIVERGED = 1e9
-"""Displacements by the size of the model beyond which a motion has lost its stability."""
-OFF_SUPPORT = 1e-6
-"""Fraction of the largest displacement by which a state may miss its supports."""
-OFF_BALANCE = 1e-4
-"""Fraction of the largest force by which the accelerations of a state may miss the balance."""
+DIVERGED = 1e9  # displacements by the size of the model beyond which a motion has lost its stability
+OFF_SUPPORT = 1e-6  # fraction of the largest displacement by which a state may miss its supports
+OFF_BALANCE = 1e-4  # fraction of the largest force by which the accelerations of a state may miss the balance
 
 
 def _version(model: Structure) -> list[Any]:
@@ -312,21 +307,12 @@ class TransientAnalysis:
         if self.integrator.balanced:
             free, largest = self._imbalance(*self._at(at))
             residual = free / largest if largest else 0.0
-        report = Report(
-            unknowns=len(e.system.constraint_map.free),
-            total_load=loads.sum(axis=0),
-            total_reaction=at.reactions.sum(axis=0),
-            solver=str(self.integrator),
-            reason=f"step {at.step}, t = {at.time:g} s",
-            iterations=0,
-            backward_error=residual,
-            force_error=None,
-            moment_error=None,
-            seconds={},
-            warnings=[*e.warnings, *check_deformation(model, e.groups, at.u)],
-            notes=model.remarks(),
-            formulation=model.chosen(e.groups),
-        )
+        totals, reason = (loads.sum(axis=0), at.reactions.sum(axis=0)), f"step {at.step}, t = {at.time:g} s"
+        solution = Solution(at.u, str(self.integrator), reason, 0, 0.0)
+        warnings = [*e.warnings, *check_deformation(model, e.groups, at.u)]
+        unknowns = len(e.system.constraint_map.free)
+        report = report_of(model, e.groups, unknowns, totals, solution, seconds={}, warnings=warnings)
+        report.backward_error = residual
         u0 = model.initial_displacement
         result = Result(model.mesh, e.groups, at.u.copy(), at.reactions.copy(), loads, report, u0)
         if e.terms is not None:

@@ -27,12 +27,9 @@ from kratos_lite.solvers.direct import one_thread
 from kratos_lite.typing import Array
 
 _log = logging.getLogger("kratos_lite")
-STIFF = 15.0
-"""h ω up to which the linearly implicit integrator has never been seen to blow up."""
-NEWTON_MAX = 50
-"""Iterations of one step; a step that needs more is too long."""
-SLOW = 0.2
-"""Rate of an iteration with old factors above which new ones are made."""
+STIFF = 15.0  # h ω up to which the linearly implicit integrator has never been seen to blow up
+NEWTON_MAX = 50  # iterations of one step; a step that needs more is too long
+SLOW = 0.2  # rate of an iteration with old factors above which new ones are made
 
 
 class _FiniteElement(BodyIntegrator[FiniteElementBody]):

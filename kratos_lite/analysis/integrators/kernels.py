@@ -16,8 +16,7 @@ Finish: TypeAlias = Callable[..., int]
 """Completes a step in NumPy; returns the first body that failed, or -1."""
 Step: TypeAlias = Callable[..., tuple[Array, int]]
 """Takes a step in NumPy under constant loads; returns the load at mid-step, too."""
-AT_ONCE = 100_000
-"""Steps of one body in one call of a kernel: they take less than 0.1 s."""
+AT_ONCE = 100_000  # steps of one body in one call of a kernel: they take less than 0.1 s
 
 
 def compiled(name: str, *arguments: Any) -> Any:

@@ -27,8 +27,7 @@ from kratos_lite.typing import Array, Mask
 from kratos_lite.voigt import tensor
 
 METHODS = ("explicit", "linearly_implicit", "energy_momentum")
-TOLERANCE = 1e-12
-"""Last change of the rate of F beside that rate in the energy-momentum method."""
+TOLERANCE = 1e-12  # last change of the rate of F beside that rate in the energy-momentum method
 NEWTON_MAX = 50
 
 

@@ -26,11 +26,9 @@ from kratos_lite.bodies.rotations import exp, hat, right_jacobian, rotation_of, 
 from kratos_lite.typing import Array, Mask
 
 METHODS = ("explicit", "momentum_conserving", "implicit")
-TOLERANCE = 1e-14
-"""Residual of the implicit method beside the momentum."""
+TOLERANCE = 1e-14  # residual of the implicit method beside the momentum
 NEWTON_MAX = 50
-ROUND_OFF = 4e-16
-"""Change of a velocity beside it that is none."""
+ROUND_OFF = 4e-16  # change of a velocity beside it that is none
 
 
 class _Rigid(BodyIntegrator[RigidBody]):
