@@ -13,15 +13,12 @@ from kratos_lite.analysis.solution_checks import Phases
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.errors import InputError
 from kratos_lite.model.structure import Structure
-from kratos_lite.solvers import direct
 from kratos_lite.solvers.constraints import ConstraintMap, rigid_modes
 from kratos_lite.solvers.eigen import Operator, Pencil, Problem, dense_modes, is_small, neutral_motions
 from kratos_lite.solvers.linear_solver import LinearSolver
 from kratos_lite.solvers.plan import DENSE_MODES, stepped
 from kratos_lite.typing import Array, Complexes, Progress
 from kratos_lite.validation import instance, whole_number
-
-FEW = 40  # up to this many unknowns there is nothing to iterate for
 
 
 def natural_modes(
@@ -156,7 +153,10 @@ def critical_rates(e: EquationsOfMotion, count: int) -> Array:
     if count > n:
         raise InputError(f"this model has 1 … {n} critical rates; got {count}")
     if n <= DENSE_MODES or count > n // 4:
-        largest = _dense(reduced(e, e.K), reduced(e, H))[::-1][:count]
+        from scipy.linalg import eigh
+
+        dense = (reduced(e, A).toarray() for A in (H, e.K))
+        largest = np.asarray(eigh(*dense, eigvals_only=True))[::-1][:count]
     else:
         solver = replace(e.system.equations, plan=stepped(n))
         times_H, times_K = (_reduced_product(constraints, A.times) for A in (H, e.K))
@@ -167,52 +167,12 @@ def critical_rates(e: EquationsOfMotion, count: int) -> Array:
         return np.sort(np.where(largest > 0, 1 / np.sqrt(np.maximum(largest, 1e-300)), np.inf))
 
 
-def critical_rates_beside(
-    e: EquationsOfMotion, rate: float, factors: direct.Factorization | None = None
-) -> tuple[float, float]:
-    """Return the critical rates of the mesh next below and next above a rate > 0, to some 1 %.
-
-    They are 0 and infinite where there is none.  `factors` are those of K - rate² H, if they are known: some
-    twenty solutions with them are enough.
-    """
-    square, K, H = rate**2, reduced(e, e.K), reduced(e, _critical_terms(e))
-    if K.shape[0] <= FEW:
-        with np.errstate(divide="ignore"):
-            squares = 1 / _dense(K, H)
-    else:
-        factors = factors or direct.factorize((K - square * H).tocsr())
-        squares = _beside(K, H, square, factors)
-    below, above = squares[(squares > 0) & (squares <= square)], squares[squares > square]
-    return float(np.sqrt(below.max(initial=0.0))), float(np.sqrt(above.min(initial=np.inf)))
-
-
-def _beside(K: Any, H: Any, square: float, factors: direct.Factorization) -> Array:
-    """Return eigenvalues of K φ = λ H φ on either side of a number, by Lanczos on (K - number H)^-1 K."""
-    from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
-
-    n = K.shape[0]
-    inverse = LinearOperator((n, n), matvec=factors.apply, dtype=np.float64)
-    start = np.random.default_rng(0).standard_normal(n)
-    way = {"mode": "buckling", "which": "BE", "OPinv": inverse, "v0": start, "return_eigenvectors": False}
-    try:
-        return np.asarray(eigsh(K, 2, H, sigma=square, tol=1e-2, ncv=FEW // 2, maxiter=3, **way))
-    except ArpackError as error:  # what it has found, if anything
-        return np.asarray(getattr(error, "eigenvalues", ()), dtype=float)
-
-
 def _critical_terms(e: EquationsOfMotion) -> BlockMatrix:
     """Return H, less what stiffens."""
     assert e.terms is not None
     H = BlockMatrix(np.zeros_like(e.K.data), e.K.indices, e.K.indptr)
     H.add_scalar(e.terms.H - (e.stiffening if e.stiffened else 0.0))
     return H
-
-
-def _dense(K: Any, H: Any) -> Array:
-    """Return all 1 / λ of K φ = λ H φ, ascending."""
-    from scipy.linalg import eigh
-
-    return np.asarray(eigh(H.toarray(), K.toarray(), eigvals_only=True))
 
 
 def reduced(equations: EquationsOfMotion, A: BlockMatrix) -> Any:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from itertools import combinations
 from time import perf_counter
 
 import numpy as np
@@ -12,12 +11,11 @@ import numpy as np
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError, SolveError
 from kratos_lite.mesh import Mesh
-from kratos_lite.model.checks import equilibrium, young_moduli
+from kratos_lite.model.checks import young_moduli
 from kratos_lite.model.structure import Structure
-from kratos_lite.registry import remembered
 from kratos_lite.solvers.linear_solver import Solution
 from kratos_lite.solvers.plan import METHODS
-from kratos_lite.typing import Array, Ints, Progress
+from kratos_lite.typing import Array, Progress
 from kratos_lite.validation import choice, function_or_none
 
 
@@ -48,25 +46,6 @@ def check_arguments(solver: str, tolerance: float) -> None:
     if isinstance(tolerance, bool) or not isinstance(tolerance, (float, int)) or not 0 < tolerance < 1:
         raise InputError(f"tolerance must be a number between 0 and 1; got {tolerance!r}")
     choice(solver, "solver", METHODS)
-
-
-def initial_roundoff(model: Structure, norm: float, tolerance: float, forces: Array) -> float:
-    """Return what rounding and the solver leave of the forces (n, 3) of an initial state, in N."""
-    u0 = model.initial_displacement
-    largest = 0.0 if u0 is None else float(np.abs(u0).max(initial=0.0))
-    return float(max(np.finfo(float).eps * norm * largest, tolerance * np.linalg.norm(forces)))
-
-
-def balance_of(
-    mesh: Mesh, external: Array, forces: Array, reactions: Array, inner: Array, noise: float, unknowns: int
-) -> tuple[float, float]:
-    """Return what forces and moments miss to equilibrium, relative; `noise` in N is that of one unknown.
-
-    `forces` are `external` ones without those of the initial stress, `inner` those of the stresses, (n, 3).
-    """
-    # Without loads, each prescribed degree of freedom may hold nothing but the rounding of K u.
-    rounding = (unknowns**0.5 if forces.any() else np.count_nonzero(reactions)) * noise
-    return equilibrium(mesh.points, external, reactions, inner, rounding)
 
 
 def check_solution(solution: Solution, u: Array, balance: tuple[float, float]) -> None:
@@ -138,27 +117,16 @@ def largest_elongation(mesh: Mesh, u: Array) -> float:
     for block in mesh.blocks:
         if block.shape is None or not len(block):
             continue
-        cells = _spread(len(block), -(-SAMPLE * len(block) // mesh.n_elements))
+        count, wanted = len(block), -(-SAMPLE * len(block) // mesh.n_elements)
+        # spread so that no regular order of the elements hides any
+        cells = np.arange(count) if wanted >= count else (np.arange(wanted) * GOLDEN % 1 * count).astype(int)
         corners = block.nodes[cells, : block.shape.corners]
-        one, other = _pairs(block.shape.corners)
+        one, other = np.triu_indices(block.shape.corners, 1)
         X, D = mesh.points[corners], u[corners]
         X, D = X[:, one] - X[:, other], D[:, one] - D[:, other]
         length = np.maximum(np.einsum("epi,epi->ep", X, X), np.finfo(float).tiny)
         found = max(found, float(np.abs(np.einsum("epi,epi->ep", X, D) / length).max()))
     return found
-
-
-@remembered
-def _pairs(corners: int) -> tuple[Ints, Ints]:
-    one, other = np.array(list(combinations(range(corners), 2))).T
-    return one, other
-
-
-def _spread(count: int, wanted: int) -> Ints:
-    """Return rows of some of `count` elements, spread so that no regular order of them hides any."""
-    if wanted >= count:
-        return np.arange(count)
-    return (np.arange(wanted) * GOLDEN % 1 * count).astype(np.int64)
 
 
 def _diagonal(values: Array) -> float:

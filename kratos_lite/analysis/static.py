@@ -22,11 +22,9 @@ from kratos_lite.analysis.report import report_of
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.solution_checks import (
     Phases,
-    balance_of,
     check_arguments,
     check_deformation,
     check_solution,
-    initial_roundoff,
 )
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model import checks
@@ -215,7 +213,7 @@ class StaticAnalysis:
     ) -> Result:
         """Solve for a load set with the equations of all parts in `moving`."""
         model, state, phase = self.model, self._state, case.phase
-        warnings = self._warnings(case)
+        warnings, n_used = self._warnings(case), 3 * int(state.used.sum())
         u, reactions, noise = self._at_rest(), 0.0 - case.forces, 0.0
         solution = Solution(u, "none", "nothing moves: u = 0 needs no solution", 0, 0.0)
         if case.moving.any():
@@ -233,28 +231,23 @@ class StaticAnalysis:
                 reactions = system.residual(u, case.forces)
             reactions = model.supports.supported(reactions)
             inner = model.supports.on_independents(stress_load(model, state.groups, u))
-            if state.initial is not None and self.system is not None:
-                rounding = initial_roundoff(model, self.system.norm, self.tolerance, case.forces)
-            else:
-                rounding = 0.0
-            forces = case.external, case.forces, reactions, inner
-            balance = balance_of(model.mesh, *forces, max(noise, rounding), 3 * int(state.used.sum()))
+            roundoff = max(noise, self._initial_roundoff(case.forces))
+            # Without loads, each prescribed degree of freedom may hold nothing but the rounding of K u.
+            count = n_used**0.5 if case.forces.any() else np.count_nonzero(reactions)
+            balance = checks.equilibrium(model.mesh.points, case.external, reactions, inner, count * roundoff)
             if tolerance is None:
                 check_solution(solution, u, balance)
             initial = case.external - case.forces
             if tolerance is None and not initial.any():
                 work = checks.work_of(u, inner, case.external, reactions)
-                prescribed = float(
-                    np.abs(model.supports.values).sum()
-                )  # whose work has the rounding of forces
+                prescribed = float(np.abs(model.supports.values).sum())  # whose work has roundoff of forces
                 warnings += checks.check_energy(work, 100 * noise * prescribed)
             warnings += checks.check_rounding(noise, case.external, initial, reactions, model.supports)
             warnings += check_deformation(model, state.groups, u)
-        n_equations = 3 * int(state.used.sum()) - self._dirichlet.count
         report = report_of(
             model,
             state.groups,
-            n_equations - len(model.supports.dependents()),
+            n_used - self._dirichlet.count - len(model.supports.dependents()),
             (case.external.sum(axis=0), reactions.sum(axis=0)),
             solution,
             balance,
@@ -300,6 +293,15 @@ class StaticAnalysis:
         system = self._equations_of(moving).system
         displaced, at_rest = (supports.constraint_map(system.nodes, u).c for u in (moved, 0.0 * moved))
         return system.solve(load, displaced - at_rest, max(self.tolerance, ADJOINT_TOLERANCE))[0]
+
+    def _initial_roundoff(self, forces: Array) -> float:
+        """Return what rounding and the solver leave of the forces (n, 3) of an initial state, in N."""
+        if self._state.initial is None or self.system is None:
+            return 0.0
+        u0 = self.model.initial_displacement
+        largest = 0.0 if u0 is None else float(np.abs(u0).max(initial=0.0))
+        rounded = np.finfo(float).eps * self.system.norm * largest
+        return float(max(rounded, self.tolerance * np.linalg.norm(forces)))
 
     def _at_rest(self) -> Array:
         """Return displacements (n, 3) that are 0 but for what is prescribed."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from kratos_lite.ale.checks import critical_rate_estimate, near_critical
 from kratos_lite.analysis.derived_quantities import motion_summary
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
-from kratos_lite.analysis.modal import critical_rates, critical_rates_beside
+from kratos_lite.analysis.modal import critical_rates
 from kratos_lite.analysis.nodal_loads import initial_loads, stress_load
 from kratos_lite.analysis.report import report_of
 from kratos_lite.analysis.result import Result
@@ -18,7 +18,6 @@ from kratos_lite.analysis.solution_checks import (
 from kratos_lite.model.checks import check_loads, equilibrium
 from kratos_lite.model.loads.base import equal_loads
 from kratos_lite.model.structure import Structure
-from kratos_lite.solvers.direct import Factorization
 from kratos_lite.solvers.linear_solver import LinearSolver
 from kratos_lite.solvers.plan import repeated
 from kratos_lite.typing import Progress
@@ -63,7 +62,7 @@ def solve_steady(
         critical = None
         if e.terms is not None and rate:
             if solution.method == "direct":
-                critical = _critical_rate(e, equations.factors if symmetric else None)
+                critical = float(critical_rates(e, 1)[0])
             limit = critical_rate_estimate(e.terms) if critical is None else critical
             warnings += near_critical(e.terms.motion, 0.0, limit, critical is not None)
     report = report_of(
@@ -82,12 +81,3 @@ def solve_steady(
     result = Result(model.mesh, e.groups, e.system.scatter(u), reactions, nodal, report, u0)
     report.motion = motion_summary(e, result, critical)
     return result
-
-
-def _critical_rate(e: EquationsOfMotion, factors: Factorization | None) -> float:
-    """Return the critical rate next above that of a motion, or the lowest if one lies below."""
-    assert e.terms is not None
-    rate = e.rates(0.0)[0]
-    below, above = critical_rates_beside(e, rate, factors)
-    far = abs(rate) > critical_rate_estimate(e.terms)  # where those below are too far away to be found
-    return float(critical_rates(e, 1)[0]) if below or far else above

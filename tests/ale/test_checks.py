@@ -7,8 +7,6 @@ from meshes import changed_at, elsewhere
 import kratos_lite as kl
 from kratos_lite.ale import Rotation, Translation
 from kratos_lite.ale.checks import rayleigh_speed
-from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
-from kratos_lite.analysis.modal import critical_rates_beside
 from kratos_lite.errors import InputError, ModelError
 
 
@@ -75,19 +73,6 @@ def test_a_thick_wheel_bends_at_less_than_half_the_rate_of_waves(rate, damping, 
         said = [text for text in warnings if "critical" in text]
         assert (len(said) == 1 and said[0].startswith(words)) if words else not said
     assert (result.report.motion["margin"] < 0) == ("above" in words)
-
-
-def test_critical_rates_beside_a_rate_are_those_of_the_mesh(wheels):
-    for cells, element in (((1, 12, 1), "20N"), ((2, 24, 1), "20N"), ((1, 12, 1), "8N")):
-        model = wheels.disk(element, *cells[:2])
-        all_rates = kl.critical_rate(wheels_with(model, 50.0), 12)
-        widest = int(np.diff(all_rates).argmax())
-        low, high = all_rates[widest : widest + 2]
-        between = (low + high) / 2
-        model.motion = None
-        e = EquationsOfMotion(wheels_with(model, between), free=False)
-        assert critical_rates_beside(e, between) == pytest.approx((low, high), rel=1e-2)
-        assert critical_rates_beside(e, 0.5 * all_rates[0]) == (0.0, pytest.approx(all_rates[0], rel=1e-2))
 
 
 def wheels_with(model, rate):
