@@ -62,10 +62,8 @@ def states_of(body: Body, states: Any) -> list[State]:
 def _row(body: Body, state: State) -> Array:
     """Return time, energies and mass center (8,)."""
     with at(body, state):
-        energies = [
-            float(e) for e in (body.kinetic_energy(), body.internal_energy(), body.potential_energy())
-        ]
-        return np.concatenate([[state.time, *energies, sum(energies)], body.mass_center()])
+        energies = body.kinetic_energy(), body.internal_energy(), body.potential_energy()
+        return np.array([state.time, *energies, sum(energies), *body.mass_center()], dtype=float)
 
 
 def moving_subjects(body: Body, states: Any, most: int, title: str | None) -> list[Subject]:
@@ -74,18 +72,12 @@ def moving_subjects(body: Body, states: Any, most: int, title: str | None) -> li
     if len(found) < 2:
         raise InputError("nothing moves here: give more than one state of the body")
     assert body.mesh is not None
-    X, chosen = body.mesh.points, [found[row] for row in evenly(len(found), most)]
-    return [
-        Subject(
-            body.mesh,
-            body.position(X, check_state_of_body(state, body).q) - X,
-            None,
-            f"{title or ''}\nt = {state.time:.3f} s".strip(),
-            marks_of(body, state.q),
-            True,
-        )
-        for state in chosen
-    ]
+    X, subjects = body.mesh.points, []
+    for state in (found[row] for row in evenly(len(found), most)):
+        u = body.position(X, check_state_of_body(state, body).q) - X
+        head = f"{title or ''}\nt = {state.time:.3f} s".strip()
+        subjects.append(Subject(body.mesh, u, None, head, marks_of(body, state.q), True))
+    return subjects
 
 
 def marks_of(body: Body, q: Array) -> Marks:

@@ -179,9 +179,8 @@ def animate(
     most = whole_number(OF_STATES if frames is None else frames, "frames", least=2)
     if isinstance(thing, Body):
         _only({**given, "frames": None, "fps": None}, "a body", ("states", "title", "size", "view", "zoom"))
-        subjects = moving_subjects(thing, states, most, title)
-        series, given["view"] = [[subject] for subject in subjects], view or "iso"
-        options = options_of(given, 1.0)
+        series = [[subject] for subject in moving_subjects(thing, states, most, title)]
+        options = options_of({**given, "view": view or "iso"}, 1.0)
     else:
         series, options = series_of(thing, given, most)
     write_animation(path, series, options, fps)
@@ -198,11 +197,9 @@ def _figure(thing: Any, given: dict[str, Any]) -> Any:
     if isinstance(thing, Body):
         _only(given, "a body", ("states", "shown", "title", "size", "view"))
         return path_figure(thing, given)
-    for name in ("points", "shown"):
+    for name, owner in (("points", "an element"), ("shown", "a body")):
         if given[name] is not None:
-            raise InputError(
-                f"{name} belongs to {'an element' if name == 'points' else 'a body'}; leave it out"
-            )
+            raise InputError(f"{name} belongs to {owner}; leave it out")
     return figure_of(*panels_of(thing, given))
 
 
@@ -218,9 +215,7 @@ def _history(report: Report, given: dict[str, Any]) -> Any:
         raise InputError(
             "this report has no history to draw: that of model.solve(error=...) has the error of each mesh"
         )
-    unknowns, errors = (
-        np.array([getattr(s, name) for s in report.history]) for name in ("unknowns", "error")
-    )
+    unknowns, errors = np.array([(step.unknowns, step.error) for step in report.history]).T
     title, size = given["title"] or "", given["size"] or (6, 4)
     return convergence_figure(unknowns, errors, report.error_asked, report.error_of, title, size)
 

@@ -30,12 +30,9 @@ KINDS = (
 def panels_of(thing: Any, given: dict[str, Any]) -> tuple[list[Subject], Options]:
     """Return what is drawn side by side, and how."""
     if given["modes"] is not None:
-        shapes, titles = _modes(thing, given)
-        options = options_of(given, _factor(given, 1.0))
-        return _phase(thing, given, shapes, titles, 1.0), options
+        return _phase(thing, given, *_modes(thing, given), 1.0), options_of(given, 1.0)
     things, titles = _several(thing, given)
-    subjects = [_subject(one, given) for one in things]
-    options = options_of(given, _factor(given, None))
+    subjects, options = [_subject(one, given) for one in things], options_of(given)
     heads = _heads(subjects, given, factor_of(subjects, options.scale))
     if len(things) == 1 and not titles:
         return [replace(subjects[0], title=heads)], options
@@ -48,11 +45,8 @@ def series_of(thing: Any, given: dict[str, Any], most: int) -> tuple[list[list[S
     given["displacement"] = None
     phases = np.arange(given["frames"] or PERIOD) / (given["frames"] or PERIOD)
     if given["modes"] is not None:
-        shapes, titles = _modes(thing, given)
-        turns = np.exp(2j * np.pi * phases)
-        return [_phase(thing, given, shapes, titles, turn) for turn in turns], options_of(
-            given, _factor(given, 1.0)
-        )
+        modes, turns = _modes(thing, given), np.exp(2j * np.pi * phases)
+        return [_phase(thing, given, *modes, turn) for turn in turns], options_of(given, 1.0)
     if isinstance(thing, InTime) and given["values"] is None:
         given["values"] = "displacement"
     things, titles = _several(thing, given)
@@ -60,23 +54,22 @@ def series_of(thing: Any, given: dict[str, Any], most: int) -> tuple[list[list[S
         rows = evenly(len(things), most)
         subjects = [_subject(things[row], given) for row in rows]
         titles = [titles[row] for row in rows] if titles else [""] * len(rows)
+    elif not isinstance(things[0], Fields) or not things[0].u.any():
+        raise InputError("nothing moves here: give modes, states, or a result with displacements")
     else:
-        if not isinstance(things[0], Fields) or not things[0].u.any():
-            raise InputError("nothing moves here: give modes, states, or a result with displacements")
-        subjects = [
-            _scaled(_subject(things[0], given), fraction) for fraction in (1 - np.cos(2 * np.pi * phases)) / 2
-        ]
+        fractions = (1 - np.cos(2 * np.pi * phases)) / 2
+        subjects = [_scaled(_subject(things[0], given), fraction) for fraction in fractions]
         titles = [""] * len(subjects)
-    scale = factor_of(subjects, _factor(given, None))
-    heads = _heads(subjects, given, scale)
-    return [
-        [replace(subject, title=f"{heads}\n{title}".strip())]
-        for subject, title in zip(subjects, titles, strict=True)
-    ], options_of(given, scale)
+    options = options_of(given)
+    options.scale = factor_of(subjects, options.scale)
+    heads = _heads(subjects, given, options.scale)
+    titled = zip(subjects, titles, strict=True)
+    return [[replace(subject, title=f"{heads}\n{title}".strip())] for subject, title in titled], options
 
 
-def options_of(given: dict[str, Any], scale: float | None) -> Options:
-    """Return how subjects are drawn."""
+def options_of(given: dict[str, Any], scale: float | None = None) -> Options:
+    """Return how subjects are drawn, with a factor on displacements if none is given."""
+    scale = scale if given["scale"] == "auto" else number(given["scale"], "scale")
     size = given["size"] or (8, 6)
     return Options(given["view"], _clim(given["clim"]), scale, _zoom(given["zoom"]), given["clip"], size)
 
@@ -84,11 +77,6 @@ def options_of(given: dict[str, Any], scale: float | None) -> Options:
 def evenly(count: int, most: int) -> list[int]:
     """Return at most so many of 0 … count - 1, evenly spread, the first and the last among them."""
     return [int(row) for row in np.unique(np.linspace(0, count - 1, min(count, most)).round())]
-
-
-def _factor(given: dict[str, Any], otherwise: float | None) -> float | None:
-    """Return the factor on displacements that was given; else another."""
-    return otherwise if given["scale"] == "auto" else number(given["scale"], "scale")
 
 
 def _several(thing: Any, given: dict[str, Any]) -> tuple[list[Any], list[str]]:
@@ -159,11 +147,11 @@ def _values(result: Fields | None, mesh: Mesh, u: Array | None, given: dict[str,
         return named
     if values is None:
         return None
-    numbers = finite(values, "values")
-    if numbers.shape not in ((mesh.n_nodes,), (mesh.n_elements,)):
+    numbers, counts = finite(values, "values"), (mesh.n_nodes, mesh.n_elements)
+    if numbers.ndim != 1 or len(numbers) not in counts:
         raise InputError(
-            f"values must have shape ({mesh.n_nodes},), a number for each node, or ({mesh.n_elements},), for "
-            f"each element; got {numbers.shape}"
+            f"values must have shape ({counts[0]},), a number for each node, or ({counts[1]},), for each "
+            f"element; got {numbers.shape}"
         )
     return Values(numbers, unit=unit or "")
 
@@ -211,14 +199,14 @@ def _phase(
 ) -> list[Subject]:
     """Return modes side by side in a phase, colored by displacement as a fraction of the largest."""
     mesh = _mesh(thing)
-    u = (shapes * turn).real
-    size = np.linalg.norm(shapes, axis=2).max(axis=1)
     subjects = []
-    for shape, largest, title in zip(u, size, titles, strict=True):
-        values: Values | None = Values(np.linalg.norm(shape, axis=1) / (largest or 1.0))
-        if given["values"] is not None:
-            values = _values(None, mesh, shape / (largest or 1.0), given)
-        subjects.append(Subject(mesh, shape, values, title))
+    for shape, title in zip(shapes, titles, strict=True):
+        u, largest = (shape * turn).real, np.linalg.norm(shape, axis=1).max() or 1.0
+        if given["values"] is None:
+            values: Values | None = Values(np.linalg.norm(u, axis=1) / largest)
+        else:
+            values = _values(None, mesh, u / largest, given)
+        subjects.append(Subject(mesh, u, values, title))
     return subjects
 
 
