@@ -197,15 +197,13 @@ class EquationsOfMotion:
         """Return what the motion adds to K and C as sparse (a, a), or None; kept for the same rates."""
         from scipy.sparse import csr_array
 
-        key = self.rates(time)
+        key, pattern = self.rates(time), self.system.pattern
         if self._scalar_kept is None or self._scalar_kept[0] != key:
-            pattern = self.system.pattern
-            n = pattern.n_nodes
-            pair = [
-                None if data is None else csr_array((data, pattern.indices, pattern.indptr), shape=(n, n))
-                for data in (self.stiffness_terms(time), self.damping_terms(time))
-            ]
-            self._scalar_kept = key, (pair[0], pair[1])
+
+            def sparse(data: Array | None) -> Any:
+                return None if data is None else csr_array((data, pattern.indices, pattern.indptr))
+
+            self._scalar_kept = key, (sparse(self.stiffness_terms(time)), sparse(self.damping_terms(time)))
         return self._scalar_kept[1]
 
     def matrix(self, time: float, m: float, c: float, k: float) -> BlockMatrix:

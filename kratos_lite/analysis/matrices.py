@@ -69,10 +69,10 @@ def matrices_of(
         made.sort_indices()
         return made
 
-    still = e.terms is None
-    C = csr_array((e.size, e.size)) if still and not any(e.rayleigh) else e.matrix(t, 0.0, 1.0, 0.0).scipy()
+    damped = e.terms is not None or any(e.rayleigh)
+    C = e.matrix(t, 0.0, 1.0, 0.0).scipy() if damped else csr_array((e.size, e.size))
     return Matrices(
-        K=whole((e.K if still else e.matrix(t, 0.0, 0.0, 1.0)).scipy()),
+        K=whole((e.K if e.terms is None else e.matrix(t, 0.0, 0.0, 1.0)).scipy()),
         M=whole(e.mass.matrix()),
         C=whole(C),
         f=e.system.scatter(e.load(t)).ravel().copy(),

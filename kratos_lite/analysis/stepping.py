@@ -6,7 +6,6 @@ import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from math import ceil, inf
-from typing import Any
 
 import numpy as np
 
@@ -97,16 +96,6 @@ def integrate(
     return _states(stepper, h, count, every, until, progress)
 
 
-def _ends(answer: Any) -> bool:
-    """Return whether the loop ends, from what `until` returned."""
-    try:
-        return bool(answer)
-    except ValueError:
-        raise InputError(
-            f"until must return True or False; got {short(answer)}; use .any() or .all()"
-        ) from None
-
-
 def _states(
     stepper: BodyStepper | TransientAnalysis,
     h: float,
@@ -127,7 +116,12 @@ def _states(
                 shown("integrate", done / count)
             state = stepper.state()
             yield state
-            if until and _ends(until(state)):
+            answer = until is not None and until(state)
+            if np.size(answer) != 1:
+                raise InputError(
+                    f"until must return True or False; got {short(answer)}; use .any() or .all()"
+                )
+            if answer:
                 return
 
 

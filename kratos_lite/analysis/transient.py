@@ -118,8 +118,8 @@ class TransientAnalysis:
 
     def _start(self, u: Array, v: Array, a: Array) -> None:
         """Take over what is prescribed at the start, and find the first acceleration."""
-        e = self.equations
-        self.u, self.v = e.prescribed.replace(self.u, u), e.prescribed.replace(self.v, v)
+        replace = self.equations.prescribed.replace
+        self.u, self.v = replace(self.u, u), replace(self.v, v)
         self.a = self._balanced(a)
 
     def _check_supports(self, u: Array, prescribed: Array, what: str) -> None:
@@ -216,10 +216,10 @@ class TransientAnalysis:
 
     def state(self) -> State:
         """Return the model as it is now."""
-        residual = self._residual()
+        residual, imbalance, _ = self._residual()
         values = {name: self._whole(getattr(self, name)).copy() for name in "uva"}
         values["reactions"] = self.equations.model.supports.supported(self._whole(residual))
-        values["imbalance"] = np.array(self._free_part(residual))
+        values["imbalance"] = np.array(imbalance)
         return State("model", str(self.integrator), self.time, self.step, values, self.parts)
 
     def restore(self, state: State) -> None:
@@ -243,51 +243,26 @@ class TransientAnalysis:
         self._restored = state
 
     def check_state(self, state: object) -> State:
-        """Return a state that is one of a model of this mesh.
-
-        Parameters
-        ----------
-        state : to be checked.
-
-        Returns
-        -------
-        State
-
-        Raises
-        ------
-        InputError
-            It is another one, is not finite, or no state.
-        """
+        """Return a state that is one of a model of this mesh; InputError otherwise."""
         shape = (self.equations.system.n_nodes, 3)
         return check_state(state, "model", {**dict.fromkeys(MODEL_FIELDS[:4], shape), "imbalance": ()})
 
     def _settle(self, state: State) -> None:
         """Balance the acceleration of a state of another integrator, or of another load."""
-        residual, largest = self._imbalance(self.u, self.v, self.a, self.time)
+        _, residual, largest = self._residual()
         other = abs(residual - float(state.values.get("imbalance", np.nan))) > OFF_BALANCE * largest
         if other or state.integrator != str(self.integrator):
             self.a = self._balanced(self.equations.prescribed.part(self.a))
 
-    def _terms(self, u: Array, v: Array, a: Array, time: float) -> list[Array]:
-        """Return M a, C v, K u and -f, (3a,) in N."""
-        e = self.equations
-        return [e.mass.times(a), e.times_damping(v, time), e.times_stiffness(u, time), -e.load(time)]
-
-    def _residual(self) -> Array:
-        """Return M a + C v + K u - f, (3a,) in N."""
-        return np.asarray(np.sum(self._terms(self.u, self.v, self.a, self.time), axis=0))
-
-    def _imbalance(self, u: Array, v: Array, a: Array, time: float) -> tuple[float, float]:
-        """Return the largest free component of M a + C v + K u - f, and the largest of its terms, in N."""
-        terms = self._terms(u, v, a, time)
-        # rounding of K u comes in
-        noise = 1e-10 * float(np.abs(self.equations.K.data).max() * np.abs(u).max(initial=0.0))
-        largest = max(noise, *(float(np.abs(term).max(initial=0.0)) for term in terms))
-        return self._free_part(np.sum(terms, axis=0)), largest
-
-    def _free_part(self, forces: Array) -> float:
-        """Return the largest free component of forces (3a,)."""
-        return float(np.abs(self.equations.system.constraint_map.reduce(forces)).max(initial=0.0))
+    def _residual(self, state: State | None = None) -> tuple[Array, float, float]:
+        """Return M a + C v + K u - f (3a,), its largest free component and the largest of its terms, in N."""
+        e, (u, v, a, time) = self.equations, self._at(state)
+        terms = e.mass.times(a), e.times_damping(v, time), e.times_stiffness(u, time), -e.load(time)
+        residual = np.asarray(sum(terms))
+        roundoff = 1e-10 * float(np.abs(e.K.data).max() * np.abs(u).max(initial=0.0))  # of K u
+        largest = max(roundoff, *(float(np.abs(term).max(initial=0.0)) for term in terms))
+        free = e.system.constraint_map.reduce(residual)
+        return residual, float(np.abs(free).max(initial=0.0)), largest
 
     def result(self, state: State | None = None) -> Result:
         """Return a state as a result with strains and stresses.
@@ -305,7 +280,7 @@ class TransientAnalysis:
         e, at, residual = self.equations, self.state() if state is None else self.check_state(state), None
         model, loads = e.model, e.system.scatter(e.load(at.time)).copy()
         if self.integrator.balanced:
-            free, largest = self._imbalance(*self._at(at))
+            _, free, largest = self._residual(at)
             residual = free / largest if largest else 0.0
         totals, reason = (loads.sum(axis=0), at.reactions.sum(axis=0)), f"step {at.step}, t = {at.time:g} s"
         solution = Solution(at.u, str(self.integrator), reason, 0, 0.0)
@@ -321,7 +296,7 @@ class TransientAnalysis:
 
     def reactions(self) -> Array:
         """Return M a + C v + K u - f (n, 3) in N: forces of supports and constraints, 0 where none act."""
-        return self.equations.model.supports.supported(self._whole(self._residual()))
+        return self.equations.model.supports.supported(self._whole(self._residual()[0]))
 
     def energy(self, state: State | None = None) -> float:
         """Return ½ v·M v + ½ u·K u, K with what the motion adds: constant without loads and damping.
@@ -338,30 +313,12 @@ class TransientAnalysis:
         return float(v @ e.mass.times(v) + u @ e.times_stiffness(u, time)) / 2
 
     def material_velocity(self, state: State | None = None) -> Array:
-        """Return the velocity of the material in space; see `kratos_lite.material_velocity`.
-
-        Parameters
-        ----------
-        state : of this model; that of now if not given.
-
-        Returns
-        -------
-        (n, 3) float, m/s.
-        """
+        """Return the velocity of the material in space (n, 3) in m/s; see `kratos_lite.material_velocity`."""
         u, v, _, time = self._at(state)
         return self._whole(velocity_of_material(self.equations, u, v, time))
 
     def material_acceleration(self, state: State | None = None) -> Array:
-        """Return the acceleration of the material in space; see `kratos_lite.material_acceleration`.
-
-        Parameters
-        ----------
-        state : of this model; that of now if not given.
-
-        Returns
-        -------
-        (n, 3) float, m/s².
-        """
+        """Return the acceleration of the material (n, 3) in m/s²; see `kratos_lite.material_acceleration`."""
         return self._whole(acceleration_of_material(self.equations, *self._at(state)))
 
     def _at(self, state: State | None) -> tuple[Array, Array, Array, float]:
