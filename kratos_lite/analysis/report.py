@@ -30,21 +30,13 @@ def peak_memory() -> int:
 
 @dataclass(frozen=True)
 class RefinementStep:
-    """One mesh on the way to the accuracy asked for.
-
-    Attributes
-    ----------
-    elements, kinds : number of elements, and their classes.
-    unknowns : free degrees of freedom.
-    error : relative error of the energy norm or of the quantity, as it was known then.
-    seconds : for solution and estimate.
-    """
+    """One mesh on the way to the requested accuracy."""
 
     elements: int
-    kinds: str
-    unknowns: int
-    error: float
-    seconds: float
+    kinds: str  # classes of the elements
+    unknowns: int  # free degrees of freedom
+    error: float  # relative, of the energy norm or of the quantity, as it was known then
+    seconds: float  # for solution and estimate
 
     def __str__(self) -> str:
         return f"{self.error:.2%} with {self.unknowns} unknowns, {self.elements} {self.kinds}"
@@ -52,51 +44,31 @@ class RefinementStep:
 
 @dataclass
 class Report(Tabular):
-    """What was solved, how, and how well.
+    """What was solved, how, and how well."""
 
-    Attributes
-    ----------
-    unknowns : free degrees of freedom.
-    total_load, total_reaction : (3,) N.
-    solver, reason, iterations : how it was solved and why that way.
-    backward_error : |b - A x| / (|A| |x| + |b|), or None.
-    force_error, moment_error : what loads, reactions and the internal load of the stresses miss to
-        equilibrium, relative; None where material that moves through the mesh carries momentum, so that they
-        need not balance.
-    seconds : per phase.
-    peak_memory : bytes.
-    warnings, notes : what the checks and the reader found.
-    skipped : what this solution did without, as it would have changed nothing.
-    kernels : what computed, compiled kernels and their threads or NumPy.
-    formulation : which one of the elements was chosen and why; "" where their names say it.
-    error : relative error, as estimated on the safe side, of a solution to a requested accuracy.
-    error_of : what has that error.
-    error_asked : the error that was asked for.
-    history : the meshes that it took, the last one of the result.
-    motion : of a model whose material moves through its mesh: rate, critical rate, resultant of the supports.
-    """
-
-    unknowns: int
-    total_load: Array
-    total_reaction: Array
-    solver: str
+    unknowns: int  # free degrees of freedom
+    total_load: Array  # (3,) N
+    total_reaction: Array  # (3,) N
+    solver: str  # how it was solved, and why that way
     reason: str
     iterations: int
-    backward_error: float | None
+    backward_error: float | None  # |b - A x| / (|A| |x| + |b|)
+    # what loads, reactions and the internal forces of the stresses miss to equilibrium, relative; None where
+    # material that moves through the mesh carries momentum, so that they need not balance
     force_error: float | None
     moment_error: float | None
-    seconds: dict[str, float]
-    peak_memory: int = field(default_factory=peak_memory)
-    warnings: list[str] = field(default_factory=list)
+    seconds: dict[str, float]  # by phase
+    peak_memory: int = field(default_factory=peak_memory)  # bytes
+    warnings: list[str] = field(default_factory=list)  # what the checks and the reader found
     notes: list[str] = field(default_factory=list)
-    skipped: list[str] = field(default_factory=list)
-    kernels: str = field(default_factory=described)
-    formulation: str = ""
-    motion: dict[str, Any] = field(default_factory=dict)
-    error: float | None = None
-    error_of: str = "the energy norm"
-    error_asked: float | None = None
-    history: list[RefinementStep] = field(default_factory=list)
+    skipped: list[str] = field(default_factory=list)  # what this solution did without: it changes nothing
+    kernels: str = field(default_factory=described)  # what computed: compiled kernels and threads, or NumPy
+    formulation: str = ""  # which one of the elements was chosen, and why; "" where their names say it
+    motion: dict[str, Any] = field(default_factory=dict)  # of the material: rate, critical rate, resultant
+    error: float | None = None  # relative, estimated on the safe side, of a solution to a requested accuracy
+    error_of: str = "the energy norm"  # what has that error
+    error_asked: float | None = None  # that was requested
+    history: list[RefinementStep] = field(default_factory=list)  # the meshes, the last one of the result
 
     def table(self) -> list[tuple[str, str]]:
         """Return the rows of the summary, labels and values."""

@@ -45,24 +45,7 @@ class StaticAnalysis:
 
     It follows its structure: new prescribed values are used; anything else that changes K (materials,
     rules, which degrees of freedom are prescribed, constraints, initial stress) has all checked and made
-    anew at the next solution.
-
-    Parameters
-    ----------
-    model : the structure.
-    solver : ``auto``, ``dense``, ``direct`` or ``amg``.
-    tolerance : relative residual at which the iterative solver stops.
-    progress : called with the phase and the fraction done, 0 … 1.
-    backend, petsc : see `Model.solve`.
-
-    Attributes
-    ----------
-    system : the `ConstrainedSystem` or `PetscSystem` that is solved, or None as long as nothing has moved.
-
-    Raises
-    ------
-    MeshError, ModelError, InputError
-        The structure is broken, or it has a motion.
+    anew at the next solution.  Arguments are those of `Model.solve`.
     """
 
     def __init__(
@@ -102,27 +85,11 @@ class StaticAnalysis:
         start: Array | None = None,
         tolerance: float | None = None,
     ) -> Result:
-        """Solve for some loads, or for those of the model.
+        """Solve for some loads, or for those of the model; errors are those of `Model.solve`.
 
-        Parameters
-        ----------
-        loads : one or several, in place of those of the model.
-        start : (n, 3) m, displacements near the solution, such as those of a similar load, at which an
-            iteration begins.
-        tolerance : relative residual at which this iteration stops, in place of that of the analysis; how
-            far the result is from equilibrium is in its report, and no error then.
-
-        Returns
-        -------
-        Result
-
-        Raises
-        ------
-        MeshError, ModelError, InputError
-            A load does not fit, does not balance where supports leave rigid-body modes free, or a change of
-            the model has broken it.
-        SolveError
-            If the accuracy asked for cannot be reached.
+        `start` (n, 3) in m is near the solution, such as that of a similar load: an iteration begins there.
+        `tolerance` is the relative residual at which this iteration stops, in place of that of the analysis;
+        how far the result is from equilibrium is in its report, and no error then.
         """
         self._follow()
         case = self._load(self.model.loads if loads is None else loads)
@@ -133,17 +100,7 @@ class StaticAnalysis:
         return self._solve(case, case.moving, tolerance, start)
 
     def check(self) -> list[str]:
-        """Check the loads of the model, too, as a solution does, without solving.
-
-        Returns
-        -------
-        Warnings, one sentence each.
-
-        Raises
-        ------
-        MeshError, ModelError, InputError
-            A load does not fit, or a change of the model has broken it.
-        """
+        """Check the loads of the model, too, as a solution does, without solving; return warnings."""
         self._follow()
         case = self._load(self.model.loads)
         return self._warnings(case) + self._state.free.notes(case.moving)
@@ -266,21 +223,9 @@ class StaticAnalysis:
         self._equations = None
 
     def adjoint(self, load: Array, motion: Array) -> Array:
-        """Return the displacement (n, 3) in m under a load alone, with supports displaced by a motion alone.
+        """Return the displacement (n, 3) in m under a load (n, 3) in N alone, supports displaced by a motion.
 
-        Parameters
-        ----------
-        load : (n, 3) N.
-        motion : (n, 3) m, read where a displacement is prescribed.
-
-        Returns
-        -------
-        (n, 3) in m, without the loads, prescribed displacements and initial stress of the model.
-
-        Raises
-        ------
-        ModelError
-            A motion is given, and nothing is prescribed there.
+        The motion (n, 3) in m is read where a displacement is prescribed; ModelError where nothing is.
         """
         self._follow()
         supports, load = self.model.supports, self._state.free.balanced(load)

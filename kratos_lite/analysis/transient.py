@@ -243,7 +243,21 @@ class TransientAnalysis:
         self._restored = state
 
     def check_state(self, state: object) -> State:
-        """Return a state that is one of a model of this mesh; InputError otherwise."""
+        """Return a state that is one of a model of this mesh.
+
+        Parameters
+        ----------
+        state : to be checked.
+
+        Returns
+        -------
+        State
+
+        Raises
+        ------
+        InputError
+            It is another one, is not finite, or no state.
+        """
         shape = (self.equations.system.n_nodes, 3)
         return check_state(state, "model", {**dict.fromkeys(MODEL_FIELDS[:4], shape), "imbalance": ()})
 
@@ -313,12 +327,30 @@ class TransientAnalysis:
         return float(v @ e.mass.times(v) + u @ e.times_stiffness(u, time)) / 2
 
     def material_velocity(self, state: State | None = None) -> Array:
-        """Return the velocity of the material in space (n, 3) in m/s; see `kratos_lite.material_velocity`."""
+        """Return the velocity of the material in space; see `kratos_lite.material_velocity`.
+
+        Parameters
+        ----------
+        state : of this model; that of now if not given.
+
+        Returns
+        -------
+        (n, 3) float, m/s.
+        """
         u, v, _, time = self._at(state)
         return self._whole(velocity_of_material(self.equations, u, v, time))
 
     def material_acceleration(self, state: State | None = None) -> Array:
-        """Return the acceleration of the material (n, 3) in m/s²; see `kratos_lite.material_acceleration`."""
+        """Return the acceleration of the material in space; see `kratos_lite.material_acceleration`.
+
+        Parameters
+        ----------
+        state : of this model; that of now if not given.
+
+        Returns
+        -------
+        (n, 3) float, m/s².
+        """
         return self._whole(acceleration_of_material(self.equations, *self._at(state)))
 
     def _at(self, state: State | None) -> tuple[Array, Array, Array, float]:

@@ -32,16 +32,10 @@ class ModelIntegrator(ABC):
     """A way to take one step of the equations of motion of a model.
 
     Subclasses are frozen dataclasses whose fields are their numbers.
-
-    Attributes
-    ----------
-    name : word under which files find it.
-    lumps_mass : whether it needs the mass in the nodes.
-    balanced : whether M a + C v + K u = f holds at the end of each step.
     """
 
-    name: ClassVar[str]
-    lumps_mass: ClassVar[bool] = False
+    name: ClassVar[str]  # the word under which files find it
+    lumps_mass: ClassVar[bool] = False  # whether it needs the mass in the nodes
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -54,44 +48,17 @@ class ModelIntegrator(ABC):
         return False
 
     def check(self, e: EquationsOfMotion) -> None:  # noqa: B027 (most take all models)
-        """Refuse a model that it cannot take.
-
-        Parameters
-        ----------
-        e : its equations of motion.
-
-        Raises
-        ------
-        ModelError
-            The model has something that the integrator does not take.
-        """
+        """Raise ModelError for a model with something that the integrator does not take."""
 
     def critical_step(self, e: EquationsOfMotion) -> float:
-        """Return the longest stable step.
-
-        Parameters
-        ----------
-        e : equations of motion.
-
-        Returns
-        -------
-        float, s; infinite if any step is stable.
-        """
+        """Return the longest stable step in s, infinite if any step is stable."""
         return np.inf
 
     @abstractmethod
     def step(self, e: EquationsOfMotion, now: Kinematics, start: float, h: float) -> Kinematics:
-        """Take one step.
+        """Return displacement, velocity and acceleration (3a,) at the end of a step from those at its start.
 
-        Parameters
-        ----------
-        e : equations of motion.
-        now : displacement, velocity and acceleration (3a,) at its start.
-        start, h : time at its start, and its length, in s.
-
-        Returns
-        -------
-        displacement, velocity and acceleration (3a,) at its end.
+        It starts at the time `start` and takes `h`, in s.
         """
 
     def __str__(self) -> str:
@@ -100,16 +67,10 @@ class ModelIntegrator(ABC):
 
 
 class BodyIntegrator(ABC, Generic[B]):
-    """A way to take one step of a body.
+    """A way to take one step of a body."""
 
-    Attributes
-    ----------
-    name : the word that bodies hold.
-    bodies : class of bodies that it advances.
-    """
-
-    name: ClassVar[str]
-    bodies: ClassVar[type[Body]]
+    name: ClassVar[str]  # the word that bodies hold
+    bodies: ClassVar[type[Body]]  # that it advances
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
