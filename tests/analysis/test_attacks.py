@@ -166,6 +166,8 @@ def test_damaged_files_of_moments_end_in_one_error(tmp_path):
     (tmp_path / "text.npz").write_text("time,energy")
     with pytest.raises(kl.InputError, match=r"not a state that kl\.write wrote, or not all of it$"):
         kl.read_state(tmp_path / "text.npz")
+    with pytest.raises(kl.InputError, match="there is no such file"):
+        kl.read_state(tmp_path / "none.npz")
 
 
 def test_arguments_of_solutions_are_checked_with_a_motion_too():
@@ -179,8 +181,6 @@ def test_arguments_of_solutions_are_checked_with_a_motion_too():
             model.solve(**options)
     with pytest.raises(kl.InputError, match="progress must be a function"):
         model.transient(progress=3)
-    with pytest.raises(kl.InputError, match="until must be a function of a state"):
-        kl.integrate(model.transient(), 1e-3, 1, until=3)
     with pytest.raises(kl.InputError, match="a Result or a State is needed; got NoneType"):
         kl.reaction_resultant(model, None)
     with pytest.raises(kl.InputError, match="critical rates; got 100000"):

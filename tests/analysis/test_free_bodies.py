@@ -42,7 +42,7 @@ def shared(model, u):
     return np.array([(f * u).sum() for f in forces]) / np.abs(R).max() / np.abs(u).max() / volume
 
 
-SMALL, LARGE = (3, 2, 2), (18, 6, 6)
+SMALL, LARGE = (3, 2, 2), (12, 4, 4)
 
 
 @pytest.mark.parametrize(

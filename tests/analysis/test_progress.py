@@ -1,5 +1,7 @@
 """Progress is reported in every phase, and an error of the function that it is reported to ends the work."""
 
+from contextlib import suppress
+
 import pytest
 
 import kratos_lite as kl
@@ -23,36 +25,27 @@ def stepped(progress):
     return list(kl.integrate(held().transient(progress=progress), 1e-4, 3, progress=progress))
 
 
-WORK = {
-    "dense": lambda progress: held().solve("dense", progress=progress),
-    "direct": lambda progress: held().solve("direct", progress=progress),
-    "multigrid": lambda progress: held().solve("amg", progress=progress),
-    "cases": lambda progress: held().solve_cases({"own": kl.Gravity((0, 0, -1.0))}, progress=progress),
-    "adaptive": lambda progress: held().solve(error=0.2, progress=progress),
-    "steady": lambda progress: moving().solve(progress=progress),
-    "modes": lambda progress: held().modes(2, progress=progress),
-    "complex modes": lambda progress: moving().complex_modes(2, progress=progress),
-    "steps": stepped,
-}
 STATIC = {"check", "load", "assemble", "solve", "verify"}
-PHASES = {
-    "dense": STATIC | {"factorize"},
-    "direct": STATIC | {"factorize"},
-    "multigrid": STATIC | {"set up"},
-    "cases": STATIC,
-    "adaptive": STATIC,
-    "steady": STATIC | {"factorize"},
-    "modes": {"check", "assemble", "modes"},
-    "complex modes": {"check", "assemble", "modes"},
-    "steps": {"assemble", "factorize", "integrate"},
+MODES = {"check", "assemble", "modes"}
+CASES = {"own": kl.Gravity((0, 0, -1.0))}
+WORK = {
+    "dense": (lambda progress: held().solve("dense", progress=progress), STATIC | {"factorize"}),
+    "direct": (lambda progress: held().solve("direct", progress=progress), STATIC | {"factorize"}),
+    "multigrid": (lambda progress: held().solve("amg", progress=progress), STATIC | {"set up"}),
+    "cases": (lambda progress: held().solve_cases(CASES, progress=progress), STATIC),
+    "adaptive": (lambda progress: held().solve(error=0.2, progress=progress), STATIC),
+    "steady": (lambda progress: moving().solve(progress=progress), STATIC | {"factorize"}),
+    "modes": (lambda progress: held().modes(2, progress=progress), MODES),
+    "complex modes": (lambda progress: moving().complex_modes(2, progress=progress), MODES),
+    "steps": (stepped, {"assemble", "factorize", "integrate"}),
 }
 
 
 @pytest.mark.parametrize("work", WORK)
 def test_every_phase_is_reported_from_its_begin_to_its_end(work):
-    calls = []
-    WORK[work](lambda phase, share: calls.append((phase, share)))
-    assert PHASES[work] <= {phase for phase, _ in calls}
+    calls, (run, phases) = [], WORK[work]
+    run(lambda phase, share: calls.append((phase, share)))
+    assert phases <= {phase for phase, _ in calls}
     assert all(0 <= share <= 1 for _, share in calls)
     last = dict(calls)
     assert {phase for phase, share in last.items() if share != 1} == set()
@@ -70,7 +63,7 @@ def test_an_iteration_for_modes_reports_each_step():
 
 
 @pytest.mark.parametrize(
-    ("work", "phase"), [(work, phase) for work in WORK for phase in sorted(PHASES[work])]
+    ("work", "phase"), [(work, phase) for work, (_, phases) in WORK.items() for phase in sorted(phases)]
 )
 def test_an_error_in_any_phase_comes_through(work, phase):
     class Stop(Exception):
@@ -81,7 +74,7 @@ def test_an_error_in_any_phase_comes_through(work, phase):
             raise Stop
 
     with pytest.raises(Stop):
-        WORK[work](stop)
+        WORK[work][0](stop)
 
 
 def test_an_analysis_can_be_used_again_after_it_was_stopped_in_any_phase():
@@ -92,18 +85,11 @@ def test_an_analysis_can_be_used_again_after_it_was_stopped_in_any_phase():
             stops.append(phase)
             raise KeyboardInterrupt
 
-    analysis = None
-    while analysis is None:
-        try:
-            analysis = held().static("amg", progress=stop)
-        except KeyboardInterrupt:
-            pass
-    while True:
-        try:
+    analysis = result = None
+    while result is None:
+        with suppress(KeyboardInterrupt):
+            analysis = analysis or held().static("amg", progress=stop)
             result = analysis.solve()
-            break
-        except KeyboardInterrupt:
-            pass
     assert {"check", "load", "assemble", "set up", "solve", "verify"} <= set(stops)
     assert abs(result.u - expected).max() <= 1e-12 * abs(expected).max()
 

@@ -134,12 +134,13 @@ def test_a_clamp_carries_the_weight_of_a_bar_and_its_moment():
 def test_resultants_refuse_what_is_not_of_the_model():
     model, other = shaken_bar(), wheel()
     result = model.solve()
-    with pytest.raises(kl.InputError, match="reactions of 20 nodes; the model has"):
-        kl.reaction_resultant(other, result)
-    with pytest.raises(kl.InputError, match=r"shape \(3,\); got \(2,\)"):
-        kl.reaction_resultant(model, result, center=(0, 0))
-    with pytest.raises(kl.ModelError, match="no node is chosen"):
-        kl.reaction_resultant(model, result, lambda X: X[:, 0] > 5)
+    for owner, options, words in (
+        (other, {}, "reactions of 20 nodes; the model has"),
+        (model, {"center": (0, 0)}, r"shape \(3,\); got \(2,\)"),
+        (model, {"where": lambda X: X[:, 0] > 5}, "no node is chosen"),
+    ):
+        with pytest.raises((kl.InputError, kl.ModelError), match=words):
+            kl.reaction_resultant(owner, result, **options)
 
 
 def test_the_material_of_a_wheel_turns_and_takes_the_displacement_along():

@@ -117,18 +117,21 @@ def test_elements_with_different_rules_give_a_list():
     mesh = kl.box(cells=(2, 1, 1))
     model = held_model(mesh, 1e-3 * mesh.points)
     model.use_rule(3, [1])
-    values = model.solve().at_integration_points("CAUCHY_STRESS_VECTOR")
+    result = model.solve()
+    values = result.at_integration_points("CAUCHY_STRESS_VECTOR")
     assert [value.shape for value in values] == [(8, 6), (27, 6)]
+    assert [value.shape for value in result.principal_stresses()] == [(8, 3), (27, 3)]
 
 
 def test_unknown_quantities_and_elements_are_named():
     result = held_model(kl.box(), np.zeros((8, 3))).solve()
-    with pytest.raises(kl.InputError, match=r"must be one of DISPLACEMENT, .*Did you mean VON_MISES"):
-        result.at_integration_points("VON_MISES")
-    with pytest.raises(kl.MeshError, match="no element has the id 7; ids run from 1 to 1"):
-        result.at_integration_points("STRAIN", element=7)
-    with pytest.raises(kl.MeshError, match="id of an element must be a whole number"):
-        result.at_integration_points("STRAIN", element="one")
+    for name, element, words in (
+        ("VON_MISES", None, r"must be one of DISPLACEMENT, .*Did you mean VON_MISES"),
+        ("STRAIN", 7, "no element has the id 7; ids run from 1 to 1"),
+        ("STRAIN", "one", "id of an element must be a whole number"),
+    ):
+        with pytest.raises((kl.InputError, kl.MeshError), match=words):
+            result.at_integration_points(name, element=element)
 
 
 # ---- anywhere in the mesh ----------------------------------------------------------------------------
@@ -196,8 +199,6 @@ def test_a_point_outside_the_mesh_is_an_error_that_says_how_far():
     result = held_model(kl.box(), np.zeros((8, 3))).solve()
     with pytest.raises(kl.MeshError, match=r"point 1 at .* lies outside the mesh"):
         result.at([[0.5, 0.5, 0.5], [2.0, 0.5, 0.5]])
-    with pytest.raises(kl.InputError, match="located in another mesh"):
-        result.at(kl.box(cells=(2, 1, 1)).locate([0.5, 0.5, 0.5]))
     larger = result.mesh.replace(points=result.mesh.points * 10)  # of the same size, but with other gradients
     with pytest.raises(kl.InputError, match="these points were located in another mesh"):
         result.at(larger.locate([0.5, 0.5, 0.5]))
@@ -251,12 +252,6 @@ def test_stresses_of_points_and_places_are_functions_of_the_same_tensor():
         )
         assert np.abs(result.von_mises(at) - mises).max() < 1e-14 * size
         assert result.principal_directions(at).shape == (*shape, 3, 3)
-
-
-def test_principal_stresses_of_elements_with_different_rules_are_a_list():
-    model = held_model(mesh := kl.box(cells=(2, 1, 1)), 1e-3 * mesh.points)
-    model.use_rule(3, [1])
-    assert [s.shape for s in model.solve().principal_stresses()] == [(8, 3), (27, 3)]
 
 
 def test_own_b_operator_gives_the_strain_at_points():

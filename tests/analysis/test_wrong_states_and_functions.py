@@ -158,7 +158,7 @@ def test_an_amplitude_is_a_function_of_the_time(amplitude):
             subject.add(kl.Gravity((0, 0, -9.81)), amplitude=amplitude)
 
 
-@pytest.mark.parametrize("function", WRONG)
+@pytest.mark.parametrize("function", [*WRONG, 3.0, kl.Traction("x+", (0, 0, 1.0)), None])
 def test_a_load_in_time_is_a_function_of_the_time(function):
     with pytest.raises(InputError, match="a function of time that returns a load is needed"):
         kl.TimeDependentLoad(function)

@@ -211,7 +211,7 @@ MUTATIONS = [
         "analysis/integrators/generalized_alpha.py",
         "return NewmarkNumbers((1 - self.alpha) ** 2 / 4, 0.5 - self.alpha, self.alpha, 0.0)",
         "return NewmarkNumbers((1 - self.alpha) ** 2 / 4, 0.5 - self.alpha, -self.alpha, 0.0)",
-        "tests/analysis/test_time_dependent_loads.py -k bossak",
+        TRANSIENT,
     ),
     Mutation(
         "analysis/integrators/generalized_alpha.py",
