@@ -3,6 +3,9 @@
 from kratos_lite import ale as ale
 from kratos_lite.analysis.comparison import Comparison as Comparison
 from kratos_lite.analysis.comparison import compare as compare
+from kratos_lite.analysis.derived_quantities import material_acceleration as material_acceleration
+from kratos_lite.analysis.derived_quantities import material_derivative as material_derivative
+from kratos_lite.analysis.derived_quantities import material_velocity as material_velocity
 from kratos_lite.analysis.derived_quantities import reaction_resultant as reaction_resultant
 from kratos_lite.analysis.error_estimate import ErrorEstimate as ErrorEstimate
 from kratos_lite.analysis.error_estimate import QuantityError as QuantityError
@@ -11,9 +14,6 @@ from kratos_lite.analysis.integrators import Bossak as Bossak
 from kratos_lite.analysis.integrators import CentralDifference as CentralDifference
 from kratos_lite.analysis.integrators import GeneralizedAlpha as GeneralizedAlpha
 from kratos_lite.analysis.integrators import Newmark as Newmark
-from kratos_lite.analysis.material_derivatives import material_acceleration as material_acceleration
-from kratos_lite.analysis.material_derivatives import material_derivative as material_derivative
-from kratos_lite.analysis.material_derivatives import material_velocity as material_velocity
 from kratos_lite.analysis.matrices import LocalSystem as LocalSystem
 from kratos_lite.analysis.matrices import Matrices as Matrices
 from kratos_lite.analysis.modal import critical_rate as critical_rate

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from operator import itemgetter
+
 import numpy as np
 
 from kratos_lite.analysis.nodal_loads import initial_loads, stress_load
-from kratos_lite.analysis.report import element_counts, report_of, vector
+from kratos_lite.analysis.report import element_counts, report_of
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.solution_checks import Phases, check_arguments, check_solution
 from kratos_lite.assembly.element_groups import ElementGroup
@@ -37,26 +40,15 @@ class PartResult(Result):
 
     def table(self) -> list[tuple[str, str]]:
         """Return the rows of the summary, the same in all parts; all of them ask for it."""
-        partition, report = self.partition, self.report
-        here = element_counts(self.mesh, self.groups, report.formulation)
-        counts: dict[str, int] = {}
-        for some in partition.gather(here):
-            for name, count in some.items():
-                counts[name] = counts.get(name, 0) + count
-        length, node, u = max(partition.gather(self.largest_displacement()), key=lambda found: found[0])
-        mises, element, center = max(partition.gather(self.largest_von_mises()), key=lambda found: found[0])
-        return [
-            ("nodes", str(partition.offsets[-1])),
-            ("elements", ", ".join(f"{count} {name}" for name, count in counts.items())),
-            *report.load_rows(),
-            ("largest displacement", f"{length:.6e} m at node {node}, {vector(u)} m"),
-            ("strain energy", f"{partition.sum(self.energy()):.6e} J"),
-            (
-                "largest von Mises",
-                f"{mises:.6e} Pa (at a Gauss point) in element {element} around {vector(center)} m",
-            ),
-            *report.solution_rows(),
-        ]
+        partition, counts = self.partition, Counter[str]()
+        for some in partition.gather(element_counts(self.mesh, self.groups, self.report.formulation)):
+            counts.update(some)
+        displacement, mises = (
+            max(partition.gather(largest), key=itemgetter(0))
+            for largest in (self.largest_displacement(), self.largest_von_mises())
+        )
+        extremes = displacement, partition.sum(self.energy()), mises
+        return self._summary((int(partition.offsets[-1]), counts), extremes)
 
 
 def solve_part(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -112,9 +112,9 @@ def load_set(
     phase: Phases,
 ) -> LoadSet:
     """Return loads as nodal forces; an error where they do not fit, or a free component is not in balance."""
-    if not isinstance(loads, (Load, list, tuple)):
+    loads = [loads] if isinstance(loads, Load) else loads
+    if not isinstance(loads, (list, tuple)):
         raise InputError(f"a load, or a list of them, is needed; got {type(loads).__name__}")
-    loads = [loads] if isinstance(loads, Load) else list(loads)
     for load in loads:
         if not isinstance(load, Load):
             raise InputError(f"a load such as Gravity or Traction is needed; got {type(load).__name__}")
@@ -126,7 +126,7 @@ def load_set(
         pushed = any_axis((forces != 0) & ~supports.fixed)
         moving = state.components_with(pushed | dirichlet.displaced)
         state.free.check((load.forces(mesh, state.groups) for load in loads), moving)
-    return LoadSet(loads, external, forces, moving, phase)
+    return LoadSet(list(loads), external, forces, moving, phase)
 
 
 def any_axis(mask: Mask) -> Mask:
@@ -178,27 +178,11 @@ def system_of(
     def constraints(nodes: Ints) -> ConstraintMap:
         return model.supports.constraint_map(nodes).holding(held[nodes])
 
+    what = model.mesh.points, groups, constraints
+    how: dict[str, Any] = {"solver": solver, "tolerance": tolerance, "progress": progress}
     if backend == "own":
-        return ConstrainedSystem(
-            model.mesh.points,
-            groups,
-            constraints,
-            solver=solver,
-            tolerance=tolerance,
-            patterns=model.patterns,
-            progress=progress,
-            hanging=model.mesh.hanging,
-        )
+        return ConstrainedSystem(*what, **how, patterns=model.patterns, hanging=model.mesh.hanging)
     from kratos_lite.distributed.communicator import started
     from kratos_lite.distributed.petsc_system import PetscSystem
 
-    return PetscSystem(
-        model.mesh.points,
-        groups,
-        constraints,
-        started(),
-        petsc,
-        solver=solver,
-        tolerance=tolerance,
-        progress=progress,
-    )
+    return PetscSystem(*what, started(), petsc, **how)

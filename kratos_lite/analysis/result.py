@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol, overload
 import numpy as np
 
 from kratos_lite.analysis.element_fields import ElementFields
+from kratos_lite.analysis.fields import data_frame, fields, nodal_columns
 from kratos_lite.analysis.peak import peak
 from kratos_lite.analysis.report import Report, element_counts, vector
 from kratos_lite.assembly.element_groups import ElementGroup
@@ -284,8 +285,6 @@ class Result(ElementFields, Tabular):
 
         They are (n,) by headers with units; ``kl.write("nodes.csv", result)`` writes them.
         """
-        from kratos_lite.analysis.fields import nodal_columns  # a quick start for results
-
         return nodal_columns(self)
 
     def to_dataframe(self) -> Any:
@@ -300,8 +299,6 @@ class Result(ElementFields, Tabular):
         KratosLiteError
             pandas is not installed.
         """
-        from kratos_lite.analysis.fields import data_frame
-
         return data_frame(self.columns())
 
     def to_pyvista(self) -> Any:
@@ -317,7 +314,6 @@ class Result(ElementFields, Tabular):
         KratosLiteError
             PyVista is not installed.
         """
-        from kratos_lite.analysis.fields import fields
         from kratos_lite.mesh.vtk import pyvista_grid
 
         return pyvista_grid(self.mesh, *fields(self))
@@ -358,19 +354,31 @@ class Result(ElementFields, Tabular):
     def table(self) -> list[tuple[str, str]]:
         """Return the rows of the summary, labels and values."""
         mesh, report = self.mesh, self.report
-        length, node, u = self.largest_displacement()
-        mises, element, center = self.largest_von_mises()
-        counts = element_counts(mesh, self.groups, report.formulation)
-        forces = float(np.abs(self.loads).sum() + np.abs(self.reactions).sum())
-        place = f"in element {element} around {vector(center)} m{peak(self) or ''}"
+        counts = mesh.n_nodes, element_counts(mesh, self.groups, report.formulation)
+        extremes = self.largest_displacement(), self.energy(), self.largest_von_mises()
+        size = float(np.abs(self.loads).sum() + np.abs(self.reactions).sum())
+        error = [("estimated error", self._stated_error())]
+        rows = self._summary(counts, extremes, error, size, str(peak(self) or ""))
+        return rows + [("warning", text) for text in self._error.warnings if text not in report.warnings]
+
+    def _summary(
+        self,
+        counts: tuple[int, dict[str, int]],
+        extremes: tuple[tuple[float, int, Array], float, tuple[float, int, Array]],
+        error: Sequence[tuple[str, str]] = (),
+        size: float = 0.0,
+        near: str = "",
+    ) -> list[tuple[str, str]]:
+        """Return the rows of a summary from numbers of nodes and elements, largest values and energy."""
+        (length, node, u), energy, (mises, element, center) = extremes
+        place = f"in element {element} around {vector(center)} m{near}"
         return [
-            ("nodes", str(mesh.n_nodes)),
-            ("elements", ", ".join(f"{count} {name}" for name, count in counts.items())),
-            *report.load_rows(forces),
+            ("nodes", str(counts[0])),
+            ("elements", ", ".join(f"{count} {name}" for name, count in counts[1].items())),
+            *self.report.load_rows(size),
             ("largest displacement", f"{length:.6e} m at node {node}, {vector(u)} m"),
-            ("strain energy", f"{self.energy():.6e} J"),
-            ("estimated error", self._stated_error()),
+            ("strain energy", f"{energy:.6e} J"),
+            *error,
             ("largest von Mises", f"{mises:.6e} Pa (at a Gauss point) {place}"),
-            *report.solution_rows(),
-            *[("warning", text) for text in self._error.warnings if text not in report.warnings],
+            *self.report.solution_rows(),
         ]

@@ -152,15 +152,12 @@ class StaticAnalysis:
         if known is None or (moving & ~known.components).any():
             components = moving if known is None else moving | known.components
             nodes = components[state.component] & state.used
-            every, groups = (
-                select(state.groups, nodes),
-                select(state.groups, nodes & ~self._dirichlet.at_rest),
-            )
+            groups = select(state.groups, nodes & ~self._dirichlet.at_rest)
+            n_at_rest = sum(map(len, select(state.groups, nodes))) - sum(map(len, groups))
             how = state.free.held, self.solver, self.tolerance, self.progress, self.backend, self.petsc
             system = system_of(self.model, groups, *how)  # which may be refused; the one before stays then
             self.release()
-            self._equations = Equations(system, components, sum(map(len, every)) - sum(map(len, groups)))
-            return self._equations
+            self._equations = known = Equations(system, components, n_at_rest)
         return known
 
     # ---- one solution ------------------------------------------------------------------------------

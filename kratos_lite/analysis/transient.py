@@ -8,11 +8,14 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.ale.checks import critical_rate_estimate, near_critical
-from kratos_lite.analysis.derived_quantities import motion_summary
+from kratos_lite.analysis.derived_quantities import (
+    acceleration_of_material,
+    motion_summary,
+    velocity_of_material,
+)
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.integrators.base import INTEGRATORS, ModelIntegrator, check_stable
 from kratos_lite.analysis.integrators.generalized_alpha import Newmark
-from kratos_lite.analysis.material_derivatives import acceleration_of_material, velocity_of_material
 from kratos_lite.analysis.modal import critical_rates
 from kratos_lite.analysis.report import report_of
 from kratos_lite.analysis.result import Result

@@ -53,13 +53,13 @@ class _Implicit(ModelIntegrator):
         """Take a step, for the increment of the displacement."""
         s = self.numbers()
         (u, v, a), end, f = now, start + h, 1 - s.alpha_f
-        a_old = v / (s.beta * h) + (1 / (2 * s.beta) - 1) * a  # minus a⁺ for Δu = 0
-        v_new = (1 - s.gamma / s.beta) * v + h * (1 - s.gamma / (2 * s.beta)) * a
+        v_new, a_new = _newmark(s, h, 0.0, v, a)
         at_start, more_a = e.prescribed.part(u), 0.0 * a
         if e.model.supports.motions:
-            before = at_start, e.prescribed.part(v), e.prescribed.part(a)
-            more_v, more_a = _beyond_newmark(s, h, before, e.prescribed.at_end(end, h))
-            v_new, a_old = v_new + more_v, a_old - more_a
+            g_end, v_end, a_end = e.prescribed.at_end(end, h)
+            by_newmark = _newmark(s, h, g_end - at_start, e.prescribed.part(v), e.prescribed.part(a))
+            more_a = a_end - by_newmark[1]
+            v_new, a_new = v_new + v_end - by_newmark[0], a_new + more_a
         middle = start + f * h
         force = e.load(middle) - e.times_stiffness(u, middle)
         force -= e.times_damping(f * v_new + s.alpha_f * v, middle)
@@ -67,10 +67,10 @@ class _Implicit(ModelIntegrator):
             force += e.mass.times(4 / h * v - more_a) + e.load(start)
             force -= e.times_stiffness(u, start) + e.times_damping(v, start)
         else:
-            force += e.mass.times((1 - s.alpha_m) * a_old - s.alpha_m * a)
+            force += e.mass.times(-(1 - s.alpha_m) * a_new - s.alpha_m * a)
         solve = e.solver(middle, (1 - s.alpha_m) / (s.beta * h * h), f * s.gamma / (s.beta * h), f)
         du = solve(force, e.prescribed(end) - at_start, h * v + h * h / 2 * a)
-        return u + du, s.gamma / (s.beta * h) * du + v_new, du / (s.beta * h * h) - a_old
+        return u + du, s.gamma / (s.beta * h) * du + v_new, du / (s.beta * h * h) + a_new
 
 
 @dataclass(frozen=True)
@@ -198,11 +198,8 @@ def _check_alpha(alpha: float, name: str) -> None:
         raise InputError(f"the α of {name} lies in -1/3 … 0; got {alpha}")
 
 
-def _beyond_newmark(s: NewmarkNumbers, h: float, start: Kinematics, end: Kinematics) -> tuple[Array, Array]:
-    """Return what velocity and acceleration at the end of a step have beyond Newmark's formulas, (3a,)."""
-    (g, v, a), (g_end, v_end, a_end) = start, end
-    change = g_end - g
-    v_newmark = s.gamma / (s.beta * h) * change + (1 - s.gamma / s.beta) * v
-    v_newmark += h * (1 - s.gamma / (2 * s.beta)) * a
-    a_newmark = change / (s.beta * h * h) - v / (s.beta * h) - (1 / (2 * s.beta) - 1) * a
-    return v_end - v_newmark, a_end - a_newmark
+def _newmark(s: NewmarkNumbers, h: float, du: Array | float, v: Array, a: Array) -> tuple[Array, Array]:
+    """Return v⁺ and a⁺ by Newmark's formulas, (3a,)."""
+    v_new = (1 - s.gamma / s.beta) * v + h * (1 - s.gamma / (2 * s.beta)) * a
+    a_new = -v / (s.beta * h) - (1 / (2 * s.beta) - 1) * a
+    return v_new + s.gamma / (s.beta * h) * du, a_new + du / (s.beta * h * h)
