@@ -80,11 +80,6 @@ def test_the_history_is_in_the_report_and_the_model_stays():
     assert abs(result.report.total_reaction[2] + 1.0) < 1e-9
 
 
-def test_what_is_out_of_reach_is_said_with_what_was_reached():
-    result = bar().solve(error=1e-4, most_unknowns=600)
-    assert any("was not reached" in text and "600 unknowns" in text for text in result.report.warnings)
-
-
 @pytest.mark.parametrize("error", [0, 1.0, -0.1, "1%", np.nan, True])
 def test_errors_that_are_no_share_are_refused(error):
     with pytest.raises(kl.InputError, match="error"):

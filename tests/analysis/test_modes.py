@@ -6,7 +6,6 @@ import pytest
 import kratos_lite as kl
 from kratos_lite.analysis import modal
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.solvers import eigen as modes_of_matrices
 
 UNIT = kl.Isotropic3D(E=1.0, nu=0.3, density=1.0)
 CUBE = [1.77125] * 2 + [2.38517] * 3 + [2.42566] * 3 + [2.755359] * 3 + [2.83592] * 3 + [2.97223] * 3
@@ -94,19 +93,6 @@ def test_a_mode_swings_as_it_is():
     period = 2 * np.pi / omega[2]
     *_, end = kl.integrate(model.transient(displacement=shapes[2]), period / 500, 500, every=500)
     np.testing.assert_allclose(end.u, shapes[2], atol=1e-4 * np.abs(shapes[2]).max())
-
-
-def test_iteration_gives_what_dense_algebra_gives(monkeypatch):
-    model = cube(3, "8N")
-    dense = model.modes(12)[0]
-    held = cube(3, "8N")
-    held.fix("z-")
-    waves = np.sort(np.abs(held.complex_modes(12)[0].imag))
-    monkeypatch.setattr(modes_of_matrices, "DENSE_MODES", 0)
-    monkeypatch.setattr(modal, "DENSE_MODES", 0)
-    np.testing.assert_allclose(model.modes(12)[0][6:], dense[6:], rtol=1e-9)
-    assert not model.modes(12)[0][:6].any()
-    np.testing.assert_allclose(np.sort(np.abs(held.complex_modes(12)[0].imag)), waves, rtol=1e-9)
 
 
 def test_complex_modes_of_what_stands_still():

@@ -72,15 +72,20 @@ def test_order_two(name):
     assert errors[-1] < 2e-3
 
 
-@pytest.mark.parametrize("share", [0.3, 3.0])
-def test_trapezoidal_rule_step_by_step(share):
-    """A mode is turned by 2 atan(ωh/2) each step, at any step, without loss."""
-    model, omega = bar(), wave(4, lumped=False)
-    mode = shape(model)
-    transient = model.transient(displacement=mode)
-    for k, state in enumerate(kl.integrate(transient, share / omega, 10), start=1):
-        turned = np.cos(2 * k * np.arctan(share / 2))
-        np.testing.assert_allclose(state.u, turned * mode, atol=1e-12)
+@pytest.mark.parametrize(
+    ("name", "share", "angle"),
+    [
+        ("trapezoidal", 0.3, 2 * np.arctan(0.15)),
+        ("trapezoidal", 3.0, 2 * np.arctan(1.5)),
+        ("central", 0.2, np.arccos(1 - 0.2**2 / 2)),
+    ],
+)
+def test_a_mode_is_turned_by_the_same_angle_in_each_step(name, share, angle):
+    """By 2 atan(ωh/2), and by θ with cos θ = 1 - (ωh)²/2, without loss."""
+    model, omega, mode = bar(), wave(4, lumped=name == "central"), shape(bar())
+    transient = model.transient(integrator=INTEGRATORS[name], displacement=mode)
+    for k, state in enumerate(kl.integrate(transient, share / omega, 20), start=1):
+        np.testing.assert_allclose(state.u, np.cos(k * angle) * mode, atol=1e-12)
 
 
 def amplification(integrator, omega: float, h: float) -> np.ndarray:
@@ -117,16 +122,6 @@ def test_spectral_radii_of_hht_and_newmark():
         assert amplification(Newmark(0.3025, 0.6), omega, h / omega) < 1.0
     assert amplification(HHT(-0.1), omega, 1e5 / omega) == pytest.approx(0.9 / 1.1, rel=1e-2)
     assert amplification(HHT(0.0), omega, 3.0 / omega) == pytest.approx(1.0, abs=2e-6)
-
-
-def test_central_difference_turns_by_its_own_angle():
-    """cos(θ) = 1 - (ωh)²/2 each step."""
-    model, omega = bar(), wave(4, lumped=True)
-    mode, h = shape(bar()), 0.2 / wave(4, lumped=True)
-    transient = model.transient(integrator=CentralDifference(), displacement=mode)
-    theta = np.arccos(1 - (omega * h) ** 2 / 2)
-    for k, state in enumerate(kl.integrate(transient, h, 20), start=1):
-        np.testing.assert_allclose(state.u, np.cos(k * theta) * mode, atol=1e-12)
 
 
 def test_critical_step():
@@ -234,16 +229,6 @@ def test_support_that_moves(name):
     np.testing.assert_allclose(end.u[bottom, 2], amplitude * np.sin(drive * t), atol=1e-15)
     velocity = amplitude * drive * np.cos(drive * t)
     np.testing.assert_allclose(end.v[bottom, 2], velocity, atol=2e-2 * amplitude * drive)
-
-
-def test_all_that_is_held_moves_as_one():
-    """A body carried by z(t) = g t²/2 at all its nodes has the reactions m g."""
-    model = kl.Model(kl.box((1, 1, 1), (2, 2, 2)), kl.Isotropic3D(E=E, nu=0.3, density=RHO))
-    model.fix(lambda X: np.ones(len(X), dtype=bool), "xy")
-    model.fix(lambda X: np.ones(len(X), dtype=bool), "z", lambda t: 0.5 * 9.81 * t * t)
-    *_, end = kl.integrate(model.transient(integrator=GeneralizedAlpha(0.5)), 1e-3, 400)
-    assert end.u[:, 2] == pytest.approx(0.5 * 9.81 * end.time**2)
-    assert end.reactions[:, 2].sum() == pytest.approx(9.81 * RHO, rel=2e-2)
 
 
 def test_free_fall():
