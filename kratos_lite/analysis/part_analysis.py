@@ -8,8 +8,8 @@ from operator import itemgetter
 import numpy as np
 
 from kratos_lite.analysis.nodal_loads import initial_loads, stress_load
-from kratos_lite.analysis.report import element_counts, report_of
-from kratos_lite.analysis.result import Result
+from kratos_lite.analysis.report import element_counts
+from kratos_lite.analysis.result import Result, result_of
 from kratos_lite.analysis.solution_checks import Phases, check_arguments, check_solution
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.distributed.partition import Partition
@@ -114,19 +114,15 @@ def solve_part(
         work = partition.sum(checks.work_of(u[own], inner[own], external[own], reactions[own]))
         system.warnings += [] if initial is not None else checks.check_energy(work)
     found = [text for some in partition.gather(warnings) for text in some]
-    totals = partition.sum(external[own].sum(axis=0)), partition.sum(reactions[own].sum(axis=0))
-    report = report_of(
-        model,
-        groups,
-        system.unknowns,
-        totals,
-        solution,
-        (off, 0.0),
-        seconds=phase.seconds,
-        warnings=[*dict.fromkeys(found), *system.warnings],
+    warnings = [*dict.fromkeys(found), *system.warnings]
+    told = {"unknowns": system.unknowns, "seconds": phase.seconds, "warnings": warnings}
+    fields = u, reactions, external
+    result = result_of(PartResult, None, model, groups, fields, solution, (off, 0.0), **told)
+    report = result.report
+    report.total_load, report.total_reaction = (
+        partition.sum(f[own].sum(axis=0)) for f in (external, reactions)
     )
     report.notes = list(dict.fromkeys(text for some in partition.gather(report.notes) for text in some))
-    result = PartResult(mesh, groups, u, reactions, external, report, model.initial_displacement)
     result.partition = partition
     return result
 

@@ -10,9 +10,7 @@ import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.mesh import Mesh
-from kratos_lite.model.structure import Structure
 from kratos_lite.native import described
-from kratos_lite.solvers.linear_solver import Solution
 from kratos_lite.tabular import Tabular
 from kratos_lite.typing import Array
 
@@ -123,32 +121,6 @@ class Report(Tabular):
             ("force of supports", f"{force} N"),
             ("moment of supports", f"{moment} N m"),
         ]
-
-
-def report_of(
-    model: Structure,
-    groups: Sequence[ElementGroup],
-    unknowns: int,
-    totals: tuple[Array, Array],
-    solution: Solution,
-    balance: tuple[float | None, float | None] = (None, None),
-    notes: Sequence[str] = (),
-    **others: Any,
-) -> Report:
-    """Return the report of a solution, from total load and reaction and what they miss to equilibrium."""
-    return Report(
-        unknowns,
-        *totals,
-        solver=solution.method,
-        reason=solution.reason,
-        iterations=solution.iterations,
-        backward_error=solution.backward_error,
-        force_error=balance[0],
-        moment_error=balance[1],
-        notes=[*model.remarks(), *notes],
-        formulation=model.chosen(groups),
-        **others,
-    )
 
 
 def element_counts(mesh: Mesh, groups: Sequence[ElementGroup], formulation: str) -> dict[str, int]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol, overload
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar, overload
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh, Where
 from kratos_lite.model.structure import Structure
+from kratos_lite.solvers.linear_solver import Solution
 from kratos_lite.tabular import Tabular
 from kratos_lite.typing import Array, ArrayLike, Numbers
 from kratos_lite.validation import finite, flag, instance, whole_number
@@ -382,3 +383,36 @@ class Result(ElementFields, Tabular):
             ("largest von Mises", f"{mises:.6e} Pa (at a Gauss point) {place}"),
             *self.report.solution_rows(),
         ]
+
+
+R = TypeVar("R", bound=Result)
+
+
+def result_of(
+    kind: type[R],
+    analysis: Analysis | None,
+    model: Structure,
+    groups: Sequence[ElementGroup],
+    fields: tuple[Array, Array, Array],
+    solution: Solution,
+    balance: tuple[float | None, float | None] = (None, None),
+    **report: Any,
+) -> R:
+    """Return the result of a solution of a model from u, reactions and loads (n, 3), with its report.
+
+    `balance` is what forces and moments miss to equilibrium; `report` has the unknowns, notes and warnings.
+    """
+    u, reactions, loads = fields
+    made = Report(
+        total_load=loads.sum(axis=0),
+        total_reaction=reactions.sum(axis=0),
+        solver=solution.method,
+        reason=solution.reason,
+        iterations=solution.iterations,
+        backward_error=solution.backward_error,
+        force_error=balance[0],
+        moment_error=balance[1],
+        formulation=model.chosen(groups),
+        **{**report, "notes": [*model.remarks(), *report.get("notes", ())]},
+    )
+    return kind(model.mesh, groups, u, reactions, loads, made, model.initial_displacement, analysis)

@@ -18,8 +18,7 @@ from kratos_lite.analysis.prepared import (
     prepared,
     system_of,
 )
-from kratos_lite.analysis.report import report_of
-from kratos_lite.analysis.result import Result
+from kratos_lite.analysis.result import Result, result_of
 from kratos_lite.analysis.solution_checks import (
     Phases,
     check_arguments,
@@ -198,20 +197,15 @@ class StaticAnalysis:
                 warnings += checks.check_energy(work, 100 * noise * prescribed)
             warnings += checks.check_rounding(noise, case.external, initial, reactions, model.supports)
             warnings += check_deformation(model, state.groups, u)
-        report = report_of(
-            model,
-            state.groups,
-            n_used - self._dirichlet.count - len(model.supports.dependents()),
-            (case.external.sum(axis=0), reactions.sum(axis=0)),
-            solution,
-            balance,
-            state.free.notes(case.moving),
-            seconds=phase.seconds,
-            warnings=warnings,
-            skipped=self._skipped(case.moving),
-        )
-        u0 = model.initial_displacement
-        return Result(model.mesh, state.groups, u, reactions, case.external, report, u0, self)
+        report = {
+            "unknowns": n_used - self._dirichlet.count - len(model.supports.dependents()),
+            "seconds": phase.seconds,
+            "warnings": warnings,
+            "notes": state.free.notes(case.moving),
+            "skipped": self._skipped(case.moving),
+        }
+        fields = u, reactions, case.external
+        return result_of(Result, self, model, state.groups, fields, solution, balance, **report)
 
     def release(self) -> None:
         """Release the matrix and what is made of it; another solution makes them anew."""

@@ -7,8 +7,7 @@ from kratos_lite.analysis.derived_quantities import motion_summary
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.modal import critical_rates
 from kratos_lite.analysis.nodal_loads import initial_loads, stress_load
-from kratos_lite.analysis.report import report_of
-from kratos_lite.analysis.result import Result
+from kratos_lite.analysis.result import Result, result_of
 from kratos_lite.analysis.solution_checks import (
     Phases,
     check_arguments,
@@ -31,11 +30,11 @@ def solve_steady(
     phase = Phases(progress)
     with phase("check"):
         e = EquationsOfMotion(model, free=False, steady=True, progress=progress)
-        warnings, changing = list(e.warnings), []
-        rate = e.rates(0.0)[0]
-        if e.terms is not None and not e.terms.motion.steady:
-            changing = [f"the rate changes; this is the steady state of {rate:g}, as at the time 0"]
-        if e.terms is not None and not e.terms.motion.uniformly_accelerated:
+        assert e.terms is not None
+        warnings, changing, motion, rate = list(e.warnings), [], e.terms.motion, e.rates(0.0)[0]
+        if not motion.steady:
+            changing.append(f"the rate changes; this is the steady state of {rate:g}, as at the time 0")
+        if not motion.uniformly_accelerated:
             changing.append("the acceleration of the center changes; it is taken as at the time 0")
     with phase("load"):
         forces, inertia = e.load(0.0), e.inertia_load(0.0)
@@ -51,8 +50,7 @@ def solve_steady(
     with phase("verify"):
         u = solution.x
         warnings += check_deformation(model, e.groups, e.system.scatter(u))
-        left = e.system.scatter(A @ u - forces)
-        reactions = model.supports.supported(left)
+        reactions = model.supports.supported(e.system.scatter(A @ u - forces))
         inner = e.system.scatter(e.times_stiffness(u, 0.0) - e.K @ u)  # what the motion adds is a force, too
         stresses = stress_load(model, e.groups, e.system.scatter(u))
         initial = initial_loads(model, e.groups)
@@ -60,24 +58,19 @@ def solve_steady(
         balance = equilibrium(model.mesh.points, nodal - inner, reactions, stresses)
         check_solution(solution, u, balance)
         critical = None
-        if e.terms is not None and rate:
+        if rate:
             if solution.method == "direct":
                 critical = float(critical_rates(e, 1)[0])
             limit = critical_rate_estimate(e.terms) if critical is None else critical
-            warnings += near_critical(e.terms.motion, 0.0, limit, critical is not None)
-    report = report_of(
-        model,
-        e.groups,
-        len(e.system.constraint_map.free),
-        (nodal.sum(axis=0), reactions.sum(axis=0)),
-        solution,
-        balance,
-        changing,
-        seconds=phase.seconds,
-        warnings=warnings,
-        skipped=["convective terms, as the rate is 0"] if not (rate or inertia.any()) else [],
-    )
-    u0 = model.initial_displacement
-    result = Result(model.mesh, e.groups, e.system.scatter(u), reactions, nodal, report, u0)
-    report.motion = motion_summary(e, result, critical)
+            warnings += near_critical(motion, 0.0, limit, critical is not None)
+    report = {
+        "unknowns": len(e.system.constraint_map.free),
+        "seconds": phase.seconds,
+        "warnings": warnings,
+        "notes": changing,
+        "skipped": [] if rate or inertia.any() else ["convective terms, as the rate is 0"],
+    }
+    fields = e.system.scatter(u), reactions, nodal
+    result = result_of(Result, None, model, e.groups, fields, solution, balance, **report)
+    result.report.motion = motion_summary(e, result, critical)
     return result

@@ -17,8 +17,7 @@ from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.integrators.base import INTEGRATORS, ModelIntegrator, check_stable
 from kratos_lite.analysis.integrators.generalized_alpha import Newmark
 from kratos_lite.analysis.modal import critical_rates
-from kratos_lite.analysis.report import report_of
-from kratos_lite.analysis.result import Result
+from kratos_lite.analysis.result import Result, result_of
 from kratos_lite.analysis.solution_checks import check_deformation
 from kratos_lite.analysis.state import MODEL_FIELDS, State, check_state
 from kratos_lite.errors import InputError, ModelError
@@ -299,16 +298,18 @@ class TransientAnalysis:
         if self.integrator.balanced:
             _, free, largest = self._residual(at)
             residual = free / largest if largest else 0.0
-        totals, reason = (loads.sum(axis=0), at.reactions.sum(axis=0)), f"step {at.step}, t = {at.time:g} s"
-        solution = Solution(at.u, str(self.integrator), reason, 0, 0.0)
+        solution = Solution(at.u, str(self.integrator), f"step {at.step}, t = {at.time:g} s", 0, 0.0)
         warnings = [*e.warnings, *check_deformation(model, e.groups, at.u)]
-        unknowns = len(e.system.constraint_map.free)
-        report = report_of(model, e.groups, unknowns, totals, solution, seconds={}, warnings=warnings)
-        report.backward_error = residual
-        u0 = model.initial_displacement
-        result = Result(model.mesh, e.groups, at.u.copy(), at.reactions.copy(), loads, report, u0)
+        told: dict[str, Any] = {
+            "unknowns": len(e.system.constraint_map.free),
+            "seconds": {},
+            "warnings": warnings,
+        }
+        fields = at.u.copy(), at.reactions.copy(), loads
+        result = result_of(Result, None, model, e.groups, fields, solution, **told)
+        result.report.backward_error = residual
         if e.terms is not None:
-            report.motion = motion_summary(e, result, self._monitor.of_mesh, at.time)
+            result.report.motion = motion_summary(e, result, self._monitor.of_mesh, at.time)
         return result
 
     def reactions(self) -> Array:
