@@ -36,7 +36,7 @@ REFUSED = {
     "36_empty": r"there are no nodes",
     "37_only_comment": r"there are no nodes",
     "39_mixed_case": r":10:1: 'begin' stands outside any block; .*capitals matter",
-    "40_two_values_on_line": r":11:2: node 1 .*two nodes on one line\?",
+    "40_two_values_on_line": r":11:2: node 1 .*2 rows on one line\?",
     "42_two_coords": r":13:2: node 3 has 2 coordinates",
     "45_ctrl_chars_in_name": r":25:1: SubModelPart '../../etc/passwd' is no name",
     "46_no_nodes_block": r"there are no nodes",

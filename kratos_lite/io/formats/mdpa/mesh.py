@@ -1,22 +1,34 @@
-"""Nodes, elements, conditions and geometries of an `.mdpa` file."""
+"""Nodes, elements, conditions, geometries and parts of an `.mdpa` file."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from kratos_lite.errors import InputError
-from kratos_lite.io.formats.cells import already, repeated, repeated_nodes, wrong_nodes
+from kratos_lite.io.formats.cells import MOST, already, repeated_nodes, wrong_nodes
+from kratos_lite.io.formats.document import Document
 from kratos_lite.io.formats.mdpa.rows import Layout, first_line, read_rows
-from kratos_lite.io.formats.mdpa.scan import Frame, Source
+from kratos_lite.io.formats.mdpa.scan import LISTS, Frame, Source
+from kratos_lite.io.formats.mdpa.values import read_values
 from kratos_lite.io.names import LINES, SOLIDS, condition_shape, count, element_shape
-from kratos_lite.mesh import Block, Mesh, distinct, ids_of
+from kratos_lite.mesh import Block, Mesh, Part, distinct, ids_of, rows_of_ids, without_repeats
 from kratos_lite.shapes.faces import FACE_SHAPES
+from kratos_lite.typing import Ints
 
 NODES = Layout("node", "irrr", "coordinates", needs="expected id x y z", alone=True)
-WORDS = {"Elements": "element", "Conditions": "condition", "Geometries": "geometry"}
+CELLS = {"Elements": "element", "Conditions": "condition", "Geometries": "geometry"}
+PART_NAME = re.compile(r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*")
+"""Names that may be part of a file name without harm."""
+NUMBERS = ("properties", "tables")
+"""Kinds of members of which a part keeps the ids, not the rows."""
+WORDS = {
+    "nodes": "node", "elements": "element", "conditions": "condition", "geometries": "geometry",
+    "constraints": "constraint", "properties": "Properties", "tables": "table",
+}  # fmt: skip
 
 
 def read_mesh(source: Source, frames: dict[str, list[Frame]], properties: Sequence[int]) -> Mesh:
@@ -58,25 +70,25 @@ def read_blocks(source: Source, frames: list[Frame], mesh: Mesh) -> list[Block]:
     """
     blocks = [block for frame in frames if len(block := _read_block(source, frame, mesh))]
     if blocks:
-        _refuse_repeated(source, blocks, WORDS[frames[0].name])
+        lines = np.concatenate([block.lines for block in blocks if block.lines is not None])
+        source.refuse_repeated(CELLS[frames[0].name], ids_of(blocks), lines)
     return blocks
 
 
 def _read_block(source: Source, frame: Frame, mesh: Mesh) -> Block:
-    name, word = frame.arguments[0], WORDS[frame.name]
+    name, word = frame.arguments[0], CELLS[frame.name]
     head = 1 if word == "geometry" else 2
     width = _width_of(frame.name, name)
-    known = width is not None
+    needs, is_known = f"{name} needs {width}", width is not None
     if width is None:
         width = max(len(first_line(source, frame.spans[0]).split()) - head, 0)
-    needs = f"{name} needs {width}" if known else f"the first {word} of the block has {width}"
-    layout = Layout(word, "ip"[:head] + "i" * width, "nodes", head, needs, alone=not known)
+        needs = f"the first {word} of the block has {width}"
+    layout = Layout(word, "ip"[:head] + "i" * width, "nodes", head, needs, alone=not is_known)
     rows = read_rows(source, frame.spans[0], layout)
-    ids = rows.ints[:, 0] if len(rows.ints) else np.zeros(0, dtype=np.int64)
-    nodes = mesh.node_rows(rows.ints[:, head:]).reshape(len(ids), width)
+    ids, properties = rows.ints[:, 0], rows.ints[:, 1] if head == 2 else 0
+    nodes = mesh.node_rows(rows.ints[:, head:])
     for row, text in wrong_nodes(rows.ints[:, head:], nodes):
         source.problem_in_line(f"{word} {ids[row]} ({name}){text}", int(rows.lines[row]))
-    properties = rows.ints[:, 1] if head == 2 and len(ids) else np.zeros(len(ids), dtype=np.int64)
     shape = {"element": element_shape, "condition": condition_shape}.get(word, lambda _: None)(name)
     return Block(name, np.maximum(nodes, 0), ids, properties, shape, rows.lines)
 
@@ -88,14 +100,6 @@ def _width_of(kind: str, name: str) -> int | None:
         return int(match.group(1)) if match else None
     width = count(name)
     return width if width in (SOLIDS if kind == "Elements" else (*FACE_SHAPES, *LINES)) else None
-
-
-def _refuse_repeated(source: Source, blocks: list[Block], word: str) -> None:
-    ids = ids_of(blocks)
-    lines = np.concatenate([block.lines for block in blocks if block.lines is not None])
-    for row, first in repeated(ids):
-        text = already(f"{word} {ids[row]}", lines[first], f"; give each {word} its own id")
-        source.problem_in_line(text, int(lines[row]))
 
 
 def _check_properties(source: Source, blocks: list[Block], word: str, declared: Sequence[int]) -> None:
@@ -111,3 +115,85 @@ def _check_properties(source: Source, blocks: list[Block], word: str, declared: 
                 f"add 'Begin Properties {number}' … 'End Properties'",
                 int(block.lines[rows[0]]),
             )
+
+
+def member_ids(document: Document) -> dict[str, Ints]:
+    """Return the ids of all nodes, elements, … that parts list, in the order of their rows."""
+    mesh, numbers = document.mesh, (document.properties, document.tables)
+    lists = [[c.id for c in document.constraints], *map(list, numbers)]
+    return {
+        "nodes": mesh.node_ids,
+        "elements": mesh.element_ids,
+        "conditions": ids_of(mesh.conditions),
+        "geometries": ids_of(document.geometries),
+        **{kind: np.array(ids, np.int64) for kind, ids in zip(("constraints", *NUMBERS), lists, strict=True)},
+    }
+
+
+class PartReader:
+    """Read the parts of a file; `ids` are those of all members that it has."""
+
+    def __init__(self, source: Source, ids: dict[str, Ints]) -> None:
+        self.source = source
+        self.ids = ids
+        self.order = {kind: np.argsort(values, kind="stable") for kind, values in ids.items()}
+        self.lines: dict[str, int] = {}
+        self.data: dict[str, dict[str, Any]] = {}
+        self.members: dict[str, dict[str, list[Ints]]] = {}  # of each part, by kind
+
+    def read(self, frames: list[Frame]) -> dict[str, Part]:
+        """Return all parts by their full names, parents before their children."""
+        for frame in frames:
+            self._read(frame, "")
+        parts = {}
+        for name, members in self.members.items():
+            fields: dict[str, Any] = {
+                kind: without_repeats(np.concatenate(lists)) for kind, lists in members.items()
+            }
+            fields |= {kind: tuple(fields[kind].tolist()) for kind in NUMBERS if kind in fields}
+            parts[name] = Part(**fields, data=self.data.get(name, {}))
+        return parts
+
+    def _read(self, frame: Frame, parent: str) -> None:
+        name = frame.arguments[0]
+        if not PART_NAME.fullmatch(name):
+            text = f"SubModelPart {name!r} is no name; use letters, digits, '_', '-' and single dots inside"
+            self.source.problem(text, frame.offset)
+            return
+        full = f"{parent}.{name}" if parent else name
+        if full in self.lines:
+            text = already(f"SubModelPart {full}", self.lines[full], "; give each part its own name")
+            self.source.problem(text, frame.offset)
+            return
+        self.lines[full] = self.source.line(frame.offset)
+        for ancestor in chain_of(full):
+            self.members.setdefault(ancestor, {})
+        for child in frame.children:
+            if child.name == "SubModelPart":
+                self._read(child, full)
+            elif child.name == "SubModelPartData":
+                self.data.setdefault(full, {}).update(read_values(self.source, child.spans)[0])
+            elif child.name in LISTS:
+                self._add(child, child.name.removeprefix("SubModelPart").lower(), full)
+            else:
+                text = f"unknown block {child.name} in SubModelPart {full} is skipped"
+                self.source.note(text, child.offset)
+
+    def _add(self, child: Frame, kind: str, full: str) -> None:
+        """Add the members in a list of ids to a part and to all its ancestors."""
+        read = read_rows(self.source, child.spans[0], Layout("id", "p" if kind == "properties" else "i"))
+        ids = read.ints[:, 0]
+        rows = rows_of_ids(self.ids[kind], ids, self.order[kind])
+        exists = rows >= 0
+        report = self.source.note_in_line if kind in NUMBERS else self.source.problem_in_line
+        for i in np.flatnonzero(~exists)[:MOST]:
+            text = f"SubModelPart {full} lists {WORDS[kind]} {ids[i]}, which the file does not have"
+            report(text, int(read.lines[i]))
+        for ancestor in chain_of(full) if len(ids) else ():
+            self.members[ancestor].setdefault(kind, []).append((ids if kind in NUMBERS else rows)[exists])
+
+
+def chain_of(full: str) -> list[str]:
+    """Return the full names of a part and of its ancestors, the outermost first."""
+    words = full.split(".")
+    return [".".join(words[:i]) for i in range(1, len(words) + 1)]

@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from kratos_lite.errors import nearest
-from kratos_lite.io.formats.cells import already, repeated
+from kratos_lite.io.formats.cells import already
 from kratos_lite.io.formats.document import Document, Properties
-from kratos_lite.io.formats.mdpa.data import read_data
-from kratos_lite.io.formats.mdpa.mesh import read_blocks, read_mesh
-from kratos_lite.io.formats.mdpa.parts import PartReader
+from kratos_lite.io.formats.mdpa.data import read_constraints, read_data
+from kratos_lite.io.formats.mdpa.mesh import PartReader, member_ids, read_blocks, read_mesh
 from kratos_lite.io.formats.mdpa.scan import TOP, Frame, Source, scan
 from kratos_lite.io.formats.mdpa.values import Table, read_table, read_values
 from kratos_lite.io.text import blank_comments, integer, read_bytes
-from kratos_lite.mesh import ids_of
-from kratos_lite.typing import Ints
 
 
 def read_mdpa(path: str | Path, *, strict: bool = True) -> Document:
@@ -46,29 +41,16 @@ def read_mdpa(path: str | Path, *, strict: bool = True) -> Document:
 
 def _read(source: Source, frames: dict[str, list[Frame]]) -> Document:
     """Return the document; first what others refer to, whatever the order in the file."""
-    properties = _properties(source, frames["Properties"])
-    tables = _tables(source, frames["Table"])
+    properties = _by_id(source, frames["Properties"], _properties, least=0)
+    tables = _by_id(source, frames["Table"], _table)
     mesh = read_mesh(source, frames, list(properties))
     # References to what is broken already would only be reported as missing.
     source.problems.raise_if_any()
     document = Document(mesh, properties, tables=tables)
     document.geometries = read_blocks(source, frames["Geometries"], mesh)
     document.model_data, _ = read_values(source, [span for f in frames["ModelPartData"] for span in f.spans])
-    if frames["Constraints"]:
-        from kratos_lite.io.formats.mdpa.constraints import read_constraints
-
-        for frame in frames["Constraints"]:
-            document.constraints += read_constraints(source, frame, mesh.node_ids)
-    _refuse_repeated_constraints(source, document)
-    ids = {
-        "nodes": mesh.node_ids,
-        "elements": mesh.element_ids,
-        "conditions": ids_of(mesh.conditions),
-        "geometries": ids_of(document.geometries),
-        "constraints": _numbers(c.id for c in document.constraints),
-        "properties": _numbers(properties),
-        "tables": _numbers(tables),
-    }
+    document.constraints = read_constraints(source, frames["Constraints"], mesh.node_ids)
+    ids = member_ids(document)
     document.nodal_data = [read_data(source, f, ids["nodes"]) for f in frames["NodalData"]]
     document.element_data = [read_data(source, f, ids["elements"]) for f in frames["ElementalData"]]
     document.condition_data = [read_data(source, f, ids["conditions"]) for f in frames["ConditionalData"]]
@@ -76,54 +58,33 @@ def _read(source: Source, frames: dict[str, list[Frame]]) -> Document:
     return document
 
 
-def _numbers(numbers: Iterable[int]) -> Ints:
-    return np.array(list(numbers), dtype=np.int64)
-
-
-def _properties(source: Source, frames: list[Frame]) -> dict[int, Properties]:
-    """Return the Properties of some frames by their ids."""
-    properties: dict[int, Properties] = {}
+def _by_id(
+    source: Source, frames: list[Frame], read: Callable[[Source, Frame, int], Any], least: int = 1
+) -> dict[int, Any]:
+    """Return what `read` makes of blocks, by the ids in their headers."""
+    by_id: dict[int, Any] = {}
     for frame in frames:
-        number = _number(source, frame, properties, zero=True)
-        values, lines = read_values(source, frame.spans)
-        for child in frame.children:
-            key = " ".join(["Table", *child.arguments])
-            values[key], lines[key] = read_table(source, child, child.arguments), source.line(child.offset)
-            source.note(f"{key} of {frame.title[6:]} is kept, but not used", child.offset)
-        if number is not None:
-            properties[number] = Properties(number, values, lines, source.line(frame.offset))
-    return properties
+        word, number = frame.arguments[0], -1
+        try:
+            number = 0 if word == "0" and least == 0 else integer(word.encode())
+        except ValueError as error:
+            source.problem(f"{frame.name}: {error}", frame.offset)
+        if number in by_id and number >= least:
+            text = already(f"{frame.name} {number}", by_id[number].line, "; give each its own id")
+            source.problem(text, frame.offset)
+        by_id[number] = read(source, frame, number)
+    return by_id
 
 
-def _tables(source: Source, frames: list[Frame]) -> dict[int, Any]:
-    """Return the tables of some frames by their ids."""
-    tables: dict[int, Table] = {}
-    for frame in frames:
-        number = _number(source, frame, tables)
-        table = read_table(source, frame, frame.arguments[1:])
-        source.note(f"{frame.title[6:]} is kept, but not used", frame.offset)
-        if number is not None:
-            tables[number] = table
-    return tables
+def _properties(source: Source, frame: Frame, number: int) -> Properties:
+    values, lines = read_values(source, frame.spans)
+    for child in frame.children:
+        key = " ".join(["Table", *child.arguments])
+        values[key], lines[key] = read_table(source, child), source.line(child.offset)
+        source.note(f"{key} of {frame.title[6:]} is kept, but not used", child.offset)
+    return Properties(number, values, lines, source.line(frame.offset))
 
 
-def _number(source: Source, frame: Frame, taken: dict[int, Any], zero: bool = False) -> int | None:
-    """Return the id in the header of a block, or None where it is wrong or taken."""
-    word = frame.arguments[0]
-    try:
-        number = 0 if zero and word == "0" else integer(word.encode())
-    except ValueError as error:
-        source.problem(f"{frame.name}: {error}", frame.offset)
-        return None
-    if number in taken:
-        text = already(f"{frame.name} {number}", taken[number].line, "; give each its own id")
-        source.problem(text, frame.offset)
-        return None
-    return number
-
-
-def _refuse_repeated_constraints(source: Source, document: Document) -> None:
-    all_ = document.constraints
-    for row, first in repeated(_numbers(c.id for c in all_)):
-        text = already(f"constraint {all_[row].id}", all_[first].line, "; give each its own id")
-        source.problem_in_line(text, all_[row].line)
+def _table(source: Source, frame: Frame, number: int) -> Table:
+    source.note(f"{frame.title[6:]} is kept, but not used", frame.offset)
+    return read_table(source, frame)

@@ -6,7 +6,6 @@ The compiled reader gives up on anything unusual; only the exact reader decides 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +18,7 @@ from kratos_lite.typing import Array, Ints
 
 TRUTH = {b"1": 1, b"true": 1, b"True": 1, b"0": 0, b"false": 0, b"False": 0}
 """Words for true and false."""
+LINE = re.compile(rb"[^\n]+")
 Words = list[re.Match[bytes]]
 
 
@@ -44,9 +44,9 @@ class Rows:
 
 
 def read_rows(source: Source, span: Span, layout: Layout) -> Rows:
-    """Return the rows in a piece of the text; what is wrong goes to the problems of the source."""
-    is_small = span[1] - span[0] < SMALL
-    return (None if is_small else _compiled(source, span, layout)) or _exact(source, span, layout)
+    """Return the rows in a span; what is wrong goes to the problems of the source."""
+    is_large = span[1] - span[0] >= SMALL
+    return (_compiled(source, span, layout) if is_large else None) or _exact(source, span, layout)
 
 
 def first_line(source: Source, span: Span) -> bytes:
@@ -64,10 +64,8 @@ def _compiled(source: Source, span: Span, layout: Layout) -> Rows | None:
 
 def _exact(source: Source, span: Span, layout: Layout) -> Rows:
     """Return the rows token by token, and note each that is wrong."""
-    kinds = layout.kinds
-    k = len(kinds)
-    ints: list[list[int]] = []
-    reals: list[list[float]] = []
+    kinds, k = layout.kinds, len(layout.kinds)
+    rows: list[list[float]] = []
     offsets: list[int] = []
     noted = False
     for words in _groups(source, span, k):
@@ -80,27 +78,22 @@ def _exact(source: Source, span: Span, layout: Layout) -> Rows:
         for first in range(0, len(words), k):
             row = _row(source, words[first : first + k], layout)
             if row is not None:
-                ints.append([int(v) for v, kind in zip(row, kinds, strict=True) if kind != "r"])
-                reals.append([v for v, kind in zip(row, kinds, strict=True) if kind == "r"])
+                rows.append(row)
                 offsets.append(words[first].start())
-    m, r = len(offsets), kinds.count("r")
+    m, r = len(rows), kinds.count("r")
+    ints = [int(v) for row in rows for v, kind in zip(row, kinds, strict=True) if kind != "r"]
+    reals = [v for row in rows for v, kind in zip(row, kinds, strict=True) if kind == "r"]
     lines = source.lines(np.array(offsets, dtype=np.int64))
     return Rows(np.array(ints, dtype=np.int64).reshape(m, k - r), np.array(reals).reshape(m, r), lines)
 
 
-def _groups(source: Source, span: Span, k: int) -> Iterator[Words]:
+def _groups(source: Source, span: Span, k: int) -> list[Words]:
     """Return the words line by line, or k by k where line ends carry no meaning."""
-    group: Words = []
-    end = 0
-    for word in source.words(span):
-        is_new = b"\n" in source.data[end : word.start()] if source.strict else len(group) == k
-        if group and is_new:
-            yield group
-            group = []
-        group.append(word)
-        end = word.end()
-    if group:
-        yield group
+    if source.strict:
+        lines = ([*source.words(line.span())] for line in LINE.finditer(source.data, *span))
+        return [words for words in lines if words]
+    words = [*source.words(span)]
+    return [words[i : i + k] for i in range(0, len(words), k)]
 
 
 def _row(source: Source, words: Words, layout: Layout) -> list[float] | None:
@@ -136,6 +129,4 @@ def _refuse_width(source: Source, words: Words, layout: Layout) -> None:
     hint = "; a row must stand whole on one line, unless strict=False" if source.strict else ""
     if len(words) % k == 0:
         hint = f"; {len(words) // k} rows on one line? Write one a line, or read with strict=False"
-        if layout.word == "node" and len(words) == 2 * k:
-            hint = "; two nodes on one line? Write one a line, or read with strict=False"
     source.problem(f"{found}; {layout.needs or f'expected {k - layout.head}'}{hint}", words[0].start())

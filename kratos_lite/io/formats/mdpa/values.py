@@ -80,7 +80,7 @@ def note_unknown(source: Source, name: str, offset: int) -> None:
 
 
 def read_values(source: Source, spans: list[Span]) -> tuple[dict[str, Any], dict[str, int]]:
-    """Return the variables in pieces of the text, and the line of each."""
+    """Return the variables in some spans, and the line of each."""
     values: dict[str, Any] = {}
     lines: dict[str, int] = {}
     for name, value, offset in (item for span in spans for item in _items(source, span)):
@@ -96,7 +96,7 @@ def read_values(source: Source, spans: list[Span]) -> tuple[dict[str, Any], dict
 
 
 def _items(source: Source, span: Span) -> Iterator[tuple[str, Any, int]]:
-    """Give name, value and offset of each variable in a piece of the text."""
+    """Yield name, value and offset of each variable in a span."""
     at, end = span
     last = at
     while word := WORD.search(source.data, at, end):
@@ -107,22 +107,14 @@ def _items(source: Source, span: Span) -> Iterator[tuple[str, Any, int]]:
             source.problem(text, word.start())
             at = last = source.line_end(word.start(), end)
             continue
-        begin = end
+        first = WORD.search(source.data, word.end(), end)
         try:
-            begin = _value_start(source, word.end(), end)
-            value, at = value_at(source, begin, end, kind_of(name))
+            value, at = value_at(source, first.start() if first else end, end, kind_of(name))
             yield name, value, word.start()
         except ValueError as error:
-            source.problem(f"{name}: {error}", begin if begin < end else word.start())
-            at = source.line_end(min(begin, end - 1), end)
+            source.problem(f"{name}: {error}", (first or word).start())
+            at = source.line_end(first.start() if first else end - 1, end)
         last = at
-
-
-def _value_start(source: Source, at: int, end: int) -> int:
-    word = WORD.search(source.data, at, end)
-    if word is None:
-        raise ValueError("has no value")
-    return word.start()
 
 
 def value_at(source: Source, at: int, end: int, kind: str | None) -> tuple[Any, int]:
@@ -152,12 +144,9 @@ def _array(match: re.Match[bytes]) -> Array:
         raise ValueError(f"the rows of {shown(match.group())} have different lengths")
     array = np.array(_numbers(body) if rows is None else rows, dtype=float)
     if size is not None:
-        stated = b"".join(size.split())
-        found = ",".join(map(str, array.shape)).encode()
-        if stated != found:
-            raise ValueError(
-                f"{shown(match.group())} has size [{found.decode()}], not [{shown(stated)[1:-1]}]"
-            )
+        stated, actual = b"".join(size.split()), ",".join(map(str, array.shape))
+        if stated != actual.encode():
+            raise ValueError(f"{shown(match.group())} has size [{actual}], not [{shown(stated)[1:-1]}]")
     return array
 
 
@@ -183,13 +172,13 @@ def _plain(token: bytes, kind: str | None) -> Any:
         return bool(TRUTH[token])
     if kind is None and (NUMBERLIKE.fullmatch(token) or token.endswith(b",")):
         return real(token)
-    try:
-        return token.decode("ascii")
-    except UnicodeDecodeError:
-        raise ValueError(f"{shown(token)} is no word; use plain letters") from None
+    if not token.isascii():
+        raise ValueError(f"{shown(token)} is no word; use plain letters")
+    return token.decode()
 
 
-def read_table(source: Source, frame: Frame, names: list[str]) -> Table:
+def read_table(source: Source, frame: Frame) -> Table:
     """Return the pairs of a ``Table`` block."""
     rows = read_rows(source, frame.spans[0], Layout("row", "rr", head=0, needs="expected x and y"))
-    return Table(names[0], names[1], rows.reals, source.line(frame.offset))
+    *_, x, y = frame.arguments
+    return Table(x, y, rows.reals, source.line(frame.offset))

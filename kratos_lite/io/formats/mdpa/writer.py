@@ -17,11 +17,11 @@ from kratos_lite.elements import ELEMENTS
 from kratos_lite.elements.formulations import is_unnamed
 from kratos_lite.errors import InputError
 from kratos_lite.io.formats.document import Constraint, Data, Document, Note
-from kratos_lite.io.formats.mdpa.parts import PART_NAME
+from kratos_lite.io.formats.mdpa.mesh import NUMBERS, PART_NAME, chain_of, member_ids
 from kratos_lite.io.formats.mdpa.scan import NAME
 from kratos_lite.io.formats.mdpa.values import Table, kind_of
 from kratos_lite.io.names import PRESTRESS, kratos_name
-from kratos_lite.mesh import Block, Mesh, ids_of
+from kratos_lite.mesh import Block, Mesh
 
 Lines = Iterator[str]
 
@@ -40,8 +40,9 @@ def write_mdpa(path: str | Path, document: Document) -> list[Note]:
     7 0.1 0.0 0.0
     End Nodes
     """
+    keep = _has_initial_state(document)
     try:
-        data = "\n".join(_lines(document)).encode("ascii") + b"\n"
+        data = "\n".join(_lines(document, keep)).encode("ascii") + b"\n"
     except (InputError, UnicodeEncodeError) as error:
         raise InputError(f"{path}: cannot be written: {error}") from None
     if str(path).lower().endswith(".gz"):
@@ -49,7 +50,6 @@ def write_mdpa(path: str | Path, document: Document) -> list[Note]:
 
         data = gzip.compress(data, mtime=0)
     write_whole(path, data)
-    keep = _has_initial_state(document)
     return _unknown_to_kratos(document, keep) + ([] if keep else _made_plain(document))
 
 
@@ -65,12 +65,14 @@ def _has_initial_state(document: Document) -> bool:
 def _unknown_to_kratos(document: Document, keep: bool) -> list[Note]:
     """Note what would stop Kratos: contact faces and names of 2008, and elements that users defined."""
     counts = Counter[str]()
-    blocks = [(block, keep) for block in document.mesh.blocks]
-    for block, kept in [*blocks, *((block, False) for block in document.mesh.conditions)]:
-        name = block.name if kept else kratos_name(block.name)
-        own = name in ELEMENTS and not ELEMENTS[name].__name__.startswith(("KinematicLinear3D", "BBar3D8N"))
-        old = name.startswith(("KinematicLinear", "TotalLagrangian3D"))
-        if own or old or "ContactFace" in name or re.search(r"3D\d+$", name):
+    mesh = document.mesh
+    for block in (*mesh.blocks, *mesh.conditions):
+        name = block.name if keep and block in mesh.blocks else kratos_name(block.name)
+        is_custom = name in ELEMENTS and not ELEMENTS[name].__name__.startswith(
+            ("KinematicLinear3D", "BBar3D8N")
+        )
+        is_old = name.startswith(("KinematicLinear", "TotalLagrangian3D"))
+        if is_custom or is_old or "ContactFace" in name or re.search(r"3D\d+$", name):
             counts[name] += len(block)
     text = "{} {} are written, but Kratos 10 does not know them"
     return [Note(0, text.format(n, name)) for name, n in counts.items() if n]
@@ -86,9 +88,9 @@ def _made_plain(document: Document) -> list[Note]:
     return [Note(0, text.format(name, kratos_name(name), how)) for name in names]
 
 
-def _lines(document: Document) -> Lines:
-    """Give the lines of the file in the order that Kratos needs: what is referred to comes first."""
-    mesh, keep = document.mesh, _has_initial_state(document)
+def _lines(document: Document, keep: bool) -> Lines:
+    """Yield the lines of the file in the order that Kratos needs: what is referred to comes first."""
+    mesh = document.mesh
     if document.model_data:
         yield from _block("ModelPartData", _values(document.model_data))
     for number, table in document.tables.items():
@@ -125,7 +127,7 @@ def _name(name: str) -> str:
 
 
 def _rows(ints: NDArray[Any], reals: ArrayLike = ()) -> Lines:
-    """Give the lines of a table of integers (m, a), followed by reals (m, b)."""
+    """Yield the lines of a table of integers (m, a), followed by reals (m, b)."""
     numbers = np.asarray(reals, dtype=float)
     if not np.isfinite(numbers).all():
         raise InputError("a number is not finite (nan or inf); give a finite one")
@@ -137,21 +139,20 @@ def _rows(ints: NDArray[Any], reals: ArrayLike = ()) -> Lines:
 
 
 def _properties(document: Document) -> Lines:
-    """Give the Properties; those that cells use but nobody filled become empty blocks."""
+    """Yield the Properties; those that cells use but nobody filled become empty blocks."""
     mesh = document.mesh
     used = {int(n) for block in (*mesh.blocks, *mesh.conditions) for n in np.unique(block.properties)}
     for number in [*document.properties, *sorted(used - document.properties.keys())]:
         values = document.properties[number].values if number in document.properties else {}
-        tables = {name: value for name, value in values.items() if isinstance(value, Table)}
-        body = [*_values({name: v for name, v in values.items() if name not in tables})]
-        for table in tables.values():
-            body += _table("Table", table)
-        yield from _block(f"Properties {number}", body)
+        yield from _block(f"Properties {number}", _values(values))
 
 
 def _values(values: dict[str, Any]) -> Lines:
     for name, value in values.items():
-        yield f" {_name(name)} {_value(name, value)}"
+        if isinstance(value, Table):
+            yield from _table("Table", value)
+        else:
+            yield f" {_name(name)} {_value(name, value)}"
 
 
 def _value(name: str, value: Any) -> str:
@@ -193,7 +194,7 @@ def _cells(kind: str, block: Block, mesh: Mesh, name: str) -> Lines:
 
 
 def _constraints(constraints: list[Constraint]) -> Lines:
-    """Give the constraints, those of the same variables in one block."""
+    """Yield the constraints, those of the same variables in one block."""
     # Kratos misreads a block whose constraints have different numbers of independent nodes.
     for (_, *words), group in groupby(constraints, key=_header):
         rows = []
@@ -215,37 +216,27 @@ def _header(constraint: Constraint) -> tuple[int | str, ...]:
 
 
 def _data(data: Data, is_nodal: bool) -> Lines:
-    """Give the rows of nodal, elemental or conditional data."""
+    """Yield the rows of nodal, elemental or conditional data."""
     values = np.asarray(data.values)
-    head = [data.ids[:, None], data.fixed[:, None].astype(np.int64)] if is_nodal else [data.ids[:, None]]
     if not values.size:
-        yield from _rows(data.ids[:, None])
-    elif values.ndim == 1 and kind_of(data.variable) == "truth":
-        yield from _rows(np.hstack([*head, values[:, None].astype(np.int64)]))
-    elif values.ndim == 1:
-        yield from _rows(np.hstack(head), values)
-    else:
-        for row, value in zip(_rows(np.hstack(head)), values, strict=True):
-            yield f"{row} {_array(data.variable, value)}"
+        return _rows(data.ids[:, None])
+    columns = [data.ids, data.fixed.astype(np.int64)] if is_nodal else [data.ids]
+    if values.ndim > 1:
+        rows = zip(_rows(np.stack(columns, axis=1)), values, strict=True)
+        return (f"{row} {_array(data.variable, value)}" for row, value in rows)
+    if kind_of(data.variable) == "truth":
+        return _rows(np.stack([*columns, values.astype(np.int64)], axis=1))
+    return _rows(np.stack(columns, axis=1), values)
 
 
 def _parts(document: Document) -> Lines:
-    mesh, parts = document.mesh, document.mesh.parts
-    ids = {
-        "nodes": mesh.node_ids,
-        "elements": mesh.element_ids,
-        "conditions": ids_of(mesh.conditions),
-        "geometries": ids_of(document.geometries),
-        "constraints": np.array([c.id for c in document.constraints], dtype=np.int64),
-    }
+    parts = document.mesh.parts
+    ids = member_ids(document)
     children: dict[str, list[str]] = {}
     for name in parts:
         if not PART_NAME.fullmatch(name):
             raise InputError(f"part {name!r} has no name for a .mdpa file; use letters, digits, '_' and '-'")
-        parent = name
-        while parent := parent.rpartition(".")[0]:
-            if parent in parts:
-                break
+        parent = next((ancestor for ancestor in chain_of(name)[-2::-1] if ancestor in parts), "")
         children.setdefault(parent, []).append(name)
 
     def lines(name: str, parent: str) -> Lines:
@@ -253,10 +244,10 @@ def _parts(document: Document) -> Lines:
         body: list[str] = []
         if part.data:
             body += _block("SubModelPartData", _values(part.data))
-        members = {"tables": part.tables, "properties": part.properties}
-        members |= {kind: known[getattr(part, kind)].tolist() for kind, known in ids.items()}
-        for kind, numbers in members.items():
-            if numbers:
+        for kind in ("tables", "properties", *ids):
+            members = getattr(part, kind)
+            if len(members):
+                numbers = members if kind in NUMBERS else ids[kind][members].tolist()
                 body += _block(f"SubModelPart{kind.capitalize()}", map(str, numbers))
         for child in children.get(name, ()):
             body += lines(child, name)
