@@ -17,7 +17,7 @@ from kratos_lite.io.kratos import (
     processes,
     properties,
     run_file,
-    time_integration,
+    time_dependent,
 )
 from kratos_lite.io.kratos.variables import LOADING
 from kratos_lite.materials import MATERIALS
@@ -82,7 +82,7 @@ TABLES: dict[str, Callable[[], list[str]]] = {
     "processes": _processes,
     "functions": lambda: [_code(sorted(expressions._FUNCTIONS))],
     "solver_settings": lambda: [_code(sorted(run_file.HARMLESS))],
-    "dynamic": lambda: [_code(time_integration.DYNAMIC_KEYS)],
+    "dynamic": lambda: [_code(time_dependent.DYNAMIC_KEYS)],
     "fields": _fields,
     "ale": lambda: _table(*((f"`{k}`", _code(v)) for k, v in motion.KEYS.items()), head="| motion | keys |"),
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from kratos_lite.ale import Rotation, Translation
@@ -16,6 +17,11 @@ KEYS = {
     "translation": ("direction", "boundaries", *COMMON),
 }
 
+READ: dict[str, Callable[[Settings, str], Any]] = {
+    "boundaries": Settings.text, "part": Settings.text, "center": Settings.vector,
+    "skew": Settings.flag, "stiffening": Settings.flag,
+}  # fmt: skip
+
 
 def add_motion(model: Model, settings: Settings, time: float | None = None) -> None:
     """Add the motion that the section ``ale`` of a run file gives to a model; nothing without one.
@@ -28,8 +34,7 @@ def add_motion(model: Model, settings: Settings, time: float | None = None) -> N
         return
     section = settings.section("ale")
     section.check_keys(KEYS)
-    if len(section.values) != 1:
-        raise section.error("", "one of 'rotation' and 'translation' is needed")
+    section.expect(len(section.values) == 1, "", "one of 'rotation' and 'translation' is needed")
     (kind,) = section.values
     inner = section.section(kind)
     inner.check_keys(KEYS[kind])
@@ -41,14 +46,12 @@ def add_motion(model: Model, settings: Settings, time: float | None = None) -> N
 
 def _value(section: Settings, key: str, time: float | None) -> Any:
     """Return the argument of a motion that a key gives."""
-    if key in ("boundaries", "part"):
-        return section.text(key)
-    if key in ("axis", "direction", "center"):
-        is_word = key != "center" and isinstance(section.values[key], str)
-        return section.text(key) if is_word else section.vector(key)
-    if key in ("skew", "stiffening"):
-        return section.flag(key)
-    if not isinstance(section.values[key], dict):
+    if key in READ:
+        return READ[key](section, key)
+    value = section.values[key]
+    if key in ("axis", "direction"):
+        return section.text(key) if isinstance(value, str) else section.vector(key)
+    if not isinstance(value, dict):
         return section.vector(key) if key in CENTER else section.number(key)
     series = _series(section, key)
     values = series if time is None else [one(time) for one in series]
@@ -63,8 +66,8 @@ def _series(section: Settings, key: str) -> list[TimeSeries]:
     if key not in CENTER:
         return [section.placed(key, TimeSeries, times, table.numbers("values"))]
     rows = table.get("values")
-    if not (isinstance(rows, list) and rows and all(map(_is_vector, rows))):
-        raise table.error("values", f"must be a list of [x, y, z]; got {shown(rows)}")
+    fits = isinstance(rows, list) and rows and all(map(_is_vector, rows))
+    table.expect(fits, "values", f"must be a list of [x, y, z]; got {shown(rows)}")
     return [section.placed(key, TimeSeries, times, list(column)) for column in zip(*rows, strict=True)]
 
 

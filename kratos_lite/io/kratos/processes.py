@@ -76,10 +76,9 @@ class Action:
 
 
 def _value(settings: Settings, value: Any, key: str) -> Value:
-    is_formula = isinstance(value, str)
-    expected = f"must be a number or an expression in x, y, z, t; got {shown(value)}"
-    settings.expect(is_formula or is_number(value), key, expected)
-    return value if is_formula else float(value)
+    text = f"must be a number or an expression in x, y, z, t; got {shown(value)}"
+    settings.expect(isinstance(value, str) or is_number(value), key, text)
+    return value if isinstance(value, str) else float(value)
 
 
 def _three(settings: Settings, key: str) -> list[Any]:
@@ -111,16 +110,12 @@ def _by_direction(settings: Settings) -> list[Factors]:
     return [(d, modulus) for d in direction]
 
 
-def _kept(settings: Settings) -> list[Factors]:
-    return [(), (), ()]
-
-
 @dataclass(frozen=True)
 class Process:
     """A kind of process: what it sets, and of what."""
 
     # the factors of each component from the parameters; None leaves the component alone.
-    factors: Callable[[Settings], list[Factors]]
+    factors: Callable[[Settings], Sequence[Factors]]
     keys: tuple[str, ...] = ("value",)  # parameters of its own.
     on_conditions: bool = False  # it acts on conditions, and fixes nothing.
     is_vector: bool = True  # it sets three components.
@@ -131,8 +126,8 @@ PROCESSES = {
     "assign_vector_variable_process": Process(_vector),
     "assign_scalar_variable_process": Process(_scalar, is_vector=False),
     "assign_vector_by_direction_process": Process(_by_direction, DIRECTION),
-    "fix_vector_variable_process": Process(_kept, ()),
-    "fix_scalar_variable_process": Process(_kept, (), is_vector=False),
+    "fix_vector_variable_process": Process(lambda _: [()] * 3, ()),
+    "fix_scalar_variable_process": Process(lambda _: [()] * 3, (), is_vector=False),
     "assign_vector_variable_to_conditions_process": Process(_vector, on_conditions=True),
     "assign_scalar_variable_to_conditions_process": Process(_scalar, on_conditions=True, is_vector=False),
     "assign_vector_by_direction_to_condition_process": Process(_by_direction, DIRECTION, on_conditions=True),
@@ -144,19 +139,20 @@ def actions_of(entry: Settings, module: str, context: RunContext) -> list[Action
     """Return what a process of the table `PROCESSES` does."""
     process, settings = PROCESSES[module], entry.section("Parameters", required=True)
     refuse_local_axes(settings)
-    settings.check_keys([*COMMON, *process.keys, "entities" if process.on_conditions else "constrained"])
+    on_conditions = process.on_conditions
+    settings.check_keys([*COMMON, *process.keys, "entities" if on_conditions else "constrained"])
     name, part = _variable(settings, process), context.part(settings)
-    indices, interval = part.conditions if process.on_conditions else part.nodes, interval_of(settings)
+    indices, interval = part.conditions if on_conditions else part.nodes, interval_of(settings)
     names = [f"{name}_{axis}" for axis in "XYZ"] if process.is_vector else [name]
     components = zip(names, process.factors(settings), _fixed(settings, process), strict=False)
     steps = [step for step, time in enumerate(context.times) if time in interval]
     later = [step for step in steps if step]
     actions = []
-    for component, factors, fix in components:
-        if factors or (fix and factors is not None):
-            acting = steps if factors and not process.on_conditions else later
-            conditions = process.on_conditions
-            actions.append(Action(settings, indices, component, factors, interval, acting, conditions, fix))
+    for component, factors, is_fixed in components:
+        if factors or (is_fixed and factors is not None):
+            acting = steps if factors and not on_conditions else later
+            entries = (settings, indices, component, factors, interval, acting, on_conditions, is_fixed)
+            actions.append(Action(*entries))
     return actions
 
 
@@ -194,7 +190,21 @@ def _fixed(settings: Settings, process: Process) -> list[bool]:
 def run(actions: Sequence[Action], context: RunContext, values: Variables) -> list[str]:
     """Bring the values and supports to what they are at the last step; return notes."""
     set_values(actions, context.times, values)
-    _hold(actions, len(context.times) - 1, values)
+    last, supports = len(context.times) - 1, [action for action in actions if action.fixed and action.steps]
+    for action in supports:
+        if action.steps[0] < last:  # a support of an earlier step is taken back after it
+            values.fix(action.component, action.indices, False)
+    for action in supports:
+        # What is fixed at the start, before the first step, stays so through that step.
+        if action.steps[-1] == last or (action.steps == [0] and last == 1):
+            is_whole = bool(action.factors) or len(action.steps) == last
+            text = (
+                f"{action.component} is held only from a later step on, at the value solved before; "
+                'kratos_lite solves one step: use the interval [0.0, "End"] or assign a value'
+            )
+            is_displacement = action.component.startswith("DISPLACEMENT")
+            action.settings.expect(is_whole or not is_displacement, "interval", text)
+            values.fix(action.component, action.indices)
     return notes_of(actions, context)
 
 
@@ -230,26 +240,3 @@ def set_values(actions: Sequence[Action], times: Sequence[float], values: Variab
     places = places_of(values.mesh)
     for action in sorted((a for a in actions if a.steps and a.factors), key=lambda a: a.steps[-1]):
         action.put(values, places, times[action.steps[-1]])
-
-
-def _hold(actions: Sequence[Action], last: int, values: Variables) -> None:
-    """Fix what is fixed in the last step; a support of an earlier step is taken back after it."""
-    supports = [action for action in actions if action.fixed and action.steps]
-    for action in supports:
-        if action.steps[0] < last:
-            values.fix(action.component, action.indices, False)
-    for action in supports:
-        # What is fixed at the start, before the first step, stays so through that step.
-        if action.steps[-1] == last or (action.steps == [0] and last == 1):
-            _check_history(action, last)
-            values.fix(action.component, action.indices)
-
-
-def _check_history(action: Action, last: int) -> None:
-    """Refuse a support whose value is the solution of an earlier step."""
-    is_later = not action.factors and len(action.steps) < last and action.component.startswith("DISPLACEMENT")
-    text = (
-        f"{action.component} is held only from a later step on, at the value solved before; "
-        'kratos_lite solves one step: use the interval [0.0, "End"] or assign a value'
-    )
-    action.settings.expect(not is_later, "interval", text)

@@ -10,7 +10,7 @@ import numpy as np
 from kratos_lite.analysis.model import Model
 from kratos_lite.errors import InputError, KratosLiteError, MaterialError, Problems, nearest
 from kratos_lite.io.formats.document import Properties
-from kratos_lite.io.names import PRESTRESS, nearest_variable
+from kratos_lite.io.names import PRESTRESS
 from kratos_lite.materials import MATERIALS, LinearMaterial
 from kratos_lite.model.loads.body import BodyForce, Gravity
 from kratos_lite.typing import Array
@@ -39,16 +39,8 @@ def apply_properties(model: Model, properties: Properties, materials: bool, prob
 
 
 def _apply_material(model: Model, properties: Properties) -> None:
-    try:
-        material = material_from(properties.values)
-    except KratosLiteError as error:
-        hints = {v: nearest_variable(v, ELASTIC) for v in properties.values if v not in (*ELASTIC, "DENSITY")}
-        text = "".join(
-            f"; found {v!r} at line {properties.lines.get(v, 0)}:{hint}" for v, hint in hints.items() if hint
-        )
-        raise InputError(f"{error}{text}") from None
-    if material is not None:
-        model.assign(material, properties.id)
+    if names_material(properties.values):
+        model.assign(material_from(properties.values), properties.id)
 
 
 def _apply_rule(model: Model, properties: Properties) -> None:
@@ -66,15 +58,13 @@ def _apply_prestress(model: Model, properties: Properties) -> None:
     Source: Isotropic3D of KratosStructuralApplication, σ = C ε - PRESTRESS_FACTOR · PRESTRESS.
     """
     factor = float(_numbers(properties, "PRESTRESS_FACTOR", 1.0, (), "one number"))
-    stresses = {
-        name: _numbers(properties, name, 0.0, (6,), "six components xx yy zz xy yz xz")
-        for name in PRESTRESS
-        if name in properties.values
-    }
-    if len(stresses) == 2 and (stresses["PRESTRESS"] != stresses["INSITU_STRESS"]).any():
+    names = [name for name in PRESTRESS if name in properties.values]
+    what = "six components xx yy zz xy yz xz"
+    stresses = [_numbers(properties, name, 0.0, (6,), what) for name in names]
+    if any((stress != stresses[0]).any() for stress in stresses):
         raise InputError("PRESTRESS and INSITU_STRESS are two names of one stress, but differ; keep one")
-    for stress in list(stresses.values())[:1]:
-        model.add_prestress(-factor * stress, properties.id)
+    if stresses:
+        model.add_prestress(-factor * stresses[0], properties.id)
 
 
 def _numbers(properties: Properties, name: str, default: Any, shape: tuple[int, ...], what: str) -> Array:
@@ -113,15 +103,18 @@ def _line_of(properties: Properties, text: str) -> int:
     return named[0] if named else properties.line
 
 
-def material_from(values: dict[str, Any]) -> LinearMaterial | None:
-    """Return the material of a Properties block, or None if it names none.
+def names_material(values: dict[str, Any]) -> bool:
+    """Whether a Properties block says what its material is."""
+    return "CONSTITUTIVE_LAW" in values or bool(ELASTIC & values.keys())
+
+
+def material_from(values: dict[str, Any]) -> LinearMaterial:
+    """Return the material of a Properties block.
 
     >>> material_from({"YOUNG_MODULUS": 210e9, "POISSON_RATIO": 0.3})
     Isotropic3D(E=210000000000.0, nu=0.3, density=0.0)
     """
     law = values.get("CONSTITUTIVE_LAW")
-    if law is None and not ELASTIC & values.keys():
-        return None
     name = "Isotropic3D" if law is None else str(law)
     if law in (None, USER_LAW) and "YOUNG_MODULUS_X" in values:
         name = "Orthotropic3D"

@@ -14,15 +14,18 @@ from kratos_lite.io.formats.document import Document
 from kratos_lite.io.formats.part_files import part_files, read_part
 from kratos_lite.io.kratos.context import RunContext, module_of, times_of
 from kratos_lite.io.kratos.expected_values import COMPARISONS, Comparison
-from kratos_lite.io.kratos.materials import materials_of
+from kratos_lite.io.kratos.materials import use_materials
 from kratos_lite.io.kratos.motion import add_motion
 from kratos_lite.io.kratos.processes import PROCESSES, Action, actions_of, run
-from kratos_lite.io.kratos.time_dependent import ProcessesInTime
-from kratos_lite.io.kratos.time_integration import DYNAMIC, DYNAMIC_KEYS, time_integration_of
-from kratos_lite.io.kratos.to_model import check_elements, model_from
+from kratos_lite.io.kratos.time_dependent import (
+    DYNAMIC,
+    DYNAMIC_KEYS,
+    ProcessesInTime,
+    time_integration_of,
+)
+from kratos_lite.io.kratos.to_model import model_from
 from kratos_lite.io.kratos.variables import Variables
 from kratos_lite.io.settings import Settings, find_file, read_settings
-from kratos_lite.materials import LinearMaterial
 
 ROOT_KEYS = ("problem_data", "solver_settings", "processes", "output_processes", "ale")
 HARMLESS = frozenset(
@@ -57,24 +60,21 @@ def read_kratos_project(
     if "properties" in settings:
         raise settings.error("properties", "this is a materials file; read the run file that names it")
     if not {"solver_settings", "problem_data"} & settings.values.keys():
-        text = (
-            "this is no run file of Kratos, which has 'solver_settings'; write a Python script with a 'case'"
-        )
-        raise settings.error("", text)
+        text = "this is no run file of Kratos, which has 'solver_settings'"
+        raise settings.error("", f"{text}; write a Python script with a 'case'")
     solver = settings.section("solver_settings", required=True)
     times = times_of(settings.section("problem_data", required=True), solver)
     dynamic = solver.text("solver_type") in DYNAMIC
     notes = _check_solver(solver) + _check_root(settings)
     if not dynamic:
-        notes.append(
-            f"supports, loads and motion are taken at the end of the run: those at t = {times[-1]:g} s"
-        )
+        text = "supports, loads and motion are taken at the end of the run"
+        notes.append(f"{text}: those at t = {times[-1]:g} s")
     document = _read_mesh(solver, folder, allow_outside, notes, part)
     if not linear:
         _check_strains(solver, document)
     root, moved = solver.text("model_part_name", "Structure"), solver.flag("move_mesh_flag", True)
     context = RunContext(document.mesh, root, folder, times, moved, allow_outside)
-    materials = _read_materials(solver, context, document, notes)
+    _use_materials(solver, context, document, notes)
     actions, checks = _read_processes(settings, context, notes)
     in_time = ProcessesInTime(actions, context) if dynamic else None
 
@@ -86,12 +86,9 @@ def read_kratos_project(
 
     model = model_from(
         document,
-        materials=materials is None,
         initial_displacement=initial_displacement and not dynamic,
         processes=process,
     )
-    for number, material in (materials or {}).items():
-        model.assign(material, number)
     add_motion(model, settings, None if dynamic else times[-1])
     model.notes += notes
     if in_time is None:
@@ -114,10 +111,9 @@ def _check_root(settings: Settings) -> list[str]:
 def _check_solver(solver: Settings) -> list[str]:
     """Refuse what is not a linear solid in three dimensions; note what is treated otherwise."""
     kind, analysis = solver.text("solver_type"), solver.text("analysis_type", "non_linear")
-    text = (
-        f"solver_type {kind!r}: run files are solved as 'static' or 'dynamic'; take 'static', then --modes "
-    )
-    solver.expect(kind in ("Static", "static", *DYNAMIC), "solver_type", text + "for frequencies")
+    text = f"solver_type {kind!r}: run files are solved as 'static' or 'dynamic'"
+    is_solved = kind in ("Static", "static", *DYNAMIC)
+    solver.expect(is_solved, "solver_type", f"{text}; take 'static', then --modes for frequencies")
     size = solver.integer("domain_size")
     solver.expect(size == 3, "domain_size", f"must be 3; got {size}")
     text = f"must be 'linear' or 'non_linear'; got {analysis!r}"
@@ -147,13 +143,10 @@ def _check_strains(solver: Settings, document: Document) -> None:
 
 def part_files_of(run_file: Path) -> dict[int, Path]:
     """Return the part files that hold the mesh of a run file, by number; none where it is in one file."""
-    return _part_files(read_settings(run_file).section("solver_settings", required=True), run_file.parent)
-
-
-def _part_files(solver: Settings, folder: Path) -> dict[int, Path]:
+    solver = read_settings(run_file).section("solver_settings", required=True)
     source = solver.section("model_import_settings", required=True)
-    path = folder / (source.text("input_filename") + ".mdpa")
-    return part_files(path) or part_files(folder / path.name)
+    path = run_file.parent / (source.text("input_filename") + ".mdpa")
+    return part_files(path) or part_files(run_file.parent / path.name)
 
 
 def _read_mesh(solver: Settings, folder: Path, outside: bool, notes: list[str], part: int | None) -> Document:
@@ -164,8 +157,7 @@ def _read_mesh(solver: Settings, folder: Path, outside: bool, notes: list[str], 
         path, note = find_file(source, "input_filename", folder, outside=outside, ending=".mdpa")
         document = read_document(path)
     else:
-        document, note = read_part(_part_files(solver, folder)[part]), ""
-    check_elements(document)
+        document, note = read_part(part_files_of(Path(solver.source))[part]), ""
     notes += [note] if note else []
     unused = len(document.constraints)
     if unused and not solver.flag("multi_point_constraints_used", True):
@@ -174,16 +166,13 @@ def _read_mesh(solver: Settings, folder: Path, outside: bool, notes: list[str], 
     return document
 
 
-def _read_materials(
-    solver: Settings, context: RunContext, document: Document, notes: list[str]
-) -> dict[int, LinearMaterial] | None:
-    """Return the materials of the materials file, or None if there is none."""
+def _use_materials(solver: Settings, context: RunContext, document: Document, notes: list[str]) -> None:
+    """Give the document the materials of the materials file, if there is one."""
     source = solver.section("material_import_settings")
-    if not source.text("materials_filename", ""):
-        return None
-    path, note = find_file(source, "materials_filename", context.folder, outside=context.outside)
-    notes += [note] if note else []
-    return materials_of(read_settings(path), context, document, notes)
+    if source.text("materials_filename", ""):
+        path, note = find_file(source, "materials_filename", context.folder, outside=context.outside)
+        notes += [note] if note else []
+        use_materials(read_settings(path), context, document, notes)
 
 
 def _read_processes(

@@ -1,4 +1,4 @@
-"""Processes of a Kratos run file in time: what they hold, set and load while a model moves.
+"""Kratos run files in time: integrator, damping and steps; what processes hold, set and load on the way.
 
 Kratos runs all processes before every time step, in order; values stay until they are set again.  It starts
 with the acceleration 0, as if nothing acted at the start: so loads act here from the first step on.
@@ -8,20 +8,31 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
+from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kratos_lite.analysis.model import Model
 from kratos_lite.errors import InputError
+from kratos_lite.io.case import TimeIntegration
 from kratos_lite.io.kratos.context import RunContext
 from kratos_lite.io.kratos.processes import Action, notes_of, places_of, set_values
 from kratos_lite.io.kratos.variables import LOADING, Variables
+from kratos_lite.io.settings import Settings
 from kratos_lite.model.loads import Load, ScaledLoad, TimeDependentLoad
 from kratos_lite.typing import Array, Ints
 
+if TYPE_CHECKING:
+    from kratos_lite.analysis.integrators import ModelIntegrator
+
+DYNAMIC = ("Dynamic", "dynamic")
+"""Kratos' solver_type of what moves."""
+RAYLEIGH = ("rayleigh_alpha", "rayleigh_beta")
+DYNAMIC_KEYS = ("time_integration_method", "scheme_type", "damp_factor_m", "newmark_beta", *RAYLEIGH)
 GRAVITY = frozenset(f"VOLUME_ACCELERATION_{axis}" for axis in "XYZ")
 SURFACE = frozenset(name for name in LOADING - GRAVITY if not name.startswith("DISPLACEMENT"))
-HELD = ("VELOCITY", "ACCELERATION")
+UNPRESCRIBED = ("VELOCITY", "ACCELERATION")
 """Variables that cannot be prescribed here."""
 
 
@@ -41,8 +52,8 @@ class ProcessesInTime:
         """Bring values and supports to what stays in time, and keep what changes for `finish`."""
         self._check(values)
         self._begin(values)
-        base = values.copy()
-        set_values(self.actions, self.context.times, values)
+        base, times = values.copy(), self.context.times
+        set_values(self.actions, times, values)
         for action in self.actions:
             if action.fixed:
                 values.fix(action.component, action.indices)
@@ -55,8 +66,8 @@ class ProcessesInTime:
                 continue
             values.note_idle(self.notes, group)
             values.drop(group)
-            self._later.append(TimeDependentLoad(_LoadInTime(self, actions, base.only(group), load_of)))
-        values.drop({f"{name}_{axis}" for name in HELD for axis in "XYZ"})
+            self._later.append(TimeDependentLoad(_load_in_time(actions, times, base.only(group), load_of)))
+        values.drop({f"{name}_{axis}" for name in UNPRESCRIBED for axis in "XYZ"})
 
     def finish(self, model: Model) -> None:
         """Give a model the loads and supports that change, and let all loads begin with the first step."""
@@ -72,43 +83,35 @@ class ProcessesInTime:
             )
         model.notes += self.notes
 
-    def at(self, action: Action, time: float) -> float | None:
-        """Return the last time, up to the one given, at which an action acts; None if there is none."""
-        if float(time) in action.interval:
-            return float(time)
-        times = self.context.times
-        count = bisect_right(action.steps, bisect_right(times, time) - 1)
-        return times[action.steps[count - 1]] if count else None
-
     # ---- supports and start ----------------------------------------------------------------------------
 
     def _check(self, values: Variables) -> None:
         for action in self.actions:
             name, expect = action.component, action.settings.expect
-            if action.fixed:
-                text = (
-                    f"{name} cannot be fixed; prescribe DISPLACEMENT as a function of t, or give "
-                    '"constrained": false and "interval": [0.0, 0.0] for an initial value'
-                )
-                expect(not name.startswith(HELD), "variable_name", text)
-                text = (
-                    f"{name} is held in a part of the run only; hold it from start to end, "
-                    '"interval": [0.0, "End"], or give "constrained": false for an initial value'
-                )
-                expect(not name.startswith("DISPLACEMENT") or self._acts_always(action), "interval", text)
+            text = (
+                f"{name} cannot be fixed; prescribe DISPLACEMENT as a function of t, or give "
+                '"constrained": false and "interval": [0.0, 0.0] for an initial value'
+            )
+            expect(not (action.fixed and name.startswith(UNPRESCRIBED)), "variable_name", text)
+            text = (
+                f"{name} is held in a part of the run only; hold it from start to end, "
+                '"interval": [0.0, "End"], or give "constrained": false for an initial value'
+            )
+            is_support = action.fixed and name.startswith("DISPLACEMENT")
+            expect(not is_support or self._acts_always(action), "interval", text)
         for name, fixed in values.fixed.items():
-            if name.startswith(HELD) and fixed.any():
+            if name.startswith(UNPRESCRIBED) and fixed.any():
                 raise InputError(f"{values.mesh.source}: {name} is fixed; only DISPLACEMENT can be")
 
     def _begin(self, values: Variables) -> None:
         """Find displacement and velocity at the start."""
-        start, points = values.copy(), values.mesh.points
+        start, places = values.copy(), places_of(values.mesh)
         for action in self.actions:
             name = action.component
             if action.steps[0] == 0 and action.factors:
-                value = action.value(points[action.indices], self.context.times[0])
-                start.nodal.put(name, action.indices, value)
-                is_still = not name.startswith("ACCELERATION") or not np.any(value)
+                action.put(start, places, self.context.times[0])
+                accelerated = start.nodal.scalar(name)[action.indices].any()
+                is_still = not (name.startswith("ACCELERATION") and accelerated)
                 text = f"{name} cannot be given; the acceleration at the start is 0"
                 action.settings.expect(is_still, "variable_name", text)
             if action.fixed and name.startswith("DISPLACEMENT"):
@@ -126,10 +129,8 @@ class ProcessesInTime:
         indices = action.indices[fixed[action.indices]]
         if not len(indices) or self._acts(action) == 0:
             return
-        text = (
-            f"{name} of a support changes in a part of the run only; give it as one function of t with the "
-        )
-        expect(self._acts_always(action), "interval", text + 'interval [0.0, "End"]')
+        text = f"{name} of a support changes in a part of the run only; give it as one function of t"
+        expect(self._acts_always(action), "interval", text + ' with the interval [0.0, "End"]')
         for later in self.actions[i + 1 :]:
             if later.component == name and later.factors and self._acts_always(later):
                 indices = np.setdiff1d(indices, later.indices)
@@ -152,31 +153,74 @@ def _begun(time: float) -> float:
     return float(time > 0)
 
 
-class _LoadInTime:
-    """The load of some actions as a function of the time; the same object while nothing changes."""
+def _load_in_time(
+    actions: Sequence[Action],
+    times: Sequence[float],
+    base: Variables,
+    load_of: Callable[[Variables], Load | None],
+) -> Callable[[float], Load | None]:
+    """Return the load of some actions as a function of the time; the same object while nothing changes."""
+    places = places_of(base.mesh)
 
-    def __init__(
-        self,
-        processes: ProcessesInTime,
-        actions: list[Action],
-        base: Variables,
-        load_of: Callable[[Variables], Load | None],
-    ) -> None:
-        self.processes, self.actions, self.base, self.load_of = processes, actions, base, load_of
-        self.last: tuple[object, Load | None] = (None, None)
+    @lru_cache(maxsize=1)
+    def load(acting: tuple[tuple[int, float], ...]) -> Load | None:
+        values = base.copy()
+        for i, when in acting:
+            actions[i].put(values, places, when)
+        return load_of(values)
 
-    def __call__(self, time: float) -> Load | None:
+    def at(time: float) -> Load | None:
         if not time > 0:
             return None
-        acting = [
-            (when, i) for i, a in enumerate(self.actions) if (when := self.processes.at(a, time)) is not None
-        ]
-        acting.sort()
-        key = [(i, when if self.actions[i].mentions("t") else None) for when, i in acting]
-        if key != self.last[0]:
-            values = self.base.copy()
-            points = places_of(values.mesh)
-            for when, i in acting:
-                self.actions[i].put(values, points, when)
-            self.last = (key, self.load_of(values))
-        return self.last[1]
+        last = [_last_time(action, times, float(time)) for action in actions]
+        acting = sorted((when, i) for i, when in enumerate(last) if when is not None)
+        return load(tuple((i, when if actions[i].mentions("t") else 0.0) for when, i in acting))
+
+    return at
+
+
+def _last_time(action: Action, times: Sequence[float], time: float) -> float | None:
+    """Return the last time, up to the one stated, at which an action acts; None if there is none."""
+    if time in action.interval:
+        return time
+    count = bisect_right(action.steps, bisect_right(times, time) - 1)
+    return times[action.steps[count - 1]] if count else None
+
+
+def time_integration_of(settings: Settings, processes: ProcessesInTime) -> TimeIntegration:
+    """Return the time integration of a dynamic run file; InputError with the place of what is wrong."""
+    solver, problem = settings.section("solver_settings"), settings.section("problem_data")
+    times = processes.context.times
+    text = f"must be 0 for dynamic solutions; got {times[0]:g}: shift the times"
+    problem.expect(times[0] == 0, "start_time", text)
+    alpha, beta = (solver.number(key, 0.0) for key in RAYLEIGH)
+    for key, value in zip(RAYLEIGH, (alpha, beta), strict=True):
+        solver.expect(value >= 0, key, f"must be ≥ 0; got {value:g}")
+    return TimeIntegration(
+        solver.section("time_stepping").number("time_step"),
+        len(times) - 1,
+        integrator=_integrator(solver),
+        rayleigh=(alpha, beta),
+        displacement=processes.displacement,
+        velocity=processes.velocity,
+        balanced=False,
+    )
+
+
+def _integrator(solver: Settings) -> ModelIntegrator:
+    """Return the integrator that Kratos would take."""
+    from kratos_lite.analysis.integrators import Bossak, Newmark
+
+    method = solver.text("time_integration_method", "implicit")
+    text = (
+        f"time_integration_method {method!r} is not supported: take 'implicit' with 'newmark'; "
+        "the option --integrator central_difference then integrates explicitly"
+    )
+    solver.expect(method == "implicit", "time_integration_method", text)
+    scheme, beta = solver.text("scheme_type", "bossak"), solver.number("newmark_beta", 0.25)
+    solver.expect(beta == 0.25, "newmark_beta", f"must be 0.25, which is stable; got {beta:g}")
+    text = f"scheme_type {scheme!r} is not supported; take 'newmark' or 'bossak' (Kratos' default)"
+    solver.expect(scheme in ("newmark", "bossak"), "scheme_type", text)
+    if scheme == "newmark":
+        return Newmark()
+    return solver.placed("damp_factor_m", Bossak, solver.number("damp_factor_m", -0.3))

@@ -19,7 +19,7 @@ from kratos_lite.model.loads.body import Gravity
 from kratos_lite.shapes.faces import Point1
 from kratos_lite.solvers.constraints import Constraints
 from kratos_lite.tabular import names_of
-from kratos_lite.typing import Array, Ints
+from kratos_lite.typing import Array, Ints, Mask
 
 KRATOS_LAW = {"Isotropic3D": "LinearElastic3DLaw", "Orthotropic3D": USER_LAW}
 
@@ -38,17 +38,18 @@ def document_from(model: Model) -> Document:
     for what, is_present in unwritten.items():
         if is_present:
             raise InputError(f"{what} cannot be written to a file of a model; leave it to a script")
-    mesh, start = model.mesh, _initial_displacement(model)
+    mesh, supports, start = model.mesh, model.supports, _initial_displacement(model)
     gravity, others = _split_loads(model)
     numbers, properties = _properties(model, gravity)
     blocks = _blocks(model, numbers)
     forces = sum((load.forces(mesh, model.element_groups()) for load in others), np.zeros_like(mesh.points))
-    conditions, data = _point_loads(mesh, forces, next(iter(properties), 0))
+    loaded = (forces != 0).any(axis=1)
+    conditions = _point_conditions(np.flatnonzero(loaded), next(iter(properties), 0))
     written = mesh.replace(blocks=blocks, conditions=conditions, parts=_parts(mesh))
-    data = [*_fixed(model), *start, *data]
-    document = Document(
-        written, properties, nodal_data=data, constraints=constraints_of(mesh, model.supports.constraints)
-    )
+    data = _nodal_data(mesh, "DISPLACEMENT", supports.fixed, supports.values, fixed=True) + start
+    data += _nodal_data(mesh, "POINT_LOAD", np.repeat(loaded[:, None], 3, axis=1), forces)
+    constraints = constraints_of(mesh, supports.constraints)
+    document = Document(written, properties, nodal_data=data, constraints=constraints)
     if mesh.conditions:
         document.notes.append(Note(0, "conditions are replaced by the nodal forces of their loads"))
     return document
@@ -116,37 +117,28 @@ def _values(material: LinearMaterial, gravity: Array, prestress: Array) -> dict[
 
 def _initial_displacement(model: Model) -> list[Data]:
     """Return the state without stress as the DISPLACEMENT of free nodes; InputError for supported ones."""
-    u0, fixed = model.initial_displacement, model.supports.fixed
+    u0 = model.initial_displacement
     if u0 is None:
         return []
-    if u0[fixed].any():
+    if u0[model.supports.fixed].any():
         what = "an initial displacement of prescribed degrees of freedom"
         raise InputError(f"{what} cannot be written: their DISPLACEMENT in a file is what is prescribed")
+    return _nodal_data(model.mesh, "DISPLACEMENT", u0 != 0, u0)
+
+
+def _nodal_data(mesh: Mesh, variable: str, where: Mask, values: Array, fixed: bool = False) -> list[Data]:
+    """Return the components (n, 3) of a variable where a mask (n, 3) is set."""
     data = []
     for axis, letter in enumerate("XYZ"):
-        if len(indices := np.flatnonzero(u0[:, axis])):
-            free, ids = np.zeros(len(indices), dtype=bool), model.mesh.node_ids[indices]
-            data.append(Data(f"DISPLACEMENT_{letter}", ids, free, u0[indices, axis]))
+        if len(indices := np.flatnonzero(where[:, axis])):
+            ids, mask = mesh.node_ids[indices], np.full(len(indices), fixed)
+            data.append(Data(f"{variable}_{letter}", ids, mask, values[indices, axis]))
     return data
 
 
-def _fixed(model: Model) -> list[Data]:
-    data, supports = [], model.supports
-    for axis, letter in enumerate("XYZ"):
-        if len(indices := np.flatnonzero(supports.fixed[:, axis])):
-            fixed, ids = np.ones(len(indices), dtype=bool), model.mesh.node_ids[indices]
-            data.append(Data(f"DISPLACEMENT_{letter}", ids, fixed, supports.values[indices, axis]))
-    return data
-
-
-def _point_loads(mesh: Mesh, forces: Array, properties: int) -> tuple[list[Block], list[Data]]:
-    indices = np.flatnonzero((forces != 0).any(axis=1))
-    if not len(indices):
-        return [], []
-    block = Block("PointLoadCondition3D1N", indices[:, None], properties=properties, shape=Point1)
-    free = np.zeros(len(indices), dtype=bool)
-    names = [f"POINT_LOAD_{axis}" for axis in "XYZ"]
-    return [block], [Data(n, mesh.node_ids[indices], free, forces[indices, i]) for i, n in enumerate(names)]
+def _point_conditions(nodes: Ints, properties: int) -> list[Block]:
+    block = Block("PointLoadCondition3D1N", nodes[:, None], properties=properties, shape=Point1)
+    return [block] if len(nodes) else []
 
 
 def _parts(mesh: Mesh) -> dict[str, Part]:

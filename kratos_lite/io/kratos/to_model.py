@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 
 import numpy as np
 
@@ -32,14 +32,14 @@ def model_from(
     processes: Callable[[Variables], None] | None = None,
 ) -> Model:
     """Return the model that a document describes; `processes` may change the values, as a run file does."""
-    check_elements(document)
+    _check_elements(document)
     _check_variables(document)
     model = Model(document.mesh)
     model.notes += [str(note) for note in document.notes]
     model.notes += _renamed(document.mesh)
     used = {int(p) for block in document.mesh.blocks for p in distinct(block.properties)}
-    sources = [properties.source for properties in document.properties.values() if properties.source]
-    problems = Problems(sources[0] if sources else document.mesh.source)
+    sources = (block.source for block in document.properties.values() if block.source)
+    problems = Problems(next(sources, document.mesh.source))
     for number in sorted(used & document.properties.keys()):
         apply_properties(model, document.properties[number], materials, problems)
     problems.raise_if_any()
@@ -56,7 +56,7 @@ def model_from(
     return model
 
 
-def check_elements(document: Document) -> None:
+def _check_elements(document: Document) -> None:
     """Raise InputError for every element block of unknown kind that is not empty."""
     mesh, problems = document.mesh, Problems(document.mesh.source)
     for block in mesh.blocks:
@@ -72,23 +72,20 @@ def check_elements(document: Document) -> None:
 
 def _check_variables(document: Document) -> None:
     """Raise InputError for variables that are one of a load, support or constant but for a letter or two."""
-    problems, source = Problems(), document.mesh.source
+    problems = Problems()
     of_data = {*LOADING, *VECTORS, *SPLIT}
-    for properties in document.properties.values():
-        for name in properties.values.keys() - USED:
-            _check_spelling(name, USED, problems, properties.source or source, properties.lines.get(name))
-    for data in (*document.nodal_data, *document.condition_data):
-        if data.variable not in of_data:
-            _check_spelling(data.variable, of_data, problems, data.source or source, data.line)
+    variables = [
+        (name, USED, block.source, block.lines.get(name))
+        for block in document.properties.values()
+        for name in block.values
+    ]
+    blocks = (*document.nodal_data, *document.condition_data)
+    variables += [(data.variable, of_data, data.source, data.line) for data in blocks]
+    for name, known, source, line in variables:
+        if name not in known and (meant := misspelt(name, sorted(known))):
+            place = ":".join(str(part) for part in (source or document.mesh.source, line) if part)
+            problems.add(f"{place}: unknown variable {name}. Did you mean {meant}?")
     problems.raise_if_any()
-
-
-def _check_spelling(
-    name: str, known: Collection[str], problems: Problems, source: str, line: int | None
-) -> None:
-    if meant := misspelt(name, sorted(known)):
-        place = ":".join(str(part) for part in (source, line) if part)
-        problems.add(f"{place}: unknown variable {name}. Did you mean {meant}?")
 
 
 def _renamed(mesh: Mesh) -> list[str]:
@@ -104,21 +101,23 @@ def _renamed(mesh: Mesh) -> list[str]:
 
 def _fill(values: Variables, document: Document, model: Model) -> None:
     """Put the data blocks of a document into variables."""
-    mesh, problems = document.mesh, Problems()
-    for data in document.nodal_data:
-        if not _fits(data, model, problems, mesh.source):
-            continue
-        indices = mesh.node_rows(data.ids)
-        known = indices >= 0
-        if data.values.size:
-            _note_overridden(values, data, indices, model)
-            values.nodal.put(data.variable, indices[known], data.values[known])
-        if data.fixed.any():
-            values.fix(data.variable, indices[known & data.fixed])
-    for data in document.condition_data:
-        indices = rows_of_ids(ids_of(mesh.conditions), data.ids)
-        if data.values.size and _fits(data, model, problems, mesh.source):
-            values.conditional.put(data.variable, indices[indices >= 0], data.values[indices >= 0])
+    mesh, problems, ids = document.mesh, Problems(), ids_of(document.mesh.conditions)
+    for fields, blocks in (
+        (values.nodal, document.nodal_data),
+        (values.conditional, document.condition_data),
+    ):
+        for data in blocks:
+            is_nodal = fields is values.nodal
+            indices = mesh.node_rows(data.ids) if is_nodal else rows_of_ids(ids, data.ids)
+            known = indices >= 0
+            if not _fits(data, model, problems, mesh.source):
+                continue
+            if is_nodal:
+                _note_overridden(values, data, indices, model)
+            if data.values.size:
+                fields.put(data.variable, indices[known], data.values[known])
+            if data.fixed.any():
+                values.fix(data.variable, indices[known & data.fixed])
     for data in document.element_data:
         _note(model, data, f"ElementalData {data.variable} is not used")
     problems.raise_if_any()
@@ -163,15 +162,15 @@ def _fits(data: Data, model: Model, problems: Problems, source: str) -> bool:
 
 def _note_overridden(values: Variables, data: Data, indices: Ints, model: Model) -> None:
     """Note fixed values that an earlier block gave otherwise."""
-    here = indices >= 0
-    indices, ids = indices[here], data.ids[here]
+    known = indices >= 0
     for name, new in components(data.variable, data.values).items():
-        if name in values.fixed:
-            changed = values.fixed[name][indices] & (values.nodal[name][indices] != new[here])
+        if name in values.fixed and new.size:
+            at = indices[known]
+            changed = values.fixed[name][at] & (values.nodal[name][at] != new[known])
             if count := int(changed.sum()):
                 more = f" (and {count - 1} more)" if count > 1 else ""
-                fixed = f"{name} of node {ids[changed].min()}{more}"
-                _note(model, data, f"{fixed} is fixed to another value before; the last one counts")
+                which = f"{name} of node {data.ids[known][changed].min()}{more}"
+                _note(model, data, f"{which} is fixed to another value before; the last one counts")
 
 
 def _constrain(model: Model, document: Document) -> None:

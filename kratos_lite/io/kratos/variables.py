@@ -30,7 +30,6 @@ DISPLACEMENT, VELOCITY = (FIELDS[name].kratos for name in ("displacement", "velo
 VECTORS = (DISPLACEMENT, "VOLUME_ACCELERATION", "POINT_LOAD", "LINE_LOAD", "SURFACE_LOAD")
 LOADING = {*(f"{v}_{a}" for v in VECTORS for a in "XYZ"), *PRESSURES}
 """Components and scalars that a static linear solution uses."""
-NO_CONDITION = ", and none has these nodes"
 SPLIT = (*VECTORS, VELOCITY)
 """Vector variables that are kept by component; velocities are those at the start of a transient."""
 
@@ -75,9 +74,8 @@ class Fields(dict[str, Array]):
 
     def loaded(self, variable: str) -> Mask:
         """Return where a variable or a component of it is not 0."""
-        names = [variable, *(f"{variable}_{axis}" for axis in "XYZ")]
-        found = [self[name] != 0 for name in names if name in self]
-        return np.logical_or.reduce(found) if found else np.zeros(self.count, dtype=bool)
+        loaded: Mask = (self.scalar(variable) != 0) | (self.vector(variable) != 0).any(axis=1)
+        return loaded
 
 
 class Variables:
@@ -123,8 +121,7 @@ class Variables:
                 model.add(load)
         self.note_idle(model.notes)
         for name in sorted({*self.nodal, *self.conditional} - LOADING):
-            given = self.nodal.scalar(name).any() or self.conditional.scalar(name).any()
-            if given:
+            if self.nodal.scalar(name).any() or self.conditional.scalar(name).any():
                 model.notes.append(f"{name} is set in the file; a static linear solution does not use it")
 
     def _apply_supports(self, model: Model) -> None:
@@ -133,9 +130,8 @@ class Variables:
             indices = np.flatnonzero(self.fixed.get(name, np.zeros(0, dtype=bool)))
             if len(indices):
                 model.fix(indices, axis.lower(), self.nodal.scalar(name)[indices, None], override=True)
-        others = [name for name in sorted(self.fixed) if not name.startswith(f"{DISPLACEMENT}_")]
-        others = [name for name in others if self.fixed[name].any()]
-        if others:
+        others = [name for name, fixed in sorted(self.fixed.items()) if fixed.any()]
+        if others := [name for name in others if not name.startswith(f"{DISPLACEMENT}_")]:
             model.notes.append(f"fixed {', '.join(others)} ignored: solids have displacements only")
 
     def condition_loads(self) -> ConditionLoads | None:
@@ -158,54 +154,35 @@ class Variables:
             return None
         return ConditionLoads(force, nodal_force, pressure, nodal_pressure)
 
-    def _note_followers(self, notes: list[str]) -> None:
-        """Note pressures that Kratos lets follow the deformed faces even in a linear analysis.
-
-        It adds the stiffness of the pressure to K; its small-displacement conditions do not.
-        """
-        names = {block.name for block in self.mesh.conditions if len(block)}
-        names = {name for name in names if name.startswith("SurfaceLoadCondition")}
-        for name in sorted(names):
-            notes.append(
-                f"{name}: the pressure acts on the undeformed body, as that of SmallDisplacement{name} in "
-                f"Kratos; {name} adds a pressure stiffness there"
-            )
-
     def note_idle(self, notes: list[str], names: Iterable[str] = LOADING) -> None:
-        """Note loads where nothing carries them, and pressures that would follow the faces in Kratos."""
+        """Note loads where nothing carries them, and pressures that follow the deformed faces in Kratos.
+
+        Kratos adds the stiffness of such a pressure to K even in a linear analysis; its small-displacement
+        conditions do not.
+        """
         shown = self.only(set(names))
         shown._note_uncarried(notes)
         loads = shown.condition_loads()
-        pressed = loads is not None and (loads.pressure.any() or loads.nodal_pressure.any())
-        if pressed:
-            shown._note_followers(notes)
+        if loads is not None and (loads.pressure.any() or loads.nodal_pressure.any()):
+            kinds = {block.name for block in self.mesh.conditions if len(block)}
+            for name in sorted(kind for kind in kinds if kind.startswith("SurfaceLoadCondition")):
+                how = f"acts on the undeformed body, as that of SmallDisplacement{name} in Kratos"
+                notes.append(f"{name}: the pressure {how}; {name} adds a pressure stiffness there")
 
     def _note_uncarried(self, notes: list[str]) -> None:
         """Note load values on conditions of another kind, and on nodes without conditions that carry them."""
         mesh = self.mesh
         for variable in (*dict.fromkeys(LOADS.values()), *PRESSURES):
             cells = [c for c, load in LOADS.items() if load == variable] or SURFACES
-            on_conditions, on_nodes = self._carriers(cells)
             kinds = "faces" if cells[0] in SURFACES else f"{cells[0]} conditions"
+            on_conditions, on_nodes = self.conditional.loaded(variable), self.nodal.loaded(variable)
+            for block, indices in with_rows(mesh.conditions):
+                if block.shape is not None and block.shape.cell in cells:
+                    on_conditions[indices] = on_nodes[block.nodes] = False
             for word, idle, ids, more in (
-                (
-                    "conditions",
-                    self.conditional.loaded(variable) & ~on_conditions,
-                    ids_of(mesh.conditions),
-                    "",
-                ),
-                ("nodes", self.nodal.loaded(variable) & ~on_nodes, mesh.node_ids, NO_CONDITION),
+                ("conditions", on_conditions, ids_of(mesh.conditions), ""),
+                ("nodes", on_nodes, mesh.node_ids, ", and none has these nodes"),
             ):
                 if idle.any():
                     where = f"{idle.sum()} {word} (first {ids[idle].min()})"
                     notes.append(f"{variable} on {where} has no effect: only {kinds} carry it{more}")
-
-    def _carriers(self, cells: Iterable[str]) -> tuple[Mask, Mask]:
-        """Return which conditions are of these cells, and which nodes they have."""
-        nodes, masks = np.zeros(self.mesh.n_nodes, dtype=bool), [np.zeros(0, dtype=bool)]
-        for block in self.mesh.conditions:
-            carries = block.shape is not None and block.shape.cell in cells
-            masks.append(np.full(len(block), carries))
-            if carries:
-                nodes[block.nodes] = True
-        return np.concatenate(masks), nodes

@@ -29,155 +29,113 @@ def changed(**solver):
     return run_file([CLAMP], [GRAVITY], **solver)
 
 
-def no_end():
-    content = changed()
-    del content["problem_data"]["end_time"]
-    return content
-
-
-def processes(*entries, key="loads_process_list"):
-    content = changed()
-    content["processes"][key] = list(entries)
-    return content
-
-
-def misplaced():
-    content = changed()
-    return {**content, "loads_process_list": []}
+def processes(*entries):
+    return run_file([CLAMP], entries)
 
 
 def in_time(*constraints):
     return run_file([CLAMP, *constraints], [GRAVITY], step=0.1, solver_type="dynamic")
 
 
-BAD = {
-    "explicit": (
+def on_top(variable, **settings):
+    return process("assign_scalar_variable_process", "Top", variable, **settings)
+
+
+def imported(**settings):
+    return changed(model_import_settings=settings)
+
+
+def dynamic(**solver):
+    return changed(solver_type="dynamic", **solver)
+
+
+NO_END = changed()
+del NO_END["problem_data"]["end_time"]
+START = {"constrained": False, "interval": [0.0, 0.0]}
+NORMAL = process(
+    "assign_vector_by_direction_to_condition_process", "Top", "SURFACE_LOAD",
+    modulus=1.0, direction="automatic_inwards_normal",
+)  # fmt: skip
+FIX = "fix_vector_variable_process"
+BAD = [
+    (
         changed(solver_type="Dynamic", time_integration_method="explicit"),
         "time_integration_method 'explicit' is not supported: take 'implicit' with 'newmark'",
     ),
-    "scheme": (changed(solver_type="dynamic", scheme_type="bdf2"), "scheme_type 'bdf2' is not supported"),
-    "Bossak's number": (
-        changed(solver_type="dynamic", damp_factor_m=0.5),
-        "the α of Bossak lies in -1/3 … 0",
-    ),
-    "Newmark's number": (changed(solver_type="dynamic", newmark_beta=0.0), "newmark_beta must be 0.25"),
-    "damping": (changed(solver_type="dynamic", rayleigh_beta=-1.0), "rayleigh_beta must be ≥ 0"),
-    "late start": (
-        {**changed(solver_type="dynamic"), "problem_data": {"start_time": 0.5, "end_time": 1.0}},
+    (changed(solver_type="eigen_value"), "solver_type 'eigen_value': run files are solved as"),
+    (dynamic(scheme_type="bdf2"), "scheme_type 'bdf2' is not supported"),
+    (dynamic(damp_factor_m=0.5), "the α of Bossak lies in -1/3 … 0"),
+    (dynamic(newmark_beta=0.0), "newmark_beta must be 0.25"),
+    (dynamic(rayleigh_beta=-1.0), "rayleigh_beta must be ≥ 0"),
+    (
+        dynamic() | {"problem_data": {"start_time": 0.5, "end_time": 1.0}},
         "start_time must be 0 for dynamic solutions",
     ),
-    "fixed velocity": (
-        in_time(process("assign_scalar_variable_process", "Top", "VELOCITY_X", value=1.0)),
-        "VELOCITY_X cannot be fixed",
-    ),
-    "given acceleration": (
-        in_time(
-            process(
-                "assign_scalar_variable_process",
-                "Top",
-                "ACCELERATION_X",
-                value=1.0,
-                constrained=False,
-                interval=[0.0, 0.0],
-            )
-        ),
-        "ACCELERATION_X cannot be given",
-    ),
-    "support that ends": (
-        in_time(process("assign_scalar_variable_process", "Top", "DISPLACEMENT_X", interval=[0.0, 0.5])),
+    (in_time(on_top("VELOCITY_X", value=1.0)), "VELOCITY_X cannot be fixed"),
+    (in_time(on_top("ACCELERATION_X", value=1.0, **START)), "ACCELERATION_X cannot be given"),
+    (
+        in_time(on_top("DISPLACEMENT_X", interval=[0.0, 0.5])),
         "DISPLACEMENT_X is held in a part of the run only",
     ),
-    "support that begins": (
+    (
         in_time(process("fix_scalar_variable_process", "Top", "DISPLACEMENT_X", interval=[0.5, "End"])),
         "DISPLACEMENT_X is held in a part of the run only",
     ),
-    "support by place and time": (
-        in_time(process("assign_scalar_variable_process", "Top", "DISPLACEMENT_X", value="t*X")),
+    (
+        in_time(on_top("DISPLACEMENT_X", value="t*X")),
         "a support may move with x, y, z or with t, not with both",
     ),
-    "temperature": (
-        processes(process("assign_scalar_variable_process", "Top", "TEMPERATURE", value=80.0)),
+    (
+        processes(on_top("TEMPERATURE", value=80.0)),
         "a TEMPERATURE is imposed, but there is no thermal strain",
     ),
-    "two dimensions": (changed(domain_size=2), "domain_size must be 3; got 2"),
-    "domain size as text": (
-        changed(domain_size="3"),
-        "solver_settings.domain_size must be an integer; got '3'",
-    ),
-    "analysis": (changed(analysis_type="quadratic"), "must be 'linear' or 'non_linear'"),
-    "other physics": (changed(displacement_control=True), "displacement_control is not supported"),
-    "endless": (changed(step=0.0), "time_step must be > 0 s"),
-    "too many steps": (changed(step=1e-9), "more than 1000000 steps"),
-    "no step": (changed(end=0.0), "no step is solved"),
-    "no end": (no_end(), "key 'problem_data.end_time' is missing"),
-    "no mesh": (
-        changed(model_import_settings={"input_type": "mdpa", "input_filename": "bix"}),
-        "there is no file",
-    ),
-    "mesh elsewhere": (changed(model_import_settings={"input_filename": "../box"}), "leaves the folder"),
-    "mesh at the root": (changed(model_import_settings={"input_filename": "/box"}), "leaves the folder"),
-    "mesh from a modeler": (
-        changed(model_import_settings={"input_type": "use_input_model_part"}),
-        "input_type 'use_input_model_part' is not supported",
-    ),
-    "misplaced list": (misplaced(), "belongs in the object 'processes'"),
-    "unknown process": (
+    (changed(domain_size=2), "domain_size must be 3; got 2"),
+    (changed(domain_size="3"), "solver_settings.domain_size must be an integer; got '3'"),
+    (changed(analysis_type="quadratic"), "must be 'linear' or 'non_linear'"),
+    (changed(displacement_control=True), "displacement_control is not supported"),
+    (changed(step=0.0), "time_step must be > 0 s"),
+    (changed(step=1e-9), "more than 1000000 steps"),
+    (changed(end=0.0), "no step is solved"),
+    (NO_END, "key 'problem_data.end_time' is missing"),
+    (imported(input_type="mdpa", input_filename="bix"), "there is no file"),
+    (imported(input_filename="../box"), "leaves the folder"),
+    (imported(input_filename="/box"), "leaves the folder"),
+    (imported(input_type="use_input_model_part"), "input_type 'use_input_model_part' is not supported"),
+    (changed() | {"loads_process_list": []}, "belongs in the object 'processes'"),
+    (
         processes({"python_module": "assign_vector_variable_proces", "Parameters": {}}),
         "unknown process 'assign_vector_variable_proces'. Did you mean assign_vector_variable_process",
     ),
-    "no module": (processes({"Parameters": {}}), "python_module' is missing"),
-    "no parameters": (processes({"python_module": "fix_vector_variable_process"}), "Parameters' is missing"),
-    "unknown part": (
-        processes(process("fix_vector_variable_process", "Structure.Botom", "DISPLACEMENT")),
+    (processes({"Parameters": {}}), "python_module' is missing"),
+    (processes({"python_module": FIX}), "Parameters' is missing"),
+    (
+        processes(process(FIX, "Structure.Botom", "DISPLACEMENT")),
         "there is no part 'Structure.Botom'. Did you mean Bottom?",
     ),
-    "unknown variable": (
-        processes(process("fix_vector_variable_process", "Bottom", "DISPLACMENT")),
+    (
+        processes(process(FIX, "Bottom", "DISPLACMENT")),
         "'DISPLACMENT' is not a vector variable of static solids. Did you mean DISPLACEMENT?",
     ),
-    "vector for scalar": (
-        processes(process("assign_scalar_variable_process", "Bottom", "DISPLACEMENT", value=0.0)),
-        "'DISPLACEMENT' is not a scalar variable",
-    ),
-    "unknown parameter": (processes(push(1.0, modulos=2.0)), "Parameters.modulos'. Did you mean modulus?"),
-    "local axes": (processes(push(1.0, local_axes={"axes": []})), "local_axes are not supported"),
-    "zero direction": (processes(push(1.0, (0.0, 0.0, 0.0))), "direction is zero"),
-    "two directions": (processes(push(1.0, (0.0, 1.0))), "direction must be a list of three entries"),
-    "automatic normal": (
-        processes(
-            process(
-                "assign_vector_by_direction_to_condition_process",
-                "Top",
-                "SURFACE_LOAD",
-                modulus=1.0,
-                direction="automatic_inwards_normal",
-            )
-        ),
-        "automatic normals are not supported",
-    ),
-    "bad modulus": (processes(push(True)), "modulus must be a number or an expression"),
-    "bad expression": (processes(push("open('x')")), """SURFACE_LOAD_X: expression "open('x')":"""),
-    "endless value": (processes(push("1/x")), "SURFACE_LOAD_X: expression '1/(x-x)'"),
-    "bad interval": (
-        processes(push(1.0, interval=[0.0, "Ende"])),
-        'interval must be [number, number or "End"]',
-    ),
-    "bad constrained": (
-        processes(process("fix_vector_variable_process", "Bottom", "DISPLACEMENT", constrained="yes")),
-        "constrained must be true, false",
-    ),
-    "history": (
-        processes(process("fix_vector_variable_process", "Top", "DISPLACEMENT", interval=[0.6, "End"]))
-        | {"solver_settings": changed(step=0.25)["solver_settings"]},
+    (processes(on_top("DISPLACEMENT", value=0.0)), "'DISPLACEMENT' is not a scalar variable"),
+    (processes(push(1.0, modulos=2.0)), "Parameters.modulos'. Did you mean modulus?"),
+    (processes(push(1.0, local_axes={"axes": []})), "local_axes are not supported"),
+    (processes(push(1.0, (0.0, 0.0, 0.0))), "direction is zero"),
+    (processes(push(1.0, (0.0, 1.0))), "direction must be a list of three entries"),
+    (processes(NORMAL), "automatic normals are not supported"),
+    (processes(push(True)), "modulus must be a number or an expression"),
+    (processes(push("open('x')")), """SURFACE_LOAD_X: expression "open('x')":"""),
+    (processes(push("1/(x-x)")), "SURFACE_LOAD_X: expression '1/(x-x)'"),
+    (processes(push(1.0, interval=[0.0, "Ende"])), 'interval must be [number, number or "End"]'),
+    (processes(process(FIX, "Bottom", "DISPLACEMENT", constrained="yes")), "constrained must be true, false"),
+    (
+        run_file([CLAMP], [process(FIX, "Top", "DISPLACEMENT", interval=[0.6, "End"])], step=0.25),
         "held only from a later step",
     ),
-}
-BAD["endless value"] = (processes(push("1/(x-x)")), BAD["endless value"][1])
+]
 
 
-@pytest.mark.parametrize("name", BAD)
-def test_bad_kratos_run_file_is_refused_with_place_and_problem(folder, name):
-    content, words = BAD[name]
+@pytest.mark.parametrize(("content", "words"), BAD, ids=[words[:40] for _, words in BAD])
+def test_bad_kratos_run_file_is_refused_with_place_and_problem(folder, content, words):
     path = write(folder, content)
     with pytest.raises(InputError) as caught:
         read_case(path)
@@ -199,50 +157,41 @@ def test_files_outside_the_folder_are_read_only_when_allowed(folder):
     same_field(result, by_hand(gravity=(0.0, 0.0, -9.81)).solve())
 
 
-def bad_material(**changes):
-    entry = json.loads(json.dumps(MATERIALS["properties"][0]))
-    variables = changes.pop("variables", None)
-    entry["Material"] |= changes.pop("material", {})
-    entry |= changes
+def bad_material(variables=None, material=None, **changes):
+    entry = json.loads(json.dumps(MATERIALS["properties"][0])) | changes
+    entry["Material"] |= material or {}
     if variables:
         entry["Material"]["Variables"] = variables
     return {"properties": [entry]}
 
 
-BAD_MATERIALS = {
-    "no list": ({"materials": []}, "needs a list of 'properties'"),
-    "part without elements": (
+BAD_MATERIALS = [
+    ({"materials": []}, "needs a list of 'properties'"),
+    (
         bad_material(model_part_name="Structure.Bottom"),
         "has no elements to carry a material; parts with elements are Structure (all), Body",
     ),
-    "unknown part": (bad_material(model_part_name="Structure.Bodi"), "Did you mean Body?"),
-    "unknown law": (
+    (bad_material(model_part_name="Structure.Bodi"), "Did you mean Body?"),
+    (
         bad_material(material={"constitutive_law": {"name": "HyperElastic3DLaw"}}),
         "part Structure.Body: 'HyperElastic3DLaw' is not a linear elastic law",
     ),
-    "no law": (bad_material(material={"constitutive_law": {}}), "constitutive_law.name' is missing"),
-    "text for E": (
-        bad_material(variables={"YOUNG_MODULUS": "steel"}),
-        "YOUNG_MODULUS must be a number; got 'steel'",
-    ),
-    "no nu": (
-        bad_material(variables={"YOUNG_MODULUS": 1e9}),
+    (bad_material(material={"constitutive_law": {}}), "constitutive_law.name' is missing"),
+    (bad_material({"YOUNG_MODULUS": "steel"}), "YOUNG_MODULUS must be a number; got 'steel'"),
+    (
+        bad_material({"YOUNG_MODULUS": 1e9}),
         "part Structure.Body: Isotropic3D needs nu (POISSON_RATIO)",
     ),
-    "nu of a fluid": (
-        bad_material(variables={"YOUNG_MODULUS": 1e9, "POISSON_RATIO": 0.5}),
+    (
+        bad_material({"YOUNG_MODULUS": 1e9, "POISSON_RATIO": 0.5}),
         "POISSON_RATIO) 0.5 must be < 0.5",
     ),
-    "layers": (
-        bad_material(material={"sub_properties": [1]}),
-        "'sub_properties' in a material is not supported",
-    ),
-}
+    (bad_material(material={"sub_properties": [1]}), "'sub_properties' in a material is not supported"),
+]
 
 
-@pytest.mark.parametrize("name", BAD_MATERIALS)
-def test_bad_materials_file_is_refused_with_place_and_problem(folder, name):
-    content, words = BAD_MATERIALS[name]
+@pytest.mark.parametrize(("content", "words"), BAD_MATERIALS)
+def test_bad_materials_file_is_refused_with_place_and_problem(folder, content, words):
     path = write(folder, content, "materials.json")
     with pytest.raises(InputError) as caught:
         read_case(write(folder, changed()))
@@ -263,48 +212,50 @@ def test_large_deformations_are_not_solved_as_small_ones(folder, run):
     assert run("solve", path, "--linear").code == 0
 
 
-def test_elements_without_material_are_named(folder):
-    text = box_mdpa().replace("Begin SubModelPart Body\n", "Begin SubModelPart Half\n")
+def without_element_8(constants=""):
+    """Return the mesh whose part Body has seven of the eight elements; constants of Properties 0."""
+    text = box_mdpa().replace("Begin Properties 0\n", "Begin Properties 0\n" + constants)
     start = text.index("Begin SubModelPartElements")
-    text = text[:start] + text[start:].replace("\n8\n", "\n", 1)
-    (folder / "box.mdpa").write_text(text)
-    write(folder, bad_material(model_part_name="Half"), "materials.json")
+    return text[:start] + text[start:].replace("\n8\n", "\n", 1)
+
+
+def test_elements_without_material_are_named(folder):
+    (folder / "box.mdpa").write_text(without_element_8())
     with pytest.raises(ModelError, match=r"element 8 \(SmallDisplacementElement3D8N\) has no material"):
         read_case(write(folder, changed()))
 
 
 def test_a_later_material_takes_the_elements_of_an_earlier_one(folder):
-    first, second = bad_material(properties_id=7)["properties"], bad_material()["properties"]
-    first[0]["Material"]["Variables"] = {"YOUNG_MODULUS": 1.0, "POISSON_RATIO": 0.0}
-    write(folder, {"properties": first + second}, "materials.json")
+    soft = bad_material({"YOUNG_MODULUS": 1.0, "POISSON_RATIO": 0.0}, properties_id=7)["properties"]
+    write(folder, {"properties": soft + bad_material()["properties"]}, "materials.json")
     same_field(solved(folder, changed()), by_hand(gravity=(0.0, 0.0, -9.81)).solve())
 
 
 def test_a_material_of_the_mesh_file_serves_elements_that_the_materials_file_leaves_out(folder):
     steel = "YOUNG_MODULUS 2e9\nPOISSON_RATIO 0.3\nDENSITY 7850\n"
-    text = box_mdpa().replace("Begin Properties 0\n", "Begin Properties 0\n" + steel)
-    start = text.index("Begin SubModelPartElements")
-    (folder / "box.mdpa").write_text(text[:start] + text[start:].replace("\n8\n", "\n", 1))
+    (folder / "box.mdpa").write_text(without_element_8(steel))
     same_field(solved(folder, changed()), by_hand(gravity=(0.0, 0.0, -9.81)).solve())
+    (folder / "box.mdpa").write_text(without_element_8(steel.replace("0.3", "0.5")))
+    with pytest.raises(InputError, match=r"box\.mdpa:3: Properties 0: .* must be < 0.5"):
+        read_case(write(folder, changed()))
 
 
+CHECK_FILE = {
+    "check_variables": ["DISPLACEMENT"],
+    "input_file_name": "reference.json",
+    "model_part_name": "Bottom",
+    "tolerance": 1.0,
+}
 CHECKED = run_file(
     [CLAMP],
     [GRAVITY],
     checks=[
         process("check_vector_components_to_nodes_process", "Bottom", "DISPLACEMENT", value=[0, None, "x"]),
-        {
-            "python_module": "from_json_check_result_process",
-            "Parameters": {
-                "check_variables": ["DISPLACEMENT"],
-                "input_file_name": "reference.json",
-                "model_part_name": "Bottom",
-                "tolerance": 1.0,
-            },
-        },
+        {"python_module": "from_json_check_result_process", "Parameters": CHECK_FILE},
     ],
 )
 REFERENCE = {"TIME": [1.1], "NODE_1": {"DISPLACEMENT_X": [0.0], "DISPLACEMENT_Y": [0.0]}}
+JUNK = [None, True, -1, 0.5, 1e308, -(10**18), "", "x", "..", [], [[]], {}, {"a": 1}]
 
 
 @pytest.mark.parametrize(
@@ -317,14 +268,13 @@ REFERENCE = {"TIME": [1.1], "NODE_1": {"DISPLACEMENT_X": [0.0], "DISPLACEMENT_Y"
     ],
     ids=["one step", "checked", "materials", "reference"],
 )
-def test_any_value_of_a_wrong_kind_ends_in_a_project_or_a_clear_error(folder, name, content):
+def test_a_value_of_a_wrong_kind_ends_in_a_project_or_a_clear_error(folder, name, content):
+    """Every fourth pair of a place and a value: each place and each value comes several times."""
     write(folder, REFERENCE, "reference.json")
     write(folder, CHECKED)
-    result = by_hand().solve()
-    paths, refused = list(spots(content)), 0
-    for path, junk in product(
-        paths, [None, True, -1, 0.5, 1e308, -(10**18), "", "x", "..", [], [[]], {}, {"a": 1}]
-    ):
+    result, refused = by_hand().solve(), 0
+    pairs = list(product(spots(content), JUNK))[::4]
+    for path, junk in pairs:
         write(folder, replaced(content, path, junk), name)
         try:
             project = read_case(folder / "ProjectParameters.json")
@@ -333,17 +283,16 @@ def test_any_value_of_a_wrong_kind_ends_in_a_project_or_a_clear_error(folder, na
         except KratosLiteError as error:
             refused += 1
             assert str(folder) in str(error), (path, junk, str(error))  # noqa: PT017
-    assert len(paths) < refused or name == "reference.json"
+    assert refused > len(pairs) / 13 or name == "reference.json"
 
 
 def test_damaged_run_files_end_in_a_project_or_a_clear_error(folder):
-    text = json.dumps(ONE_STEP)
-    refused = []
-    for at in range(0, len(text), 7):
+    text, refused = json.dumps(ONE_STEP), []
+    for at in range(0, len(text), 14):
         path = write(folder, text[:at] + text[at + 1 :])
         try:
             read_case(path)
         except KratosLiteError as error:
             refused.append(str(error).startswith(str(folder)))
-    assert len(refused) > 100
+    assert len(refused) > 50
     assert all(refused)

@@ -26,9 +26,10 @@ PART_NAME = re.compile(r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*")
 NUMBERS = ("properties", "tables")
 """Kinds of members of which a part keeps the ids, not the rows."""
 WORDS = {
-    "nodes": "node", "elements": "element", "conditions": "condition", "geometries": "geometry",
-    "constraints": "constraint", "properties": "Properties", "tables": "table",
+    "tables": "table", "properties": "Properties", "nodes": "node", "elements": "element",
+    "conditions": "condition", "geometries": "geometry", "constraints": "constraint",
 }  # fmt: skip
+"""Kinds of members, and one of each."""
 
 
 def read_mesh(source: Source, frames: dict[str, list[Frame]], properties: Sequence[int]) -> Mesh:

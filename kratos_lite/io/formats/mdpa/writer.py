@@ -17,7 +17,7 @@ from kratos_lite.elements import ELEMENTS
 from kratos_lite.elements.formulations import is_unnamed
 from kratos_lite.errors import InputError
 from kratos_lite.io.formats.document import Constraint, Data, Document, Note
-from kratos_lite.io.formats.mdpa.mesh import NUMBERS, PART_NAME, chain_of, member_ids
+from kratos_lite.io.formats.mdpa.mesh import NUMBERS, PART_NAME, WORDS, chain_of, member_ids
 from kratos_lite.io.formats.mdpa.scan import NAME
 from kratos_lite.io.formats.mdpa.values import Table, kind_of
 from kratos_lite.io.names import PRESTRESS, kratos_name
@@ -244,7 +244,7 @@ def _parts(document: Document) -> Lines:
         body: list[str] = []
         if part.data:
             body += _block("SubModelPartData", _values(part.data))
-        for kind in ("tables", "properties", *ids):
+        for kind in WORDS:
             members = getattr(part, kind)
             if len(members):
                 numbers = members if kind in NUMBERS else ids[kind][members].tolist()
