@@ -16,14 +16,9 @@ from KratosMultiphysics.python_linear_solver_factory import ConstructSolver
 
 AXES = "XYZ"
 HISTORICAL = (
-    KM.DISPLACEMENT,
-    KM.REACTION,
-    KM.VOLUME_ACCELERATION,
-    KM.POSITIVE_FACE_PRESSURE,
-    KM.NEGATIVE_FACE_PRESSURE,
-    SMA.POINT_LOAD,
-    SMA.SURFACE_LOAD,
-)
+    KM.DISPLACEMENT, KM.REACTION, KM.VOLUME_ACCELERATION, KM.POSITIVE_FACE_PRESSURE,
+    KM.NEGATIVE_FACE_PRESSURE, SMA.POINT_LOAD, SMA.SURFACE_LOAD,
+)  # fmt: skip
 MATERIAL = (KM.DENSITY, KM.YOUNG_MODULUS, KM.POISSON_RATIO)
 KEEP = []  # Kratos frees a model as soon as Python forgets it, parts still in use included
 
@@ -55,15 +50,8 @@ def read(job):
 
 def solve(part):
     solver = ConstructSolver(KM.Parameters('{"solver_type": "LinearSolversApplication.sparse_lu"}'))
-    strategy = KM.ResidualBasedLinearStrategy(
-        part,
-        KM.ResidualBasedIncrementalUpdateStaticScheme(),
-        KM.ResidualBasedBlockBuilderAndSolver(solver),
-        True,
-        False,
-        False,
-        False,
-    )
+    scheme, builder = KM.ResidualBasedIncrementalUpdateStaticScheme(), KM.ResidualBasedBlockBuilderAndSolver
+    strategy = KM.ResidualBasedLinearStrategy(part, scheme, builder(solver), True, False, False, False)
     strategy.SetEchoLevel(0)
     strategy.Check()
     strategy.Initialize()
@@ -118,10 +106,7 @@ def describe(part):
         if node.IsFixed(getattr(KM, f"DISPLACEMENT_{axis}"))
     ]
     parts = {
-        sub.FullName().removeprefix("Structure."): {
-            kind: [item.Id for item in getattr(sub, kind.capitalize())]
-            for kind in ("nodes", "elements", "conditions")
-        }
+        sub.FullName().removeprefix("Structure."): [node.Id for node in sub.Nodes]
         for sub in part.SubModelParts
     }
     properties = {

@@ -10,18 +10,10 @@ from benchmarks import cases
 from kratos_lite.assembly.stiffness import assemble_dense
 
 SOLVED = present(
-    "bar_8N",
-    "elem_column_27N",
-    "eigen_cube_8N",
-    "elem_activation_8N",
-    "elem_balken_27N",
-    "elem_beam3d_KL4N",
-    "patch_3D_shear_hexa",
-    "patch_3D_tension_tetra",
-    "response_cantilever_beam_8N",
-    "symmetrical_cube_4N",
+    "bar_8N", "elem_column_27N", "eigen_cube_8N", "elem_activation_8N", "elem_balken_27N", "elem_beam3d_KL4N",
+    "patch_3D_shear_hexa", "patch_3D_tension_tetra", "response_cantilever_beam_8N", "symmetrical_cube_4N",
     "tensile_hexahedra",
-)
+)  # fmt: skip
 
 
 def model_of(folder, case, reference, file):
@@ -64,9 +56,8 @@ def test_displacements_reactions_and_stresses_are_those_of_kratos(name):
         assert np.abs(result.reaction().sum(axis=0) - total).max() <= 1e-9 * scale
         volume = sum(float(group.at(model.mesh.points).volume().sum()) for group in result.groups)
         assert abs(volume / reference["volume"] - 1) <= 1e-9
-        if (
-            "TotalLagrangian" not in model.mesh.blocks[0].name
-        ):  # Kratos gives their stress before the solution
+        # of TotalLagrangian Kratos gives the stress before the solution
+        if "TotalLagrangian" not in model.mesh.blocks[0].name:
             stress = np.concatenate(list(result.stress("gauss")))
             for extreme, of in (("stress_max", stress.max(axis=0)), ("stress_min", stress.min(axis=0))):
                 kratos = np.array(reference["summary"][extreme])

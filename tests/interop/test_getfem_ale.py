@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from children import output_of
 
 import kratos_lite as kl
 from kratos_lite.ale import MotionMatrices, Rotation
@@ -58,8 +59,8 @@ def computed(model):
     pattern = Pattern(len(points), [group.nodes for group in groups])
     mass = Mass(points, groups, pattern, False)
     terms = MotionMatrices(Rotation("z"), points, groups, pattern, mass)
-    found = {"M": mass.scalar.data, "G": terms.G, "H": terms.H}
-    found = {name: data[:, None, None] for name, data in found.items()}
+    scalars = {"M": mass.scalar.data, "G": terms.G, "H": terms.H}
+    found = {name: data[:, None, None] for name, data in scalars.items()}
     found["K"] = assemble_stiffness(points, groups, pattern).data
     found |= {"centrifugal": terms.centrifugal, "euler": terms.euler}
     mass, flow = (exact_rule(element.shape, 2, flow=flow) for flow in (False, True))
@@ -79,10 +80,7 @@ def test_matrices_and_loads_are_those_of_getfem(kind, tmp_path):
     np.savez(tmp_path / "given.npz", **given, **words)
     command = [PYTHON, "-m", "benchmarks.programs.getfem_ale", tmp_path / "given.npz", tmp_path / "found.npz"]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    run = subprocess.run(
-        command, env=environment, cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False
-    )
-    assert run.returncode == 0, run.stdout[-2000:] + run.stderr[-2000:]
+    output_of(*command, env=environment, cwd=tmp_path)
     with np.load(tmp_path / "found.npz") as theirs:
         for name, values in ours.items():
             assert values.shape == theirs[name].shape, name

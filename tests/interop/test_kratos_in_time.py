@@ -27,21 +27,15 @@ def column(size, cells, element):
     (faces,) = mesh.faces("z+")
     count, corners = len(faces), mesh.nodes("z+")[[0, -1]]
     kind = f"SmallDisplacementSurfaceLoadCondition3D{faces.nodes.shape[1]}N"
-    rows = np.arange(1, count + 1)
-    zero = np.zeros(count, dtype=np.int64)
-    points = kl.Block(
-        "PointLoadCondition3D1N", corners[:, None], np.arange(count + 1, count + 3), zero[:1].repeat(2), None
-    )
-    nodes, none = np.arange(mesh.n_nodes), np.zeros(0, dtype=np.int64)
+    points = kl.Block("PointLoadCondition3D1N", corners[:, None], np.arange(2) + count + 1, properties=0)
     parts = {
-        "Body": kl.Part(nodes, np.arange(mesh.n_elements), none),
-        "Bottom": kl.Part(mesh.nodes("z-"), none, none),
-        "Top": kl.Part(mesh.nodes("z+"), none, np.arange(count)),
-        "Tips": kl.Part(corners, none, np.arange(count, count + 2)),
+        "Body": kl.Part(np.arange(mesh.n_nodes), np.arange(mesh.n_elements)),
+        "Bottom": kl.Part(mesh.nodes("z-")),
+        "Top": kl.Part(mesh.nodes("z+"), conditions=np.arange(count)),
+        "Tips": kl.Part(corners, conditions=np.arange(count, count + 2)),
     }
-    faces = kl.Block(kind, faces.nodes, rows, zero, faces.shape)
-    mesh = mesh.replace(conditions=[faces, points], parts=parts)
-    return mesh
+    faces = kl.Block(kind, faces.nodes, properties=0, shape=faces.shape)
+    return mesh.replace(conditions=[faces, points], parts=parts)
 
 
 CLAMP = process(TO_NODES, "Structure.Bottom", "DISPLACEMENT", value=[0.0, 0.0, 0.0])

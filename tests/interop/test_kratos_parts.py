@@ -16,6 +16,7 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
+from children import output_of
 from over_ranks import mpirun, needs_mpi
 
 import kratos_lite as kl
@@ -27,47 +28,31 @@ NEEDED = "import KratosMultiphysics.MetisApplication, KratosMultiphysics.Structu
 CANTILEVER = Path(__file__).resolve().parents[2] / "examples" / "cantilever"
 
 
-def is_there():
-    return (
-        bool(HERE) and subprocess.run([HERE, "-c", NEEDED], capture_output=True, check=False).returncode == 0
-    )
-
-
+RUNS = HERE and subprocess.run([HERE, "-c", NEEDED], capture_output=True, check=False).returncode == 0
 pytestmark = [
     needs_mpi,
-    pytest.mark.skipif(
-        not is_there(), reason="KratosMetisApplication or KRATOS_LITE_KRATOS_PYTHON is absent"
-    ),
+    pytest.mark.skipif(not RUNS, reason="KratosMetisApplication or KRATOS_LITE_KRATOS_PYTHON is absent"),
 ]
+
+
+def solve(ranks, what, folder, *words):
+    words = ("solve", what, "--backend", "petsc", *words)
+    return mpirun(ranks, "-m", "kratos_lite", *words, cwd=folder, seconds=120)
 
 
 def divided(path, ranks):
     """Let Kratos divide a file, and take the whole one away."""
     driver = Path(__file__).with_name("kratos_parts_driver.py")
-    run = subprocess.run(
-        [HERE, driver, str(ranks), path], capture_output=True, text=True, timeout=300, check=False
-    )
+    output = output_of(HERE, driver, ranks, path)
     parts = path.with_name(f"{path.stem}_partitioned")
-    assert len(list(parts.glob("*.mdpa"))) == ranks, run.stdout[-2000:] + run.stderr[-2000:]
+    assert len(list(parts.glob("*.mdpa"))) == ranks, output
     path.unlink()
     return parts
 
 
 def solved(ranks, what, folder):
     """Solve over ranks; return displacements and reactions by the ids of nodes."""
-    run = mpirun(
-        ranks,
-        "-m",
-        "kratos_lite",
-        "solve",
-        what,
-        "--backend",
-        "petsc",
-        "-o",
-        "out.pvtu",
-        cwd=folder,
-        seconds=120,
-    )
+    run = solve(ranks, what, folder, "-o", "out.pvtu")
     assert run.returncode == 0, run.stderr
     found = {}
     for piece in ElementTree.parse(folder / "out.pvtu").getroot().iter("Piece"):
@@ -122,8 +107,6 @@ def test_a_run_file_of_kratos_takes_the_parts_of_its_mesh(ranks, tmp_path):
 def test_as_many_ranks_as_parts_are_asked_for(tmp_path):
     kl.write(tmp_path / "beam.mdpa", beam(8))
     divided(tmp_path / "beam.mdpa", 2)
-    run = mpirun(
-        3, "-m", "kratos_lite", "solve", "beam_partitioned", "--backend", "petsc", cwd=tmp_path, seconds=120
-    )
+    run = solve(3, "beam_partitioned", tmp_path)
     assert run.returncode == 2
     assert re.search("there are 2 part files, .*, and 3 ranks; start `mpirun -n 2`", run.stderr)

@@ -3,12 +3,12 @@
 import gzip
 import importlib.util
 import json
-import subprocess
 import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from children import output_of
 from meshes import with_block
 from scenes import case, present
 
@@ -214,10 +214,8 @@ def test_kratos_itself_reads_the_same(tmp_path):
     given = document.nodal_data[0]  # a displacement of free nodes is a state that Kratos does not have
     document.nodal_data[0] = Data(given.variable, given.ids[:1], given.fixed[:1], given.values[:1])
     write_mdpa(tmp_path / "cube.mdpa", document)
-    run = subprocess.run(
-        [sys.executable, "-c", KRATOS, str(tmp_path / "cube")], capture_output=True, text=True, check=True
-    )
-    (line,) = [line for line in run.stdout.splitlines() if line.startswith("RESULT")]
+    lines = output_of(sys.executable, "-c", KRATOS, tmp_path / "cube").splitlines()
+    (line,) = [line for line in lines if line.startswith("RESULT")]
     found = json.loads(line.removeprefix("RESULT"))
     ids = document.mesh.node_ids
     assert found["conditions"] == {"70": ids[4:].tolist()}
