@@ -187,8 +187,8 @@ def _fixed(settings: Settings, process: Process) -> list[bool]:
     return flags
 
 
-def run(actions: Sequence[Action], context: RunContext, values: Variables) -> list[str]:
-    """Bring the values and supports to what they are at the last step; return notes."""
+def run(actions: Sequence[Action], context: RunContext, notes: list[str], values: Variables) -> None:
+    """Bring the values and supports to what they are at the last step; add notes."""
     set_values(actions, context.times, values)
     last, supports = len(context.times) - 1, [action for action in actions if action.fixed and action.steps]
     for action in supports:
@@ -205,7 +205,7 @@ def run(actions: Sequence[Action], context: RunContext, values: Variables) -> li
             is_displacement = action.component.startswith("DISPLACEMENT")
             action.settings.expect(is_whole or not is_displacement, "interval", text)
             values.fix(action.component, action.indices)
-    return notes_of(actions, context)
+    notes += notes_of(actions, context)
 
 
 def notes_of(actions: Sequence[Action], context: RunContext) -> list[str]:

@@ -5,6 +5,7 @@ Linear solids at rest or in time, in the style of 2019 and in the present one.
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 from kratos_lite.errors import Problems, nearest
@@ -24,7 +25,6 @@ from kratos_lite.io.kratos.time_dependent import (
     time_integration_of,
 )
 from kratos_lite.io.kratos.to_model import model_from
-from kratos_lite.io.kratos.variables import Variables
 from kratos_lite.io.settings import Settings, find_file, read_settings
 
 ROOT_KEYS = ("problem_data", "solver_settings", "processes", "output_processes", "ale")
@@ -77,18 +77,9 @@ def read_kratos_project(
     _use_materials(solver, context, document, notes)
     actions, checks = _read_processes(settings, context, notes)
     in_time = ProcessesInTime(actions, context) if dynamic else None
-
-    def process(values: Variables) -> None:
-        if in_time is None:
-            notes.extend(run(actions, context, values))
-        else:
-            in_time.prepare(values)
-
-    model = model_from(
-        document,
-        initial_displacement=initial_displacement and not dynamic,
-        processes=process,
-    )
+    processes = partial(run, actions, context, notes) if in_time is None else in_time.prepare
+    initial_displacement = initial_displacement and not dynamic
+    model = model_from(document, initial_displacement=initial_displacement, processes=processes)
     add_motion(model, settings, None if dynamic else times[-1])
     model.notes += notes
     if in_time is None:

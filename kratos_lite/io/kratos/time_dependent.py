@@ -21,7 +21,7 @@ from kratos_lite.io.kratos.processes import Action, notes_of, places_of, set_val
 from kratos_lite.io.kratos.variables import LOADING, Variables
 from kratos_lite.io.settings import Settings
 from kratos_lite.model.loads import Load, ScaledLoad, TimeDependentLoad
-from kratos_lite.typing import Array, Ints
+from kratos_lite.typing import Ints
 
 if TYPE_CHECKING:
     from kratos_lite.analysis.integrators import ModelIntegrator
@@ -43,8 +43,6 @@ class ProcessesInTime:
         self.context = context
         self.notes = notes_of(actions, context)
         self.actions = [action for action in actions if action.steps and len(action.indices)]
-        self.displacement: Array | None = None
-        self.velocity: Array | None = None
         self._later: list[Load] = []
         self._moving: list[tuple[Ints, str, Callable[[float], float]]] = []
 
@@ -62,25 +60,24 @@ class ProcessesInTime:
                 self._move(i, action, values)
         for group, load_of in ((GRAVITY, Variables.gravity), (SURFACE, Variables.condition_loads)):
             actions = [action for action in self.actions if action.component in group]
-            if all(self._acts_always(action) and not action.mentions("t") for action in actions):
-                continue
-            values.note_idle(self.notes, group)
-            values.drop(group)
-            self._later.append(TimeDependentLoad(_load_in_time(actions, times, base.only(group), load_of)))
+            if any(action.mentions("t") or not self._acts_always(action) for action in actions):
+                if group is SURFACE:
+                    values.note_idle(self.notes)
+                values.drop(group)
+                self._later.append(TimeDependentLoad(_load_in_time(actions, times, base, load_of)))
         values.drop({f"{name}_{axis}" for name in UNPRESCRIBED for axis in "XYZ"})
 
     def finish(self, model: Model) -> None:
         """Give a model the loads and supports that change, and let all loads begin with the first step."""
-        loads: list[Load] = [ScaledLoad(load, _begun) for load in model.loads]
+        loads: list[Load] = [ScaledLoad(load, lambda time: float(time > 0)) for load in model.loads]
         model.loads[:] = [*loads, *self._later]
         for indices, axis, motion in self._moving:
             model.fix(indices, axis, motion, override=True)
         if model.loads:
             model.notes.append("as in Kratos, the acceleration at the start is 0: loads act after t = 0")
         if self._moving:
-            model.notes.append(
-                "supports that move have the velocity of their function; Kratos takes Newmark's formulas"
-            )
+            text = "supports that move have the velocity of their function"
+            model.notes.append(f"{text}; Kratos takes Newmark's formulas")
         model.notes += self.notes
 
     # ---- supports and start ----------------------------------------------------------------------------
@@ -117,8 +114,10 @@ class ProcessesInTime:
             if action.fixed and name.startswith("DISPLACEMENT"):
                 start.fix(name, action.indices)
         u, v = start.nodal.vector("DISPLACEMENT"), start.nodal.vector("VELOCITY")
-        fixed = [start.fixed.get(f"DISPLACEMENT_{axis}", np.zeros(len(v), bool)) for axis in "XYZ"]
-        if v[np.transpose(fixed)].any():
+        fixed = {
+            f"VELOCITY{name[-2:]}": mask for name, mask in start.fixed.items() if name[:-2] == "DISPLACEMENT"
+        }
+        if any(start.nodal.scalar(name)[mask].any() for name, mask in fixed.items()):
             self.notes.append("VELOCITY of fixed nodes is left out; Kratos keeps it in the first step")
         self.displacement, self.velocity = u if u.any() else None, v if v.any() else None
 
@@ -147,10 +146,6 @@ class ProcessesInTime:
 
     def _acts_always(self, action: Action) -> bool:
         return self._acts(action) == len(self.context.times) - 1
-
-
-def _begun(time: float) -> float:
-    return float(time > 0)
 
 
 def _load_in_time(

@@ -43,11 +43,12 @@ def document_from(model: Model) -> Document:
     numbers, properties = _properties(model, gravity)
     blocks = _blocks(model, numbers)
     forces = sum((load.forces(mesh, model.element_groups()) for load in others), np.zeros_like(mesh.points))
-    loaded = (forces != 0).any(axis=1)
-    conditions = _point_conditions(np.flatnonzero(loaded), next(iter(properties), 0))
+    loaded, number = (forces != 0).any(axis=1, keepdims=True), next(iter(properties), 0)
+    points = Block("PointLoadCondition3D1N", np.argwhere(loaded)[:, :1], properties=number, shape=Point1)
+    conditions = [points] if len(points) else []
     written = mesh.replace(blocks=blocks, conditions=conditions, parts=_parts(mesh))
     data = _nodal_data(mesh, "DISPLACEMENT", supports.fixed, supports.values, fixed=True) + start
-    data += _nodal_data(mesh, "POINT_LOAD", np.repeat(loaded[:, None], 3, axis=1), forces)
+    data += _nodal_data(mesh, "POINT_LOAD", np.repeat(loaded, 3, axis=1), forces)
     constraints = constraints_of(mesh, supports.constraints)
     document = Document(written, properties, nodal_data=data, constraints=constraints)
     if mesh.conditions:
@@ -134,11 +135,6 @@ def _nodal_data(mesh: Mesh, variable: str, where: Mask, values: Array, fixed: bo
             ids, mask = mesh.node_ids[indices], np.full(len(indices), fixed)
             data.append(Data(f"{variable}_{letter}", ids, mask, values[indices, axis]))
     return data
-
-
-def _point_conditions(nodes: Ints, properties: int) -> list[Block]:
-    block = Block("PointLoadCondition3D1N", nodes[:, None], properties=properties, shape=Point1)
-    return [block] if len(nodes) else []
 
 
 def _parts(mesh: Mesh) -> dict[str, Part]:

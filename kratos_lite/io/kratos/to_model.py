@@ -102,17 +102,12 @@ def _renamed(mesh: Mesh) -> list[str]:
 def _fill(values: Variables, document: Document, model: Model) -> None:
     """Put the data blocks of a document into variables."""
     mesh, problems, ids = document.mesh, Problems(), ids_of(document.mesh.conditions)
-    for fields, blocks in (
-        (values.nodal, document.nodal_data),
-        (values.conditional, document.condition_data),
-    ):
-        for data in blocks:
-            is_nodal = fields is values.nodal
-            indices = mesh.node_rows(data.ids) if is_nodal else rows_of_ids(ids, data.ids)
-            known = indices >= 0
-            if not _fits(data, model, problems, mesh.source):
-                continue
-            if is_nodal:
+    blocks = [(values.nodal, data, mesh.node_rows(data.ids)) for data in document.nodal_data]
+    blocks += [(values.conditional, data, rows_of_ids(ids, data.ids)) for data in document.condition_data]
+    for fields, data, indices in blocks:
+        known = indices >= 0
+        if _fits(data, model, problems, mesh.source):
+            if fields is values.nodal:
                 _note_overridden(values, data, indices, model)
             if data.values.size:
                 fields.put(data.variable, indices[known], data.values[known])

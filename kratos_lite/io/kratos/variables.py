@@ -6,7 +6,7 @@ turns them into supports and loads.
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -66,10 +66,10 @@ class Fields(dict[str, Array]):
         """Return the values (m, 3) of a vector variable."""
         return np.stack([self.scalar(f"{variable}_{axis}") for axis in "XYZ"], axis=1)
 
-    def only(self, names: Container[str]) -> Fields:
-        """Return a copy of some scalars and components."""
+    def copy(self) -> Fields:
+        """Return a copy whose values can be changed without changing these."""
         other = Fields(self.count)
-        other.update((name, values.copy()) for name, values in self.items() if name in names)
+        other.update((name, values.copy()) for name, values in self.items())
         return other
 
     def loaded(self, variable: str) -> Mask:
@@ -93,13 +93,9 @@ class Variables:
 
     def copy(self) -> Variables:
         """Return a copy that can be changed without changing this."""
-        return self.only({*self.nodal, *self.fixed, *self.conditional})
-
-    def only(self, names: Container[str]) -> Variables:
-        """Return a copy of some scalars and components."""
         other = Variables(self.mesh)
-        other.nodal, other.conditional = self.nodal.only(names), self.conditional.only(names)
-        other.fixed = {k: v.copy() for k, v in self.fixed.items() if k in names}
+        other.nodal, other.conditional = self.nodal.copy(), self.conditional.copy()
+        other.fixed = {name: fixed.copy() for name, fixed in self.fixed.items()}
         return other
 
     def drop(self, names: Iterable[str]) -> None:
@@ -138,11 +134,8 @@ class Variables:
         """Return the loads that conditions carry, or None."""
         force = np.zeros((self.mesh.n_conditions, 3))
         nodal_force = {cell: self.nodal.vector(name) for cell, name in LOADS.items()}
-        carriers = [
-            (block.shape.cell, indices)
-            for block, indices in with_rows(self.mesh.conditions)
-            if block.shape is not None and len(block)
-        ]
+        conditions = [(block, at) for block, at in with_rows(self.mesh.conditions) if len(block)]
+        carriers = [(block.shape.cell, at) for block, at in conditions if block.shape is not None]
         for cell, indices in carriers:
             force[indices] = self.conditional.vector(LOADS[cell])[indices]
         positive, negative = PRESSURES
@@ -150,19 +143,17 @@ class Variables:
             fields.scalar(positive) - fields.scalar(negative) for fields in (self.conditional, self.nodal)
         )
         values = (force, *nodal_force.values(), pressure, nodal_pressure)
-        if not (len(carriers) > 0 and any(value.any() for value in values)):
-            return None
-        return ConditionLoads(force, nodal_force, pressure, nodal_pressure)
+        is_loaded = len(carriers) > 0 and any(value.any() for value in values)
+        return ConditionLoads(force, nodal_force, pressure, nodal_pressure) if is_loaded else None
 
-    def note_idle(self, notes: list[str], names: Iterable[str] = LOADING) -> None:
+    def note_idle(self, notes: list[str]) -> None:
         """Note loads where nothing carries them, and pressures that follow the deformed faces in Kratos.
 
         Kratos adds the stiffness of such a pressure to K even in a linear analysis; its small-displacement
         conditions do not.
         """
-        shown = self.only(set(names))
-        shown._note_uncarried(notes)
-        loads = shown.condition_loads()
+        self._note_uncarried(notes)
+        loads = self.condition_loads()
         if loads is not None and (loads.pressure.any() or loads.nodal_pressure.any()):
             kinds = {block.name for block in self.mesh.conditions if len(block)}
             for name in sorted(kind for kind in kinds if kind.startswith("SurfaceLoadCondition")):

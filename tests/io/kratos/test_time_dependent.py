@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from run_files import process, run_file
 
 import kratos_lite as kl
 from kratos_lite.io.files import read_case
@@ -12,11 +13,7 @@ from kratos_lite.model.loads import ScaledLoad
 
 TO_NODES = "assign_scalar_variable_process"
 TO_CONDITIONS = "assign_scalar_variable_to_conditions_process"
-CLAMP = (
-    ("Bottom", "DISPLACEMENT_X", 0.0),
-    ("Bottom", "DISPLACEMENT_Y", 0.0),
-    ("Bottom", "DISPLACEMENT_Z", 0.0),
-)
+CLAMP = tuple(("Bottom", f"DISPLACEMENT_{axis}", 0.0) for axis in "XYZ")
 
 
 @pytest.fixture
@@ -45,19 +42,9 @@ def write(tmp_path, monkeypatch):
             parameters.update(*more)
             module = TO_CONDITIONS if on_conditions else TO_NODES
             lists.append({"python_module": module, "Parameters": parameters})
-        content = {
-            "problem_data": {"start_time": 0.0, "end_time": end},
-            "solver_settings": {
-                "solver_type": "Dynamic",
-                "time_integration_method": "implicit",
-                "domain_size": 3,
-                "analysis_type": "linear",
-                "model_import_settings": {"input_filename": "mesh"},
-                "time_stepping": {"time_step": step},
-                **solver,
-            },
-            "processes": {"list": [*lists, *processes]},
-        }
+        dynamic = {"solver_type": "Dynamic", "time_integration_method": "implicit", **solver}
+        content = run_file(lists, list(processes), mesh="mesh", step=step, end=end, **dynamic)
+        del content["solver_settings"]["material_import_settings"]
         (tmp_path / "run.json").write_text(json.dumps(content, indent=1))
         if data:
             with open("mesh.mdpa", "a") as file:
@@ -77,12 +64,12 @@ def same(found, expected):
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-10 * max(np.abs(other).max(), 1e-300))
 
 
-def by_hand(load=None, **options):
-    model = kl.Model(kl.read("mesh.mdpa").mesh, kl.Isotropic3D(E=1e8, nu=0.2, density=2000.0))
-    model.fix("Bottom")
-    if load is not None:
-        model.add(load)
-    return list(kl.integrate(model.transient(**options), dt=0.01, steps=20))
+def by_hand():
+    return kl.Model(kl.read("mesh.mdpa").mesh, kl.Isotropic3D(E=1e8, nu=0.2, density=2000.0))
+
+
+def moved(model):
+    return list(kl.integrate(model.transient(integrator=kl.Bossak()), dt=0.01, steps=20))
 
 
 def test_integrator_damping_and_steps(write):
@@ -122,8 +109,10 @@ def test_a_load_stays_at_its_last_value_and_changes_no_more(write):
     assert forces[2] is not forces[1]
     assert forces[4] is forces[3]
     ramp = kl.TimeSeries([0.0, 0.05], [0.0, 0.05])
-    expected = by_hand(ScaledLoad(kl.Traction("Top", (1e5, 0.0, 0.0)), ramp), integrator=kl.Bossak())
-    for one, other in zip(states(scene), expected, strict=True):
+    model = by_hand()
+    model.fix("Bottom")
+    model.add(ScaledLoad(kl.Traction("Top", (1e5, 0.0, 0.0)), ramp))
+    for one, other in zip(states(scene), moved(model), strict=True):
         same(one, other)
 
 
@@ -135,13 +124,11 @@ def test_gravity_stays_assembled_while_another_load_changes(write):
 
 
 def test_supports_that_move_with_t(write):
-    moved = [("Bottom", "DISPLACEMENT_X", "0.01*t^2"), *CLAMP[1:]]
-    scene = read_case(write(*moved))
-    model = kl.Model(kl.read("mesh.mdpa").mesh, kl.Isotropic3D(E=1e8, nu=0.2, density=2000.0))
+    scene = read_case(write(("Bottom", "DISPLACEMENT_X", "0.01*t^2"), *CLAMP[1:]))
+    model = by_hand()
     model.fix("Bottom", "x", lambda t: 0.01 * t * t)
     model.fix("Bottom", "yz")
-    expected = list(kl.integrate(model.transient(integrator=kl.Bossak()), dt=0.01, steps=20))
-    same(states(scene)[-1], expected[-1])
+    same(states(scene)[-1], moved(model)[-1])
     assert any("Kratos takes Newmark's formulas" in note for note in scene.model.notes)
 
 
@@ -199,7 +186,7 @@ def test_options_change_a_dynamic_run_file(write, run):
     words = ("--time", "5e-3:40:40", "--integrator", "newmark", "-o", "end.npz")
     done = run("solve", "run.json", *words)
     assert done.rows["integrator"] == "newmark(0.25, 0.5)"
-    model = kl.Model(kl.read("mesh.mdpa").mesh, kl.Isotropic3D(E=1e8, nu=0.2, density=2000.0))
+    model = by_hand()
     model.fix("Bottom")
     model.add(kl.Traction("Top", (1e5, 0.0, 0.0)), amplitude=lambda t: t)
     *_, last = kl.integrate(model.transient(), dt=5e-3, steps=40)
@@ -215,15 +202,8 @@ def test_expected_values_are_compared_at_the_end_of_the_run(write, run, value, w
     end = states(read_case(write(*CLAMP, push)))[-1]
     mesh = kl.read("mesh.mdpa").mesh
     found = float(end.u[mesh.nodes("Top"), 0].mean())
-    check = {
-        "python_module": "check_scalar_to_nodes_process",
-        "Parameters": {
-            "model_part_name": "Top",
-            "variable_name": "DISPLACEMENT_X",
-            "value": found if value is None else value,
-            "tolerance_rank": 6,
-        },
-    }
+    settings = {"value": found if value is None else value, "tolerance_rank": 6}
+    check = process("check_scalar_to_nodes_process", "Top", "DISPLACEMENT_X", **settings)
     done = run("solve", write(*CLAMP, push, processes=[check]))
     assert f"check DISPLACEMENT_X on Top {word}" in done.out
     assert done.code == code
