@@ -86,8 +86,8 @@ class _Expression:
             words.append(
                 repr(float(word)) if is_number else "**" if word == "^" and not self.python else word
             )
-        if rest := self.text[place:].strip():
-            raise ValueError(f"expression {self.text!r}: {rest[:20]!r} is not understood")
+        if remaining := self.text[place:].strip():
+            raise ValueError(f"expression {self.text!r}: {remaining[:20]!r} is not understood")
         return " ".join(words).strip()
 
     def value(self, node: ast.expr) -> Any:

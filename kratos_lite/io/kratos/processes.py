@@ -45,7 +45,7 @@ class Action:
     interval: Interval  # when it acts.
     steps: list[int]  # in which steps that is; step 0 is the start, before the first solution.
     on_conditions: bool = False  # set conditions, not nodes.
-    fixed: bool = False  # hold the component in the steps in which it acts.
+    fixed: bool = False  # a Dirichlet condition in the steps in which it acts.
 
     def mentions(self, names: str) -> bool:
         """Return whether an expression uses one of these names of one letter."""
@@ -116,7 +116,7 @@ class Process:
 
     # the factors of each component from the parameters; None leaves the component alone.
     factors: Callable[[Settings], Sequence[Factors]]
-    keys: tuple[str, ...] = ("value",)  # parameters of its own.
+    keys: tuple[str, ...] = ("value",)  # parameters beside the common ones.
     on_conditions: bool = False  # it acts on conditions, and fixes nothing.
     is_vector: bool = True  # it sets three components.
 
@@ -199,7 +199,7 @@ def run(actions: Sequence[Action], context: RunContext, notes: list[str], values
         if action.steps[-1] == last or (action.steps == [0] and last == 1):
             is_whole = bool(action.factors) or len(action.steps) == last
             text = (
-                f"{action.component} is held only from a later step on, at the value solved before; "
+                f"{action.component} is fixed only from a later step on, at the value solved before; "
                 'kratos_lite solves one step: use the interval [0.0, "End"] or assign a value'
             )
             is_displacement = action.component.startswith("DISPLACEMENT")

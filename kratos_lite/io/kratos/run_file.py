@@ -15,9 +15,9 @@ from kratos_lite.io.formats.document import Document
 from kratos_lite.io.formats.part_files import part_files, read_part
 from kratos_lite.io.kratos.context import RunContext, module_of, times_of
 from kratos_lite.io.kratos.expected_values import COMPARISONS, Comparison
-from kratos_lite.io.kratos.materials import use_materials
 from kratos_lite.io.kratos.motion import add_motion
 from kratos_lite.io.kratos.processes import PROCESSES, Action, actions_of, run
+from kratos_lite.io.kratos.properties import use_materials
 from kratos_lite.io.kratos.time_dependent import (
     DYNAMIC,
     DYNAMIC_KEYS,
@@ -152,7 +152,7 @@ def _read_mesh(solver: Settings, folder: Path, outside: bool, notes: list[str], 
     notes += [note] if note else []
     unused = len(document.constraints)
     if unused and not solver.flag("multi_point_constraints_used", True):
-        notes.append(f"multi_point_constraints_used is false: {unused} constraints left out")
+        notes.append(f"multi_point_constraints_used is false: {unused} constraints omitted")
         document.constraints = []
     return document
 

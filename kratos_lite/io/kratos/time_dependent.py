@@ -1,4 +1,4 @@
-"""Kratos run files in time: integrator, damping and steps; what processes hold, set and load on the way.
+"""Kratos run files in time: integrator, damping and steps; what processes fix, set and load on the way.
 
 Kratos runs all processes before every time step, in order; values stay until they are set again.  It starts
 with the acceleration 0, as if nothing acted at the start: so loads act here from the first step on.
@@ -91,7 +91,7 @@ class ProcessesInTime:
             )
             expect(not (action.fixed and name.startswith(UNPRESCRIBED)), "variable_name", text)
             text = (
-                f"{name} is held in a part of the run only; hold it from start to end, "
+                f"{name} is fixed in a part of the run only; fix it from start to end, "
                 '"interval": [0.0, "End"], or give "constrained": false for an initial value'
             )
             is_support = action.fixed and name.startswith("DISPLACEMENT")
@@ -118,7 +118,7 @@ class ProcessesInTime:
             f"VELOCITY{name[-2:]}": mask for name, mask in start.fixed.items() if name[:-2] == "DISPLACEMENT"
         }
         if any(start.nodal.scalar(name)[mask].any() for name, mask in fixed.items()):
-            self.notes.append("VELOCITY of fixed nodes is left out; Kratos keeps it in the first step")
+            self.notes.append("VELOCITY of fixed nodes is omitted; Kratos keeps it in the first step")
         self.displacement, self.velocity = u if u.any() else None, v if v.any() else None
 
     def _move(self, i: int, action: Action, values: Variables) -> None:

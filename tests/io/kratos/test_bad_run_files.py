@@ -75,11 +75,11 @@ BAD = [
     (in_time(on_top("ACCELERATION_X", value=1.0, **START)), "ACCELERATION_X cannot be given"),
     (
         in_time(on_top("DISPLACEMENT_X", interval=[0.0, 0.5])),
-        "DISPLACEMENT_X is held in a part of the run only",
+        "DISPLACEMENT_X is fixed in a part of the run only",
     ),
     (
         in_time(process("fix_scalar_variable_process", "Top", "DISPLACEMENT_X", interval=[0.5, "End"])),
-        "DISPLACEMENT_X is held in a part of the run only",
+        "DISPLACEMENT_X is fixed in a part of the run only",
     ),
     (
         in_time(on_top("DISPLACEMENT_X", value="t*X")),
@@ -129,7 +129,7 @@ BAD = [
     (processes(process(FIX, "Bottom", "DISPLACEMENT", constrained="yes")), "constrained must be true, false"),
     (
         run_file([CLAMP], [process(FIX, "Top", "DISPLACEMENT", interval=[0.6, "End"])], step=0.25),
-        "held only from a later step",
+        "fixed only from a later step",
     ),
 ]
 

@@ -276,7 +276,7 @@ def test_constraints_are_left_out_with_a_note_when_the_run_file_says_so(folder):
     kept = read_case(write(folder, run_file([CLAMP], []))).model
     left = read_case(write(folder, run_file([CLAMP], [], multi_point_constraints_used=False))).model
     assert (len(kept.supports.constraints), len(left.supports.constraints)) == (1, 0)
-    assert "multi_point_constraints_used is false: 1 constraints left out" in left.notes
+    assert "multi_point_constraints_used is false: 1 constraints omitted" in left.notes
 
 
 @pytest.mark.parametrize(("prefix", "count"), [("", 1), ("SmallDisplacement", 0)])

@@ -171,7 +171,7 @@ def test_nodal_data_of_the_mesh_file_is_the_start(write):
     velocity = scene.time.velocity
     assert velocity[:, 0].tolist() == pytest.approx([i * 0.01 for i in range(1, 21)])
     told = [note for note in scene.model.notes if "VELOCITY" in note]
-    assert told == ["VELOCITY of fixed nodes is left out; Kratos keeps it in the first step"]
+    assert told == ["VELOCITY of fixed nodes is omitted; Kratos keeps it in the first step"]
     assert np.abs(states(scene)[-1].u).max() > 0
 
 

@@ -125,8 +125,8 @@ def _text(word: re.Match[bytes]) -> str:
 
 def _refuse_width(source: Source, words: Words, layout: Layout) -> None:
     k = len(layout.kinds)
-    found = f"{layout.word} {_text(words[0])} has {len(words) - layout.head} {layout.counted}"
+    text = f"{layout.word} {_text(words[0])} has {len(words) - layout.head} {layout.counted}"
     hint = "; a row must stand whole on one line, unless strict=False" if source.strict else ""
     if len(words) % k == 0:
         hint = f"; {len(words) // k} rows on one line? Write one a line, or read with strict=False"
-    source.problem(f"{found}; {layout.needs or f'expected {k - layout.head}'}{hint}", words[0].start())
+    source.problem(f"{text}; {layout.needs or f'expected {k - layout.head}'}{hint}", words[0].start())
