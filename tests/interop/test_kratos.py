@@ -275,13 +275,6 @@ def test_functions_of_kratos_for_13_and_15_nodes_miss_quadratic_fields(kind, lar
     assert apart[1] > largest
 
 
-def test_an_element_of_ours_reads_as_it_was_written(cubes, tmp_path):
-    model, _ = cubes[27, 2]
-    kl.write(tmp_path / "a.mdpa", model)
-    again = kl.read(tmp_path / "a.mdpa")
-    close(again.solve().u, model.solve().u, 1e-14)
-
-
 # ---- loads on surfaces and points ----------------------------------------------------------------
 
 

@@ -1,6 +1,5 @@
 """Reading `.mdpa` files: what each block means, real files, exact numbers."""
 
-import gzip
 import json
 import re
 
@@ -169,12 +168,6 @@ def test_bom_comments_and_bytes_of_other_encodings_in_comments(read):
     assert document.mesh.blocks[0].lines.tolist() == [12]
 
 
-def test_gzipped_file(tmp_path):
-    path = tmp_path / "model.mdpa.gz"
-    path.write_bytes(gzip.compress(TETRA.encode()))
-    assert read_mdpa(path).mesh.n_nodes == 4
-
-
 def test_ids_with_gaps_out_of_order_and_large(read):
     text = "Begin Nodes\n9223372036854775807 0 0 0\n3 1 0 0\nEnd Nodes\nBegin Nodes\n0001 2 0 0\nEnd Nodes\n"
     document = read(text)
@@ -219,10 +212,6 @@ def test_numbers_are_exactly_those_of_python(read):
     rows = "\n".join(f"{i + 1} {' '.join(row)}" for i, row in enumerate(tokens))
     expected = np.array([[float(t) for t in row] for row in tokens])
     assert read(f"Begin Nodes\n{rows}\nEnd Nodes").mesh.points.tobytes() == expected.tobytes()
-
-
-def test_fortran_exponents(read):
-    assert read("Begin Nodes\n1 1.0D+00 -2d-1 3.e2\nEnd Nodes").mesh.points.tolist() == [[1, -0.2, 300]]
 
 
 @pytest.mark.parametrize(

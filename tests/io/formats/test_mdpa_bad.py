@@ -148,16 +148,13 @@ def test_unknown_element_is_kept_for_the_next_stage(malformed):
     assert (block.name, block.shape, block.nodes.shape) == ("SmallDisplacementElement3D9N", None, (1, 8))
 
 
-def test_sample_is_read(tmp_path):
-    document = outcome(tmp_path / "a.mdpa", SAMPLE)
-    assert isinstance(document, Document)
-    assert list(document.mesh.parts) == ["A", "A.b"]
-
-
-@pytest.mark.parametrize("strict", [True, False])
-def test_every_prefix_is_read_or_refused(tmp_path, strict):
+def test_every_prefix_is_read_or_refused(tmp_path):
+    """Strictly, and every second one also as Kratos reads."""
     path = tmp_path / "a.mdpa"
-    results = [outcome(path, SAMPLE[:n], strict=strict) for n in range(len(SAMPLE))]
+    assert list(outcome(path, SAMPLE).mesh.parts) == ["A", "A.b"]
+    for n in range(0, len(SAMPLE), 2):
+        outcome(path, SAMPLE[:n], strict=False)
+    results = [outcome(path, SAMPLE[:n]) for n in range(len(SAMPLE))]
     whole = [n for n, result in enumerate(results) if isinstance(result, Document)]
     ends = [m.end() for m in re.finditer(rb"(?m)^End \w+", SAMPLE)]
     # A prefix is a whole file only where the last block is closed and the nodes that it needs have come.
@@ -166,22 +163,15 @@ def test_every_prefix_is_read_or_refused(tmp_path, strict):
     assert len(whole) < len(SAMPLE) / 10
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_every_flip_is_read_or_refused(tmp_path, seed):
-    rng = np.random.default_rng(seed)
-    refused = 0
-    for _ in range(250):
+def test_every_flip_is_read_or_refused(tmp_path):
+    rng, refused = np.random.default_rng(0), 0
+    for _ in range(1000):
         data = bytearray(SAMPLE)
         data[rng.integers(len(data))] ^= 1 << int(rng.integers(8))
         result = outcome(tmp_path / "a.mdpa", bytes(data), strict=bool(rng.integers(2)))
         assert isinstance(result, (Document, InputError))
         refused += isinstance(result, InputError)
-    assert refused > 50
-
-
-def test_flip_of_a_digit_never_changes_more_than_its_number(tmp_path):
-    text = SAMPLE.replace(b"1.5", b"1.7")
-    assert outcome(tmp_path / "a.mdpa", text).mesh.points[3].tolist() == [0, 1, 1.7]
+    assert refused > 200
 
 
 def test_twenty_problems_are_shown_and_the_rest_counted(tmp_path):

@@ -46,27 +46,29 @@ STRETCH = np.where(BOX.points == 1, [0, 0, 1e-3], 0.0)
 """Displacement of the cube by which a strain of 1e-3 along z lets it be free of stress."""
 
 
-@pytest.mark.parametrize("name", ["PRESTRESS", "INSITU_STRESS"])
-def test_a_positive_prestress_of_a_file_is_compression_that_lengthens_the_body(write, name):
-    u = kl.read(write(f"{name} [6] (0,0,1000,0,0,0)")).solve().u
-    assert np.abs(u - STRETCH).max() < 1e-12
+BOTH = "PRESTRESS [6] (0,0,{},0,0,0)\nINSITU_STRESS [6] (0,0,1000,0,0,0)"
 
 
-def test_the_prestress_factor_multiplies_the_prestress(write):
-    u = kl.read(write("PRESTRESS [6] (0,0,-500,0,0,0)\nPRESTRESS_FACTOR -2")).solve().u
-    assert np.abs(u - STRETCH).max() < 1e-12
+@pytest.mark.parametrize(
+    "properties",
+    [
+        "PRESTRESS [6] (0,0,1000,0,0,0)",
+        "INSITU_STRESS [6] (0,0,1000,0,0,0)",
+        "PRESTRESS [6] (0,0,-500,0,0,0)\nPRESTRESS_FACTOR -2",
+        BOTH.format(1000),
+    ],
+)
+def test_a_positive_prestress_of_a_file_is_compression_that_lengthens_the_body(write, properties):
+    assert np.abs(kl.read(write(properties)).solve().u - STRETCH).max() < 1e-12
 
 
-def test_both_names_of_the_prestress_count_once_and_must_agree(write):
-    both = "PRESTRESS [6] (0,0,{},0,0,0)\nINSITU_STRESS [6] (0,0,1000,0,0,0)"
-    assert np.abs(kl.read(write(both.format(1000))).solve().u - STRETCH).max() < 1e-12
+def test_both_names_of_the_prestress_must_agree(write):
     with pytest.raises(kl.InputError, match=r"cube\.mdpa:\d+: .*two names of one stress"):
-        kl.read(write(both.format(999)))
+        kl.read(write(BOTH.format(999)))
 
 
 def test_the_stress_of_a_held_body_is_the_negative_prestress(write):
-    path = write("PRESTRESS [6] (1,2,3,4,5,6)", fixed="")
-    model = kl.read(path)
+    model = kl.read(write("PRESTRESS [6] (1,2,3,4,5,6)", fixed=""))
     model.fix(range(8))
     stress = model.solve().stress("gauss")
     assert np.abs(stress - [-1, -2, -3, -4, -5, -6]).max() < 1e-12

@@ -113,23 +113,23 @@ def test_a_used_vector_of_wrong_size_is_refused_at_its_line(load, kind):
     ("data", "note"),
     [
         (
-            "Begin ConditionalData SURFACE_LOAD\n3 [3] (0,0,1)\n7 [3] (0,0,1)\n9 [3] (0,0,1)\n"
-            "End ConditionalData",
+            "ConditionalData SURFACE_LOAD\n3 [3] (0,0,1)\n7 [3] (0,0,1)\n9 [3] (0,0,1)",
             "SURFACE_LOAD on 2 conditions (first 7) has no effect: only faces carry it",
         ),
         (
-            "Begin ConditionalData POINT_LOAD\n3 [3] (0,0,1)\nEnd ConditionalData",
+            "ConditionalData POINT_LOAD\n3 [3] (0,0,1)",
             "POINT_LOAD on 1 conditions (first 3) has no effect: only point conditions carry it",
         ),
         (
-            "Begin NodalData POINT_LOAD_X\n7 0 1\n2 0 1\nEnd NodalData",
+            "NodalData POINT_LOAD_X\n7 0 1\n2 0 1",
             "POINT_LOAD on 1 nodes (first 2) has no effect: only point conditions carry it, and none has "
             "these nodes",
         ),
     ],
 )
 def test_loads_that_nothing_carries_are_noted(load, data, note):
-    assert [n for n in load(data=data).notes if "no effect" in n] == [note]
+    notes = load(data=f"Begin {data}\nEnd {data.split()[0]}").notes
+    assert [n for n in notes if "no effect" in n] == [note]
 
 
 def test_a_fixed_value_that_changes_in_a_later_block_is_noted(load):
