@@ -280,10 +280,7 @@ def test_value_by_the_type_of_its_variable(read, text, value):
         ("LOCAL_INERTIA_TENSOR [2,2] ((1,2),(3))", r"different lengths"),
         ("IS_RESTARTED yes", r"'yes' is neither true nor false"),
         ("INTEGRATION_ORDER 2.0", r"'2.0' is not a whole number"),
-        (
-            "DENSITY 1\n DENSITY 2",
-            r"9:2: DENSITY is already defined at line 8 with another value",
-        ),
+        ("DENSITY 1\n DENSITY 2", r"9:2: DENSITY is already defined at line 8 with another value"),
     ],
 )
 def test_wrong_value_is_named_with_its_place(read, text, message):

@@ -55,9 +55,7 @@ def _read_arrays(source: Source, frame: Frame, is_nodal: bool, kind: str | None)
             if match is None or match.group(1) not in TRUTH:
                 raise ValueError("expected is_fixed, 0, before the vector")
             if TRUTH[match.group(1)]:
-                raise ValueError(
-                    "a vector cannot be fixed; fix its components _X, _Y, _Z in blocks of their own"
-                )
+                raise ValueError("a vector cannot be fixed; fix its components _X, _Y, _Z in separate blocks")
             at = match.end()
         start = WORD.search(source.data, at, end)
         value, at = value_at(source, start.start() if start else end, end, kind)

@@ -41,8 +41,8 @@ def read_mesh(source: Source, frames: dict[str, list[Frame]], properties: Sequen
         source.problems.raise_if_any()
     blocks = read_blocks(source, frames["Elements"], mesh)
     conditions = read_blocks(source, frames["Conditions"], mesh)
-    for word, checked in (("element", blocks), ("condition", conditions)):
-        _check_properties(source, checked, word, properties)
+    _check_properties(source, blocks, "element", properties)
+    _check_properties(source, conditions, "condition", properties)
     return mesh.replace(blocks=blocks, conditions=conditions)
 
 
@@ -52,16 +52,13 @@ def _read_nodes(source: Source, frames: list[Frame]) -> Mesh:
     points = np.concatenate([np.zeros((0, 3)), *(t.reals for t in tables)])
     lines = np.concatenate([np.zeros(0, dtype=np.int32), *(t.lines for t in tables)])
     if not len(ids) and not source.problems:
-        raise InputError(
-            f"{source.name}: there are no nodes; a 'Begin Nodes' block with rows 'id x y z' is needed"
-        )
+        text = "there are no nodes; a 'Begin Nodes' block with rows 'id x y z' is needed"
+        raise InputError(f"{source.name}: {text}")
     keep = np.ones(len(ids), dtype=bool)
     for row, text, is_same in repeated_nodes(ids, points, lines):
         keep[row] = False
         (source.note_in_line if is_same else source.problem_in_line)(text, int(lines[row]))
-    if not keep.all():
-        points, ids = points[keep], ids[keep]
-    return Mesh(points, node_ids=ids, source=source.name)
+    return Mesh(points[keep], node_ids=ids[keep], source=source.name)
 
 
 def read_blocks(source: Source, frames: list[Frame], mesh: Mesh) -> list[Block]:
@@ -106,16 +103,13 @@ def _width_of(kind: str, name: str) -> int | None:
 def _check_properties(source: Source, blocks: list[Block], word: str, declared: Sequence[int]) -> None:
     for block in blocks:
         for number in distinct(block.properties):
-            if number in declared:
-                continue
-            rows = np.flatnonzero(block.properties == number)
-            more = f" (and {len(rows) - 1} more {word}s)" if len(rows) > 1 else ""
-            assert block.lines is not None
-            source.problem_in_line(
-                f"{word} {block.ids[rows[0]]}{more} uses Properties {number}, which the file does not have; "
-                f"add 'Begin Properties {number}' … 'End Properties'",
-                int(block.lines[rows[0]]),
-            )
+            if number not in declared:
+                users = block.take(block.properties == number)
+                more = f" (and {len(users) - 1} more {word}s)" if len(users) > 1 else ""
+                text = f"{word} {users.ids[0]}{more} uses Properties {number}, which the file does not have"
+                cure = f"add 'Begin Properties {number}' … 'End Properties'"
+                assert users.lines is not None
+                source.problem_in_line(f"{text}; {cure}", int(users.lines[0]))
 
 
 def member_ids(document: Document) -> dict[str, Ints]:

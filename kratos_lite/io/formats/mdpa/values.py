@@ -156,22 +156,20 @@ def _numbers(text: bytes) -> list[float]:
 
 def _plain(token: bytes, kind: str | None) -> Any:
     """Return the value of a single word."""
-    if kind in ("vector", "matrix"):
+    if kind in SAMPLES:
         raise ValueError(f"{shown(token)} is not a {kind}; write {SAMPLES[kind]}")
-    if kind == "number":
-        return real(token)
-    if kind in ("truth", "flag"):
+    is_integer = INTEGER.fullmatch(token) is not None
+    is_word = kind is None and not is_integer
+    if kind in ("truth", "flag") or (is_word and token in TRUTH):
         if token not in TRUTH:
             raise ValueError(f"{shown(token)} is neither true nor false; write 1 or 0")
         return bool(TRUTH[token])
-    if kind == "integer" and not INTEGER.fullmatch(token):
-        raise ValueError(f"{shown(token)} is not a whole number")
-    if INTEGER.fullmatch(token):
-        return int(token)
-    if kind is None and token in TRUTH:
-        return bool(TRUTH[token])
-    if kind is None and (NUMBERLIKE.fullmatch(token) or token.endswith(b",")):
+    if kind == "number" or (is_word and (NUMBERLIKE.fullmatch(token) or token.endswith(b","))):
         return real(token)
+    if is_integer:
+        return int(token)
+    if kind == "integer":
+        raise ValueError(f"{shown(token)} is not a whole number")
     if not token.isascii():
         raise ValueError(f"{shown(token)} is no word; use plain letters")
     return token.decode()

@@ -68,9 +68,8 @@ def _unknown_to_kratos(document: Document, keep: bool) -> list[Note]:
     mesh = document.mesh
     for block in (*mesh.blocks, *mesh.conditions):
         name = block.name if keep and block in mesh.blocks else kratos_name(block.name)
-        is_custom = name in ELEMENTS and not ELEMENTS[name].__name__.startswith(
-            ("KinematicLinear3D", "BBar3D8N")
-        )
+        built_in = ("KinematicLinear3D", "BBar3D8N")
+        is_custom = name in ELEMENTS and not ELEMENTS[name].__name__.startswith(built_in)
         is_old = name.startswith(("KinematicLinear", "TotalLagrangian3D"))
         if is_custom or is_old or "ContactFace" in name or re.search(r"3D\d+$", name):
             counts[name] += len(block)
@@ -82,10 +81,10 @@ def _made_plain(document: Document) -> list[Note]:
     """Note elements without a formulation, which the file gives one."""
     names = sorted({block.name for block in document.mesh.blocks if len(block) and is_unnamed(block.name)})
     text = (
-        "{}, which names no formulation, is written as {}, the plain element; to solve by another, ask for {}"
+        "{}, which names no formulation, is written as {}, the plain element; to solve by another, ask for "
     )
-    how = "formulation='non_locking' (--formulation non_locking)"
-    return [Note(0, text.format(name, kratos_name(name), how)) for name in names]
+    text += "formulation='non_locking' (--formulation non_locking)"
+    return [Note(0, text.format(name, kratos_name(name))) for name in names]
 
 
 def _lines(document: Document, keep: bool) -> Lines:
@@ -105,10 +104,9 @@ def _lines(document: Document, keep: bool) -> Lines:
             yield from _cells(kind, block, mesh, block.name if is_kept else kratos_name(block.name))
     yield from _constraints(document.constraints)
     for kind, entries in (
-        ("NodalData", document.nodal_data),
-        ("ElementalData", document.element_data),
+        ("NodalData", document.nodal_data), ("ElementalData", document.element_data),
         ("ConditionalData", document.condition_data),
-    ):
+    ):  # fmt: skip
         for data in entries:
             yield from _block(f"{kind} {_name(data.variable)}", _data(data, kind == "NodalData"))
     yield from _parts(document)
@@ -128,14 +126,11 @@ def _name(name: str) -> str:
 
 def _rows(ints: NDArray[Any], reals: ArrayLike = ()) -> Lines:
     """Yield the lines of a table of integers (m, a), followed by reals (m, b)."""
-    numbers = np.asarray(reals, dtype=float)
+    numbers = np.asarray(reals, dtype=float).reshape(len(ints), -1 if len(ints) else 0)
     if not np.isfinite(numbers).all():
         raise InputError("a number is not finite (nan or inf); give a finite one")
-    if numbers.size:
-        for row, more in zip(ints.tolist(), numbers.reshape(len(ints), -1).tolist(), strict=True):
-            yield " ".join([*map(str, row), *map(repr, more)])
-    else:
-        yield from (" ".join(map(str, row)) for row in ints.tolist())
+    for row, more in zip(ints.tolist(), numbers.tolist(), strict=True):
+        yield " ".join([*map(str, row), *map(repr, more)])
 
 
 def _properties(document: Document) -> Lines:
