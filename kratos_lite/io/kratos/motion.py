@@ -66,10 +66,7 @@ def _series(section: Settings, key: str) -> list[TimeSeries]:
     if key not in CENTER:
         return [section.placed(key, TimeSeries, times, table.numbers("values"))]
     rows = table.get("values")
-    fits = isinstance(rows, list) and rows and all(map(_is_vector, rows))
+    fits = isinstance(rows, list) and rows and all(isinstance(row, list) and len(row) == 3 for row in rows)
+    fits = fits and all(is_number(value) for row in rows for value in row)
     table.expect(fits, "values", f"must be a list of [x, y, z]; got {shown(rows)}")
     return [section.placed(key, TimeSeries, times, list(column)) for column in zip(*rows, strict=True)]
-
-
-def _is_vector(value: Any) -> bool:
-    return isinstance(value, list) and len(value) == 3 and all(map(is_number, value))

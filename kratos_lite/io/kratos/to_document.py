@@ -39,7 +39,8 @@ def document_from(model: Model) -> Document:
         if is_present:
             raise InputError(f"{what} cannot be written to a file of a model; leave it to a script")
     mesh, supports, start = model.mesh, model.supports, _initial_displacement(model)
-    gravity, others = _split_loads(model)
+    whole = [g for g in model.loads if isinstance(g, Gravity) and g.where is None and np.ndim(g.force) == 1]
+    gravity, others = sum((g.force for g in whole), np.zeros(3)), [x for x in model.loads if x not in whole]
     numbers, properties = _properties(model, gravity)
     blocks = _blocks(model, numbers)
     forces = sum((load.forces(mesh, model.element_groups()) for load in others), np.zeros_like(mesh.points))
@@ -72,13 +73,6 @@ def _blocks(model: Model, numbers: Ints) -> list[Block]:
                 part = replace(block, properties=numbers[indices], lines=None).take(np.arange(first, last))
                 blocks.append(replace(part, name=str(block_names[first])))
     return blocks
-
-
-def _split_loads(model: Model) -> tuple[Array, list[Any]]:
-    """Return the gravity that acts on the whole body and the other loads."""
-    whole = [g for g in model.loads if isinstance(g, Gravity) and g.where is None and np.ndim(g.force) == 1]
-    gravity = sum((g.force for g in whole), np.zeros(3))
-    return gravity, [load for load in model.loads if load not in whole]
 
 
 def _properties(model: Model, gravity: Array) -> tuple[Ints, dict[int, Properties]]:

@@ -172,8 +172,7 @@ def _constrain(model: Model, document: Document) -> None:
     """Add the multi-point constraints of a document."""
     known: list[Constraint] = []
     for constraint in document.constraints:
-        names = {constraint.dependent[1], *(name for _, name in constraint.independents)}
-        if names <= set(DISPLACEMENTS):
+        if {name for _, name in (constraint.dependent, *constraint.independents)} <= set(DISPLACEMENTS):
             known.append(constraint)
         else:
             text = f"constraint {constraint.id} is not on displacements; ignored"
