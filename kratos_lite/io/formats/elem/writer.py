@@ -1,44 +1,28 @@
-"""Reader and writer of the five-file sets NAME.node, .elem, .cond, .prop and .init (Kratos data of 2008)."""
+"""Writer of the five-file sets NAME.node, .elem, .cond, .prop and .init (Kratos data of 2008)."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from kratos_lite.atomic import replacing
+from kratos_lite.atomic import all_or_none, write_whole
 from kratos_lite.errors import InputError, Problems
-from kratos_lite.io.formats.document import Data, Document, Note
-from kratos_lite.io.formats.elem.data import read_nodal_data, read_properties, use_properties
-from kratos_lite.io.formats.elem.files import ElemFiles, stem
-from kratos_lite.io.formats.elem.mesh import read_mesh
+from kratos_lite.io.formats.document import Data, Document
+from kratos_lite.io.formats.elem.reader import stem
 from kratos_lite.mesh import Block, Mesh
 
-
-def read_elem(path: str | Path) -> Document:
-    """Return a five-file set, of which a path names any file or the stem; an error names all its problems.
-
-    >>> stem = getfixture("tmp_path") / "bar"
-    >>> _ = stem.with_suffix(".node").write_text("NODES = NodesList([[1, 0, 0, 0], [2, 1, 0, 0]])")
-    >>> _ = stem.with_suffix(".elem").write_text("ELEMENTS[7] = Bar3D2N([1, 2], 0);")
-    >>> document = read_elem(stem)
-    >>> document.mesh.n_nodes, document.mesh.element_ids
-    (2, array([7]))
-    """
-    files = ElemFiles(path)
-    mesh = read_mesh(files)
-    properties = read_properties(files)
-    use_properties(files, mesh, properties)
-    nodal_data = read_nodal_data(files, mesh)
-    files.problems.raise_if_any()
-    return Document(mesh, properties, nodal_data, notes=files.notes)
+NOT_HELD = {
+    **{"constraints": "constraints", "geometries": "geometries", "tables": "tables"},
+    **{"model_data": "variables of the model", "element_data": "variables on elements"},
+    "condition_data": "variables on conditions",
+}
 
 
-def write_elem(path: str | Path, document: Document) -> list[Note]:
+def write_elem(path: str | Path, document: Document) -> list[str]:
     """Write a document as a five-file set, all files or none; return notes on what the format cannot hold.
 
     >>> document = Document(Mesh([[0, 0, 0.1]]))
@@ -64,27 +48,17 @@ def write_elem(path: str | Path, document: Document) -> list[Note]:
         ".init": [f"NODES[{n}]({name}, 0) = {value!r};" for (n, name), (value, _) in dofs.items()],
     }
     problems.raise_if_any()
-    with ExitStack() as stack:
-        # All are on the disk before the first takes its place.
+    with all_or_none():
         for ending, text in lines.items():
-            data = "".join(f"{line}\n" for line in text).encode("ascii")
-            stack.enter_context(replacing(stem(path) + ending)).write_bytes(data)
+            write_whole(stem(path) + ending, "".join(f"{line}\n" for line in text).encode("ascii"))
     return notes
 
 
-def _left_out(document: Document) -> list[Note]:
-    have = {
-        "parts": document.mesh.parts,
-        "constraints": document.constraints,
-        "geometries": document.geometries,
-        "tables": document.tables,
-        "variables of the model": document.model_data,
-        "variables on elements": document.element_data,
-        "variables on conditions": document.condition_data,
-    }
+def _left_out(document: Document) -> list[str]:
+    have = {"parts": document.mesh.parts} | {name: getattr(document, key) for key, name in NOT_HELD.items()}
     texts = [f"{len(items)} {name}" for name, items in have.items() if items]
     texts += [f"nodal {data.variable}" for data in document.nodal_data if not _is_scalar(data)]
-    return [Note(0, f"left out: {text}; a five-file set cannot hold it") for text in texts]
+    return [f"left out: {text}; a five-file set cannot hold it" for text in texts]
 
 
 def _is_scalar(data: Data) -> bool:
@@ -100,9 +74,10 @@ def _check(document: Document, problems: Problems) -> None:
             problems.add(f"{data.variable} is fixed as a whole; fix its components, e.g. {data.variable}_X")
         elif not np.isfinite(data.values).all():
             problems.add(f"some values of {data.variable} are not finite; expected finite numbers")
-    variables = [name for properties in document.properties.values() for name in properties.values]
     names = [block.name for block in [*mesh.blocks, *mesh.conditions]]
-    for name in dict.fromkeys([*names, *(data.variable for data in document.nodal_data), *variables]):
+    names += [data.variable for data in document.nodal_data]
+    names += [name for properties in document.properties.values() for name in properties.values]
+    for name in dict.fromkeys(names):
         if not re.fullmatch(r"[A-Za-z_]\w*", name, re.ASCII):
             problems.add(f"{name!r} cannot be written; expected a name of letters, digits and _")
 
@@ -123,7 +98,7 @@ def _cell_lines(mesh: Mesh, blocks: Sequence[Block], word: str) -> list[str]:
     ]
 
 
-def _property_lines(document: Document, problems: Problems, notes: list[Note]) -> Iterator[str]:
+def _property_lines(document: Document, problems: Problems, notes: list[str]) -> Iterator[str]:
     """Yield the statements; values without a number are left out, with a note."""
     written = set()
     for number, properties in document.properties.items():
@@ -132,8 +107,9 @@ def _property_lines(document: Document, problems: Problems, notes: list[Note]) -
                 written.add(number)
                 yield f"PROPERTIES[{number}][{name}] = {text};"
             else:
-                text = f"left out: {name} of properties {number}; .prop files hold numbers, not {value!r}"
-                notes.append(Note(0, text))
+                notes.append(
+                    f"left out: {name} of properties {number}; .prop files hold numbers, not {value!r}"
+                )
     used = {0, *(int(number) for block in document.mesh.blocks for number in np.unique(block.properties))}
     for number in sorted(used - written - {0}) if written else ():
         problems.add(f"properties {number} have no number to write, but elements use them; give them a value")
