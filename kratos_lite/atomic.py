@@ -6,22 +6,27 @@ import errno
 import io
 import os
 import stat
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.errors import InputError, SolveError
+from kratos_lite.typing import Numbers
 
-FULL = {errno.ENOSPC, getattr(errno, "EDQUOT", None), None}
-"""Errors of a full disk, of a user who may take no more, and of NumPy, which gives no number."""
+CURES = {
+    errno.EFBIG: "raise the limit on the size of files (ulimit -f)",
+    **dict.fromkeys((errno.ENOSPC, getattr(errno, "EDQUOT", None), None), "free some space"),
+}
+"""Cures of a file too large, of a full disk or quota, and of what NumPy raises then, without a number."""
+WAITING: ContextVar[list[tuple[Path, Path]] | None] = ContextVar("waiting", default=None)
+"""Written files, and those whose places they take together at the end of `all_or_none`."""
 
 
-def read_arrays(path: str | Path, names: Sequence[str], what: str) -> dict[str, NDArray[Any]]:
+def read_arrays(path: str | Path, names: Sequence[str], what: str) -> dict[str, Numbers]:
     """Return arrays of an .npz file by name; InputError if it is damaged or not `what` it should be."""
     try:
         with np.load(io.BytesIO(Path(path).read_bytes()), allow_pickle=False) as file:
@@ -51,26 +56,18 @@ def refuse_nan(path: str | Path, name: str, values: Any) -> None:
         )
 
 
-def write_whole(path: str | Path, data: bytes | Callable[[BinaryIO], None]) -> None:
-    """Write a file as a whole, or leave what was there before untouched.
-
-    The bytes go to a temporary file in the same folder, are forced to the disk, and only then take the
-    place of `path`.  A failure of any kind, also Ctrl-C, deletes the temporary file.
-    """
-    with replacing(path) as temporary, open(temporary, "r+b") as file:
-        if callable(data):
-            data(file)
-        else:
-            file.write(data)
-
-
-WAITING: ContextVar[list[tuple[Path, Path]] | None] = ContextVar("waiting", default=None)
-"""Written files, and those whose places they take together at the end of `all_or_none`."""
+def write_whole(path: str | Path, data: bytes) -> None:
+    """Write a file as a whole, or leave what was there before untouched."""
+    with replacing(path) as temporary:
+        temporary.write_bytes(data)
 
 
 @contextmanager
 def all_or_none() -> Iterator[None]:
     """Let all files that are written in a ``with`` statement take their places at its end, or none."""
+    if WAITING.get() is not None:  # they wait for the end of the outer statement
+        yield
+        return
     written: list[tuple[Path, Path]] = []
     token = WAITING.set(written)
     try:
@@ -91,7 +88,8 @@ def all_or_none() -> Iterator[None]:
 def replacing(path: str | Path) -> Iterator[Path]:
     """Give an empty temporary file, with the ending of `path`, that replaces `path` on success.
 
-    Use this where another library insists on a file name; otherwise use `write_whole`.
+    It is forced to the disk before it takes the place of `path`.  A failure of any kind, also Ctrl-C,
+    deletes it.
     """
     try:
         # Through a symbolic link the target is replaced, not the link.
@@ -122,13 +120,8 @@ def replacing(path: str | Path) -> Iterator[Path]:
 
 def _text(path: Path, error: OSError) -> str:
     """Say what went wrong with `path` and how to cure it."""
-    folder = path.absolute().parent
-    missing = False
-    with suppress(OSError):  # a folder that may not even be looked at is there
-        missing = not folder.is_dir()
-    if missing:
-        return f"{path}: cannot be written: there is no folder {folder}; create it or choose another path"
-    cure = "free some space" if error.errno in FULL else "choose a file name in a folder where you may write"
-    if error.errno == errno.EFBIG:
-        cure = "raise the limit on the size of files (ulimit -f)"
+    if error.errno in (errno.ENOENT, errno.ENOTDIR):
+        found = f"there is no folder {path.absolute().parent}"
+        return f"{path}: cannot be written: {found}; create it or choose another path"
+    cure = CURES.get(error.errno, "choose a file name in a folder where you may write")
     return f"{path}: cannot be written: {error.strerror or error}; {cure}"

@@ -8,9 +8,11 @@ import pytest
 from kratos_lite.atomic import all_or_none, replacing, write_whole
 from kratos_lite.errors import InputError
 
+FULL = OSError(errno.ENOSPC, "No space left on device")
+
 
 def _full(*_):
-    raise OSError(errno.ENOSPC, "No space left on device")
+    raise FULL
 
 
 @pytest.fixture
@@ -20,44 +22,29 @@ def old(tmp_path):
     return file
 
 
-def test_bytes_and_functions_replace_the_old_file(old):
-    write_whole(old, b"one")
-    assert old.read_bytes() == b"one"
-    write_whole(str(old), lambda file: file.writelines([b"t", b"wo"]))
-    assert old.read_bytes() == b"two"
-    assert list(old.parent.iterdir()) == [old]
+def half_written(path, error=None):
+    """Write half of a file, and raise an error if there is one."""
+    with replacing(path) as temporary:
+        temporary.write_bytes(b"half")
+        if error:
+            raise error
 
 
-@pytest.mark.parametrize("call", ["fsync", "replace"])
-def test_a_failing_disk_leaves_the_old_file(old, monkeypatch, call):
-    monkeypatch.setattr(os, call, _full)
+@pytest.mark.parametrize("place", ["fsync", "replace", "within"])
+def test_a_failing_disk_leaves_the_old_file(old, monkeypatch, place):
+    if place != "within":
+        monkeypatch.setattr(os, place, _full)
     with pytest.raises(InputError, match=r"result\.vtu: .*No space left.*; free some space$") as error:
-        write_whole(old, b"seven b")
-    assert isinstance(error.value.__cause__, OSError)
-    assert old.read_bytes() == b"old"
-    assert list(old.parent.iterdir()) == [old]
-
-
-def test_a_disk_that_fills_midway_leaves_the_old_file(old):
-    def write(file):
-        file.write(b"half")
-        file.flush()
-        _full()
-
-    with pytest.raises(InputError, match="free some space"):
-        write_whole(old, write)
+        half_written(old, FULL if place == "within" else None)
+    assert error.value.__cause__ is FULL
     assert old.read_bytes() == b"old"
     assert list(old.parent.iterdir()) == [old]
 
 
 @pytest.mark.parametrize("kind", [KeyboardInterrupt, ZeroDivisionError])
 def test_any_interruption_passes_through_and_leaves_the_old_file(old, kind):
-    def write(file):
-        file.write(b"half")
-        raise kind
-
     with pytest.raises(kind):
-        write_whole(old, write)
+        half_written(old, kind())
     assert old.read_bytes() == b"old"
     assert list(old.parent.iterdir()) == [old]
 
@@ -102,10 +89,9 @@ def test_a_relative_name_without_folder_is_written_here(tmp_path, monkeypatch):
     assert Path("a.txt").read_bytes() == b"here"
 
 
-def test_replacing_keeps_the_ending_that_other_writers_go_by(old):
+def test_a_file_keeps_its_ending_until_it_replaces_the_old_one(old):
     with replacing(old) as temporary:
-        assert temporary.suffix == ".vtu"
-        assert temporary.parent == old.parent
+        assert (temporary.suffix, temporary.parent) == (".vtu", old.parent)
         temporary.write_bytes(b"new")
         assert old.read_bytes() == b"old"
     assert old.read_bytes() == b"new"
@@ -114,7 +100,8 @@ def test_replacing_keeps_the_ending_that_other_writers_go_by(old):
 def test_files_of_one_run_take_their_places_together_or_not_at_all(old):
     new = old.with_name("result.json")
     with all_or_none():
-        write_whole(new, b"new")
+        with all_or_none():
+            write_whole(new, b"new")
         write_whole(old, b"one")
         assert not new.exists()
         assert old.read_bytes() == b"old"
@@ -123,7 +110,7 @@ def test_files_of_one_run_take_their_places_together_or_not_at_all(old):
     def both():
         with all_or_none():
             write_whole(new, b"later")
-            write_whole(old, lambda _: _full())
+            half_written(old, FULL)
 
     with pytest.raises(InputError, match="free some space"):
         both()

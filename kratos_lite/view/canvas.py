@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from kratos_lite.atomic import write_whole
+from kratos_lite.atomic import replacing
 from kratos_lite.errors import InputError, KratosLiteError
 from kratos_lite.registry import remembered
 from kratos_lite.typing import Array
@@ -185,7 +185,8 @@ def check_picture(path: str | Path) -> str:
 def save(figure: Any, path: str | Path) -> None:
     """Write a figure, as a whole or not at all."""
     kind = check_picture(path)
-    write_whole(path, lambda file: figure.savefig(file, format=kind))
+    with replacing(path) as temporary:
+        figure.savefig(temporary, format=kind)
 
 
 # ---- colors ----------------------------------------------------------------------------------------

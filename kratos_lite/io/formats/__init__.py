@@ -51,37 +51,34 @@ def read_document(path: str | Path, *, strict: bool = True) -> Document:
 
     `strict` refuses `.mdpa` rows that do not stand on lines of their own.
     """
-    with naming(str(path)):
-        return _read(Path(path), strict)
-
-
-def _read(path: Path, strict: bool) -> Document:
-    """Return what a model file says, by its ending."""
+    path = Path(path)
     kind = ending(path)
-    if path.exists() and not path.is_file() and not path.is_dir():
-        raise InputError(f"{path}: is a pipe or a device; name an ordinary file")
-    if kind == ".mdpa":
-        from kratos_lite.io.formats.mdpa.reader import read_mdpa
-
-        if not path.exists():
+    with naming(str(path)):
+        if path.exists() and not path.is_file() and not path.is_dir():
+            raise InputError(f"{path}: is a pipe or a device; name an ordinary file")
+        if not path.is_file() and (kind == ".mdpa" or path.is_dir()):
             _refuse_part_files(path)
-        return read_mdpa(path, strict=strict)
-    if kind in ELEM_SET or (not path.is_file() and _is_stem(path)):
-        from kratos_lite.io.formats.elem import read_elem
+        if kind == ".mdpa":
+            from kratos_lite.io.formats.mdpa.reader import read_mdpa
 
-        return read_elem(path)
-    if not path.exists():
-        raise InputError(f"{path}: there is no such file")
-    if path.is_dir():
-        _refuse_part_files(path)
-        raise InputError(f"{path}: is a folder without {PROJECT}; name a file in it")
-    from kratos_lite.io.formats.gmsh import GEOMETRY, meshing
+            return read_mdpa(path, strict=strict)
+        if kind in ELEM_SET or (not path.is_file() and _is_stem(path)):
+            from kratos_lite.io.formats.elem import read_elem
 
-    if kind in GEOMETRY:
-        raise InputError(f"{path}: is a geometry, not a mesh; mesh it with {meshing(path)} and give the .msh")
-    from kratos_lite.io.formats.meshio import read_meshio
+            return read_elem(path)
+        if not path.exists():
+            raise InputError(f"{path}: there is no such file")
+        if path.is_dir():
+            raise InputError(f"{path}: is a folder without {PROJECT}; name a file in it")
+        from kratos_lite.io.formats.gmsh import GEOMETRY, meshing
 
-    return read_meshio(path)
+        if kind in GEOMETRY:
+            raise InputError(
+                f"{path}: is a geometry, not a mesh; mesh it with {meshing(path)} and give the .msh"
+            )
+        from kratos_lite.io.formats.meshio import read_meshio
+
+        return read_meshio(path)
 
 
 def _refuse_part_files(path: Path) -> None:
@@ -97,35 +94,32 @@ def _refuse_part_files(path: Path) -> None:
 
 def write_document(path: str | Path, document: Document) -> list[str]:
     """Write a document by the ending of `path`; return notes on what the format cannot hold."""
-    with naming(str(path)):
-        return _write(path, document)
-
-
-def _write(path: str | Path, document: Document) -> list[str]:
-    """Write a document by the ending of `path`."""
     kind = ending(path)
-    if kind == ".mdpa":
-        from kratos_lite.io.formats.mdpa.writer import write_mdpa
+    with naming(str(path)):
+        if kind == ".mdpa":
+            from kratos_lite.io.formats.mdpa.writer import write_mdpa
 
-        return [str(note) for note in write_mdpa(path, document)] + _mixed(document)
-    if kind in ELEM_SET:
-        from kratos_lite.io.formats.elem import write_elem
+            return [*map(str, write_mdpa(path, document)), *_mixed(document)]
+        if kind in ELEM_SET:
+            from kratos_lite.io.formats.elem import write_elem
 
-        return [str(note) for note in write_elem(path, document)]
-    if kind in ("", ".json"):
-        raise InputError(f"{path}: a model cannot be written as {kind or 'a file without ending'}; try .mdpa")
-    from kratos_lite.mesh.vtk import mesh_fields
+            return write_elem(path, document)
+        if kind in ("", ".json"):
+            raise InputError(
+                f"{path}: a model cannot be written as {kind or 'a file without ending'}; try .mdpa"
+            )
+        from kratos_lite.mesh.vtk import mesh_fields
 
-    points, cells = mesh_fields(document.mesh)
-    if kind == ".vtu":
-        from kratos_lite.io.formats.vtu import write_vtu
+        points, cells = mesh_fields(document.mesh)
+        if kind == ".vtu":
+            from kratos_lite.io.formats.vtu import write_vtu
 
-        write_vtu(path, document.mesh, points, cells)
-    else:
-        from kratos_lite.io.formats.meshio import write_meshio
+            write_vtu(path, document.mesh, points, cells)
+        else:
+            from kratos_lite.io.formats.meshio import write_meshio
 
-        write_meshio(path, document.mesh, points, cells)
-    return _left_out(kind, document)
+            write_meshio(path, document.mesh, points, cells)
+        return _left_out(kind, document)
 
 
 def _mixed(document: Document) -> list[str]:

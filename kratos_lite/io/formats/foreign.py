@@ -4,67 +4,40 @@ from __future__ import annotations
 
 import io
 import re
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.errors import InputError
+from kratos_lite.typing import Numbers
 
-OURS = {".mdpa", ".svg", ".ele", ".node", ".xml"}
+NOT_BY_MESHIO = {".mdpa", ".svg", ".ele", ".node", ".xml"}
 """Endings left to others: read by ourselves, pictures, or spread over several files."""
 
-Numbers = NDArray[Any]
 
+def read_foreign(path: Path) -> tuple[Any, str]:
+    """Return the mesh that meshio finds in a file, and what meshio says; data that are not numeric are None.
 
-@dataclass
-class Cells:
-    """Cells of one type of meshio: rows (m, k) of the points; (m, 0) where their number of nodes differs."""
-
-    type: str
-    dim: int
-    data: Numbers
-
-
-@dataclass
-class Found:
-    """What meshio finds in a file; non-numeric data are None.  `output` is what meshio says."""
-
-    points: Numbers
-    cells: list[Cells]
-    point_data: dict[str, Any] = field(default_factory=dict)
-    cell_data: dict[str, Any] = field(default_factory=dict)
-    field_data: dict[str, Any] = field(default_factory=dict)
-    point_sets: dict[str, Any] = field(default_factory=dict)
-    cell_sets: dict[str, Any] = field(default_factory=dict)
-    output: str = ""
-
-
-FIELDS = ("point_data", "cell_data", "field_data", "point_sets", "cell_sets")
-
-
-def read_foreign(path: Path) -> Found:
-    """Return what meshio finds in a file; InputError if it cannot be read."""
-    try:
-        with guarded(path, "read") as (meshio, output):
-            check_ending(path)
-            _check_end(path)
-            mesh = meshio.read(path)
-            cells = [Cells(one.type, int(one.dim), _rows(one.data)) for one in mesh.cells]
-            sets = {name: _numbers(getattr(mesh, name)) for name in FIELDS}
-            points = _numbers(mesh.points)
-    except MemoryError:
-        cure = "is it complete, and are its counts right? Else convert it on a machine with more memory"
-        raise InputError(f"{path}: meshio needs more memory than there is; {cure}") from None
-    counts = [len(one.data) for one in cells]
-    for name, values in sets["cell_data"].items():
-        if not isinstance(values, list) or [-1 if v is None else len(v) for v in values] != counts:
-            sets["cell_data"][name] = []  # not numeric: its name is all that is of use
-    return Found(points, cells, **sets, output=output.getvalue())
+    Cells are tables of rows of points (m, k), or (m, 0) where their number of nodes differs.
+    """
+    with guarded(path, "read") as (meshio, output):
+        check_ending(path)
+        _check_end(path)
+        mesh = meshio.read(path)
+        mesh.points = _numbers(mesh.points)
+        for cells in mesh.cells:
+            cells.data = _rows(cells.data)
+        for name in ("point_data", "cell_data", "field_data", "point_sets", "cell_sets"):
+            setattr(mesh, name, _numbers(getattr(mesh, name)))
+        counts = [len(cells.data) for cells in mesh.cells]
+        for name, values in mesh.cell_data.items():
+            if not isinstance(values, list) or [-1 if v is None else len(v) for v in values] != counts:
+                mesh.cell_data[name] = []  # not numeric: its name is all that is of use
+    return mesh, output.getvalue()
 
 
 def _check_end(path: Path) -> None:
@@ -77,15 +50,13 @@ def _check_end(path: Path) -> None:
 
 def _rows(data: Any) -> Numbers:
     """Return the nodes of cells; only their number where they are no table of whole numbers."""
-    try:
-        rows = np.asarray(data)
-    except ValueError:
-        rows = np.zeros(0)
-    return rows if rows.dtype.kind in "iu" and rows.ndim == 2 else np.zeros((len(data), 0), dtype=np.int64)
+    rows = _numbers(data)
+    is_table = isinstance(rows, np.ndarray) and rows.dtype.kind in "iu" and rows.ndim == 2
+    return rows if is_table else np.zeros((len(data), 0), dtype=np.int64)
 
 
 def _numbers(value: Any) -> Any:
-    """Return a value with its arrays in the byte order of this machine; None where it is not numeric."""
+    """Return numbers as arrays, also in dictionaries and lists; None for what is not numeric."""
     if isinstance(value, dict):
         return {str(name): _numbers(one) for name, one in value.items()}
     if isinstance(value, list) and any(one is None or isinstance(one, np.ndarray) for one in value):
@@ -94,18 +65,29 @@ def _numbers(value: Any) -> Any:
         array = np.asarray(value)
     except ValueError:
         return None
-    if value is None or array.dtype.kind not in "biuf":
-        return None
-    return array.astype(array.dtype.newbyteorder("="), copy=False)
+    return array if array.dtype.kind in "biuf" else None
 
 
 def check_ending(path: Path, own: str = ".mdpa .elem") -> None:
     """Refuse an ending that meshio does not know, where meshio would end the program."""
     import meshio
 
-    endings = sorted(set(meshio.extension_to_filetypes) - OURS)
+    endings = sorted(set(meshio.extension_to_filetypes) - NOT_BY_MESHIO)
     if not path.name.lower().endswith(tuple(endings)):
         raise InputError(f"{path}: unknown ending {path.suffix!r}; known are {own} {' '.join(endings)}")
+
+
+def cell_counts(mesh: Any) -> Counter[str]:
+    """Return the number of cells of each type."""
+    counts: Counter[str] = Counter()
+    for cells in mesh.cells:
+        counts[cells.type] += len(cells.data)
+    return counts
+
+
+def listed(counts: Counter[str]) -> str:
+    """Return numbers of cells as text."""
+    return ", ".join(f"{count} {kind}" for kind, count in counts.items() if count) or "no cells"
 
 
 @contextmanager
@@ -122,12 +104,15 @@ def guarded(path: Path, done: str) -> Iterator[tuple[Any, io.StringIO]]:
             yield meshio, output
     except ImportError as error:
         raise InputError(f"{path}: {error}; this format needs it: pip install {error.name}") from error
-    except (InputError, MemoryError):
+    except InputError:
         raise
-    except OSError as error:
+    except (OSError, MemoryError) as error:
         if done == "written":
-            raise  # the disk, not the format
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
+            raise  # the disk or the machine, not the format
+        if isinstance(error, OSError):
+            raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
+        cure = "is it complete, and are its counts right? Else convert it on a machine with more memory"
+        raise InputError(f"{path}: meshio needs more memory than there is; {cure}") from None
     except (Exception, SystemExit) as error:
         last = "" if isinstance(error, SystemExit) else repr(error)
         reason = " ".join(f"{output.getvalue()} {listing.getvalue()} {last}".split())

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from kratos_lite.errors import InputError
-from kratos_lite.io.formats.foreign import Found
+from kratos_lite.io.formats.foreign import cell_counts, listed
 
 GEOMETRY = (".geo", ".step", ".stp", ".brep", ".iges", ".igs")
 """Endings of geometries, which Gmsh meshes."""
@@ -26,22 +28,17 @@ def meshing(path: Path, *more: str) -> str:
     return f"'{' '.join(words)}'"
 
 
-def check_solids(path: Path, found: Found, known: frozenset[str]) -> None:
+def check_solids(path: Path, found: Any, known: Collection[str]) -> None:
     """Raise InputError, with the cure, for a mesh without solids, or with solids that no element has."""
-    counts = {(cells.type, cells.dim): 0 for cells in found.cells}
-    for cells in found.cells:
-        counts[cells.type, cells.dim] += len(cells.data)
-    of_gmsh = path.suffix.lower() == ".msh"
-    unknown = [(kind, count) for (kind, dim), count in counts.items() if dim == 3 and kind not in known]
-    for kind, count in unknown:
-        if count:
-            cure = _of_known_order(path, kind) if of_gmsh else "save linear or quadratic ones"
-            raise InputError(f"{path}: there are no elements for {count} cells {kind!r}; {cure}")
-    if not any(count for (_, dim), count in counts.items() if dim == 3):
-        held = ", ".join(f"{count} {kind}" for (kind, _), count in counts.items() if count) or "no cells"
+    counts, of_gmsh = cell_counts(found), path.suffix.lower() == ".msh"
+    solids = {cells.type for cells in found.cells if cells.dim == 3 and len(cells.data)}
+    for kind in sorted(solids - set(known)):
+        cure = _of_known_order(path, kind) if of_gmsh else "save linear or quadratic ones"
+        raise InputError(f"{path}: there are no elements for {counts[kind]} cells {kind!r}; {cure}")
+    if not solids:
         text = "there are no solid cells (tetrahedra, pyramids, wedges, hexahedra)"
         cure = _of_volumes(path, found) if of_gmsh else "mesh the volume, too, such as with Gmsh"
-        raise InputError(f"{path}: {text}, but {held}; {cure}")
+        raise InputError(f"{path}: {text}, but {listed(counts)}; {cure}")
 
 
 def _of_known_order(path: Path, kind: str) -> str:
@@ -53,7 +50,7 @@ def _of_known_order(path: Path, kind: str) -> str:
     return f"set Mesh.ElementOrder = 2; in the .geo file, or mesh with {meshing(path)}"
 
 
-def _of_volumes(path: Path, found: Found) -> str:
+def _of_volumes(path: Path, found: Any) -> str:
     """Return how to have Gmsh save volumes; once there are physical groups, it saves nothing else."""
     dims = [np.ravel(named)[-1] for named in found.field_data.values() if np.size(named) == 2]
     grouped = dims or any(np.any(tags) for tags in found.cell_data.get("gmsh:physical", []))

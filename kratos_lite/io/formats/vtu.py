@@ -5,15 +5,16 @@ Source of the format and of the node orders: VTK User's Guide, "VTK File Formats
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from html import escape
 from itertools import accumulate
 from pathlib import Path
-from typing import BinaryIO, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
 from kratos_lite import voigt
-from kratos_lite.atomic import refuse_nan, write_whole
+from kratos_lite.atomic import refuse_nan, replacing, write_whole
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh
 from kratos_lite.mesh.vtk import vtk_cells, with_shape
@@ -55,25 +56,14 @@ def write_vtu(
     """
     if Path(path).suffix.lower() == ".gz":
         raise InputError(f"{path}: ParaView reads no gzipped file; write it as .vtu")
-    write_whole(path, writer_of(path, mesh, point_data or {}, cell_data or {}, mode))
-
-
-def writer_of(
-    path: str | Path,
-    mesh: Mesh,
-    point_data: Mapping[str, Numbers],
-    cell_data: Mapping[str, Numbers],
-    mode: str = "binary",
-) -> Callable[[BinaryIO], None]:
-    """Return what writes a `.vtu` file, opened by the caller; the arguments and errors of `write_vtu`."""
     check_mode(mode)
     blocks, keep = with_shape(mesh)
-    cells = [(name, array[keep]) for name, array in checked(cell_data, mesh.n_elements, "element")]
-    refuse_nan(path, "a coordinate", mesh.points)
-    for name, values in (*point_data.items(), *cells):
+    nodal = checked(point_data or {}, mesh.n_nodes, "node")
+    cells = [(name, array[keep]) for name, array in checked(cell_data or {}, mesh.n_elements, "element")]
+    for name, values in (("a coordinate", mesh.points), *nodal, *cells):
         refuse_nan(path, name, values)
     groups = {
-        "PointData": checked(point_data, mesh.n_nodes, "node"),
+        "PointData": nodal,
         "CellData": cells,
         "Points": [("Points", mesh.points.astype("<f8", copy=False))],
         "Cells": list(zip(CELLS, vtk_cells(blocks, mesh.n_nodes), strict=True)),
@@ -87,15 +77,11 @@ def writer_of(
     appended = ' format="appended" offset="{}"/>'
     places = (_text(array) if mode == "ascii" else appended.format(next(offsets)) for array in arrays)
     head = _header(groups, mesh.n_nodes, sum(map(len, blocks)), mode, places)
-    tail = "</VTKFile>\n" if mode == "ascii" else "\n</AppendedData>\n</VTKFile>\n"
-
-    def write(file: BinaryIO) -> None:
+    with replacing(path) as temporary, open(temporary, "r+b") as file:
         file.write(head.encode())
         for pieces in reversed(stored):
             file.writelines(pieces)
-        file.write(tail.encode())
-
-    return write
+        file.write(b"</VTKFile>\n" if mode == "ascii" else b"\n</AppendedData>\n</VTKFile>\n")
 
 
 def check_mode(mode: str) -> None:
@@ -137,9 +123,7 @@ def write_pvd(path: str | Path, steps: Iterable[tuple[float, str]]) -> None:
 
     >>> write_pvd(getfixture("tmp_path") / "swing.pvd", [(0.0, "swing_0.vtu"), (0.1, "swing_1.vtu")])
     """
-    sets = [
-        f'<DataSet timestep="{float(time)!r}" part="0" file="{escaped(name)}"/>\n' for time, name in steps
-    ]
+    sets = [f'<DataSet timestep="{float(t)!r}" part="0" file="{escape(name)}"/>\n' for t, name in steps]
     text = HEAD.format("Collection") + f"<Collection>\n{''.join(sets)}</Collection>\n</VTKFile>\n"
     write_whole(path, text.encode())
 
@@ -176,17 +160,10 @@ def _header(groups: dict[str, Named], n_points: int, n_cells: int, mode: str, pl
 
 def described(name: str, array: Numbers) -> str:
     """Return type, name and, for more than one number per row, the components as XML attributes."""
-    text = f'type="{_TYPES[array.dtype.str]}" Name="{escaped(name)}"'
+    text = f'type="{_TYPES[array.dtype.str]}" Name="{escape(name)}"'
     if array.ndim > 1:
         count = int(np.prod(array.shape[1:]))
         text += f' NumberOfComponents="{count}"'
         names = _COMPONENTS.get(count, ()) if name != "Points" else ()
         text += "".join(f' ComponentName{i}="{part}"' for i, part in enumerate(names))
     return text
-
-
-def escaped(name: str) -> str:
-    """Return a name as the value of an XML attribute."""
-    for sign, word in (("&", "&amp;"), ("<", "&lt;"), (">", "&gt;"), ('"', "&quot;")):
-        name = name.replace(sign, word)
-    return name

@@ -6,7 +6,7 @@ Source of the format: VTK User's Guide, "VTK File Formats", parallel file format
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import ExitStack
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,10 +14,10 @@ import numpy as np
 
 from kratos_lite.analysis.fields import fields
 from kratos_lite.analysis.part_analysis import PartResult
-from kratos_lite.atomic import replacing
+from kratos_lite.atomic import all_or_none, write_whole
 from kratos_lite.distributed.communicator import ALONE, Alone
 from kratos_lite.distributed.partition import Partition
-from kratos_lite.io.formats.vtu import HEAD, checked, described, escaped, writer_of
+from kratos_lite.io.formats.vtu import HEAD, checked, described, write_vtu
 from kratos_lite.typing import Numbers
 
 if TYPE_CHECKING:
@@ -39,15 +39,11 @@ def write_pieces(path: str | Path, result: Result, mode: str = "binary") -> None
         points |= {name: parts.average(np.asarray(values)) for name, values in smooth.items()}
         points["PARTITION_INDEX"] = parts.owner
     data = points, cells
-    with ExitStack() as files:  # all are written before one takes its place
-        with parts.agree_on_errors():
-            if parts.rank == 0:
-                names = [piece_of(path, number).name for number in range(parts.size)]
-                files.enter_context(replacing(path)).write_text(_index(data, names), encoding="utf-8")
-            piece = piece_of(path, parts.rank)
-            write = writer_of(piece, result.mesh, *data, mode)
-            with open(files.enter_context(replacing(piece)), "r+b") as file:
-                write(file)
+    with all_or_none(), parts.agree_on_errors():
+        if parts.rank == 0:
+            names = [piece_of(path, number).name for number in range(parts.size)]
+            write_whole(path, _index(data, names).encode())
+        write_vtu(piece_of(path, parts.rank), result.mesh, *data, mode)
 
 
 def piece_of(path: str | Path, number: int) -> Path:
@@ -70,5 +66,5 @@ def _index(data: Fields, pieces: list[str]) -> str:
     for kind, arrays in groups.items():
         members = "".join(f"<PDataArray {described(name, array)}/>\n" for name, array in arrays)
         text += f"<{kind}>\n{members}</{kind}>\n"
-    text += "".join(f'<Piece Source="{escaped(name)}"/>\n' for name in pieces)
+    text += "".join(f'<Piece Source="{escape(name)}"/>\n' for name in pieces)
     return text + "</PUnstructuredGrid>\n</VTKFile>\n"

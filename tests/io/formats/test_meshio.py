@@ -53,7 +53,7 @@ def test_other_formats_keep_the_node_order(tmp_path, ending, names):
         mesh = mesh.replace(
             points=mesh.points.round(3)
         )  # meshio writes no long negative numbers to Nastran files
-        write_meshio(path, mesh)
+        write_meshio(path, mesh, {}, {})
         found = read_meshio(path).mesh
         np.testing.assert_allclose(found.points[found.blocks[0].nodes[0]], mesh.points, rtol=1e-6, atol=1e-12)
 
@@ -305,7 +305,7 @@ def test_mixed_cells_keep_their_properties_in_gmsh_files(tmp_path):
 def test_a_format_that_needs_another_package_says_which(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "h5py", None)
     with pytest.raises(InputError, match="this format needs it: pip install h5py"):
-        write_meshio(tmp_path / "a.med", one("Tetrahedron4"))
+        write_meshio(tmp_path / "a.med", one("Tetrahedron4"), {}, {})
 
 
 def test_a_full_disk_is_reported_as_such(tmp_path, monkeypatch):
@@ -314,7 +314,7 @@ def test_a_full_disk_is_reported_as_such(tmp_path, monkeypatch):
 
     monkeypatch.setattr(meshio, "write", full)
     with pytest.raises(InputError, match=r"a\.vtk: cannot be written: No space left"):
-        write_meshio(tmp_path / "a.vtk", one("Tetrahedron4"))
+        write_meshio(tmp_path / "a.vtk", one("Tetrahedron4"), {}, {})
     assert list(tmp_path.iterdir()) == []
 
 
@@ -352,7 +352,7 @@ def test_elements_listed_twice_in_a_gmsh_file_are_refused(tmp_path):
 @pytest.mark.parametrize("ending", ["gz", "GZ"])
 def test_no_gzipped_vtu_is_written(tmp_path, ending):
     with pytest.raises(InputError, match=r"write it as \.vtu"):
-        write_vtu(tmp_path / f"a.vtu.{ending}", one("Tetrahedron4"))
+        write_vtu(tmp_path / f"a.vtu.{ending}", one("Tetrahedron4"), {}, {})
     assert list(tmp_path.iterdir()) == []
 
 
