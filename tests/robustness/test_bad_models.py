@@ -2,28 +2,17 @@
 
 import numpy as np
 import pytest
-from meshes import changed_at, joined, with_block
+from meshes import changed_at, joined, named, with_block
 
 import kratos_lite as kl
 
 STEEL = kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0)
+SOLVERS = ("dense", "direct", "amg")
 KINDS = [4, 5, 6, 8, 10, 13, 15, 20, 27]
 
 
-def kind(n):
-    return f"KinematicLinear3D{n}N"
-
-
-def block(nodes, n=8):
-    nodes = np.asarray(nodes, dtype=np.int32)
-    m = len(nodes)
-    return kl.Block(
-        kind(n), nodes, np.arange(1, m + 1), np.ones(m, dtype=np.int64), kl.ELEMENTS[kind(n)].shape
-    )
-
-
-def model_of(mesh, *, rollers=False):
-    model = kl.Model(mesh, STEEL)
+def model_of(mesh, material=STEEL, *, rollers=False):
+    model = kl.Model(mesh, material)
     model.add(kl.Gravity((0, 0, -9.81)))
     if rollers:
         for side in ("x-", "x+", "y-", "y+", "z-"):
@@ -33,25 +22,19 @@ def model_of(mesh, *, rollers=False):
     return model
 
 
-def changed(nodes, columns, n=2):
-    """Return a cube whose first element has some of its nodes in another order."""
-    mesh = kl.box(cells=(n, n, n), element=kind(nodes))
-    rows = mesh.blocks[0].nodes
-    return with_block(mesh, nodes=changed_at(rows, (0, list(range(len(columns)))), rows[0, list(columns)]))
-
-
 @pytest.mark.parametrize("nodes", KINDS)
 def test_two_swapped_nodes_are_named(nodes):
-    mesh = changed(nodes, (0, 2, 1))
-    with pytest.raises(
-        kl.MeshError, match=rf"element 1 \({kind(nodes)}\): det J = -\S+ at .* must be > 0; nodes "
-    ):
+    mesh = kl.box(cells=(2, 2, 2), element=named(nodes))
+    rows = mesh.blocks[0].nodes
+    mesh = with_block(mesh, nodes=changed_at(rows, (0, [1, 2]), rows[0, [2, 1]]))
+    text = rf"element 1 \({named(nodes)}\): det J = -\S+ at .* must be > 0; nodes "
+    with pytest.raises(kl.MeshError, match=text):
         model_of(mesh).solve()
 
 
 @pytest.mark.parametrize("nodes", [4, 10])
 def test_a_mirrored_tetrahedron_is_called_inverted(nodes):
-    mesh = kl.box(element=kind(nodes))
+    mesh = kl.box(element=named(nodes))
     mesh = mesh.replace(points=mesh.points * [-1, 1, 1])
     with pytest.raises(kl.MeshError, match=r"inverted; mesh\.reoriented\(\) corrects") as caught:
         model_of(mesh).solve()
@@ -66,43 +49,31 @@ def test_many_inverted_elements_are_listed_up_to_twenty_and_counted():
     assert len(str(caught.value).splitlines()) == 21
 
 
-def test_slightly_folded_bricks_are_solved_with_a_warning():
-    mesh = kl.box()
-    corner = mesh.nodes(lambda X: X.sum(axis=1) == 3)
-    mesh = mesh.replace(points=changed_at(mesh.points, corner, (0.65, 0.65, 0.65)))
-    warnings = model_of(mesh).solve().report.warnings
-    assert any("1 elements have det J slightly < 0 at a node" in text for text in warnings)
-
-
-def test_quarter_point_nodes_are_accepted_and_noted():
-    mesh = kl.box(element=kind(20))
-    edge = mesh.nodes(lambda X: X[:, 0] == 0.5)
-    mesh = mesh.replace(points=changed_at(mesh.points, (edge, 0), 0.25))
-    warnings = model_of(mesh).solve().report.warnings
-    assert "1 elements have det J = 0 at a corner node (singular corner)" in warnings
-
-
-@pytest.mark.parametrize("solver", ["dense", "direct", "amg"])
-def test_a_body_without_supports_names_all_six_motions(solver):
-    model = kl.Model(kl.box(cells=(2, 2, 2)), STEEL)
+def hanging(model):
     model.add(kl.Gravity((0, 0, -9.81)))
-    text = r"the body \(27 nodes\) can still move: translation x, y, z; rotation about x, y, z"
-    with pytest.raises(kl.ModelError, match=text):
-        model.solve(solver)
 
 
-def test_rollers_at_the_bottom_alone_leave_three_motions():
-    model = kl.Model(kl.box(cells=(2, 2, 2)), STEEL)
+def bottom(model):
     model.fix("z-", "z")
-    with pytest.raises(kl.ModelError, match="can still move: translation x, y; rotation about z"):
-        model.solve()
 
 
-def test_a_line_of_supports_leaves_the_rotation_about_it():
-    model = kl.Model(kl.box(), STEEL)
+def line(model):
     model.fix(lambda X: (X[:, 0] == 0) & (X[:, 2] == 0))
-    with pytest.raises(kl.ModelError, match=r"can still move: rotation about y\. Fix more"):
-        model.solve()
+
+
+@pytest.mark.parametrize(
+    ("support", "solver", "motions"),
+    [
+        *((hanging, solver, "translation x, y, z; rotation about x, y, z") for solver in SOLVERS),
+        (bottom, "auto", "translation x, y; rotation about z"),
+        (line, "auto", r"rotation about y\. Fix more"),
+    ],
+)
+def test_motions_that_are_left_are_named(support, solver, motions):
+    model = kl.Model(kl.box(cells=(2, 2, 2)), STEEL)
+    support(model)
+    with pytest.raises(kl.ModelError, match=f"can still move: {motions}"):
+        model.solve(solver)
 
 
 def test_half_of_a_body_that_floats_is_named_and_coincident_nodes_are_counted():
@@ -117,7 +88,7 @@ def test_half_of_a_body_that_floats_is_named_and_coincident_nodes_are_counted():
     assert any("4 pairs of nodes coincide" in text for text in model.solve().report.warnings)
 
 
-@pytest.mark.parametrize("solver", ["dense", "direct", "amg"])
+@pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize(
     ("shift", "words"),
     [((1, 0, 1), "rotation about y"), ((1, 1, 1), "rotation about x, y, z")],
@@ -137,8 +108,7 @@ def test_bodies_that_hang_together_by_an_edge_or_a_corner_can_turn_there(solver,
 def test_three_bricks_in_a_closed_ring_of_edges_and_faces_are_one_body():
     """Bricks 1 and 3 share an edge only, but brick 2 holds both by faces."""
     mesh = kl.box(cells=(2, 1, 2))
-    kept = kl.Mesh(mesh.points, [block(mesh.blocks[0].nodes[:3])])
-    model = kl.Model(kept, STEEL)
+    model = kl.Model(kl.Mesh(mesh.points, {named(8): mesh.blocks[0].nodes[:3]}), STEEL)
     model.fix("x-")
     model.add(kl.Gravity((0, 0, -9.81)))
     assert np.abs(model.solve().u).max() < 1e-2
@@ -163,62 +133,120 @@ def test_a_needle_held_at_one_end_is_held():
     assert long == pytest.approx(short.solve().displacement("x+")[:, 0].mean() / 1e2, rel=1e-4)
 
 
+ISOTROPIC = {"E": 1.0, "nu": 0.3}
+ORTHOTROPIC = dict.fromkeys(("E_x", "E_y", "E_z", "G_xy", "G_yz", "G_xz"), 1)
+ORTHOTROPIC |= dict.fromkeys(("nu_xy", "nu_yz", "nu_xz"), 0)
+
+
 @pytest.mark.parametrize(
     ("constants", "text"),
     [
         ({"E": 0.0}, r"E \(YOUNG_MODULUS\) 0 must be > 0 Pa"),
-        ({"E": -1.0}, r"E \(YOUNG_MODULUS\) -1 must be > 0 Pa"),
         ({"E": np.nan}, r"E \(YOUNG_MODULUS\) must be finite; got nan"),
-        ({"E": np.inf}, r"E \(YOUNG_MODULUS\) must be finite; got inf"),
         ({"E": 10**400}, r"E \(YOUNG_MODULUS\) must be finite"),
         ({"E": "steel"}, r"E \(YOUNG_MODULUS\) must be a number; got 'steel'"),
         ({"E": True}, r"E \(YOUNG_MODULUS\) must be a number; got True"),
         ({"nu": 0.5}, r"nu \(POISSON_RATIO\) 0.5 must be < 0.5"),
-        ({"nu": 0.7}, r"nu \(POISSON_RATIO\) 0.7 must be < 0.5"),
         ({"nu": -1.0}, r"nu \(POISSON_RATIO\) -1 must be > -1"),
         ({"density": -1.0}, r"density \(DENSITY\) -1 must be ≥ 0"),
-    ],
-)
-def test_impossible_material_constants_are_refused(constants, text):
-    with pytest.raises(kl.MaterialError, match=text):
-        kl.Isotropic3D(**{"E": 1.0, "nu": 0.3, **constants})
-
-
-@pytest.mark.parametrize(
-    ("constants", "text"),
-    [
         ({"nu_xy": 1.1}, r"nu_xy² = 1.21 must be < E_x / E_y = 1"),
         ({"nu_xy": 0.9, "nu_yz": 0.9, "nu_xz": 0.9}, "the three Poisson ratios together are too large"),
         ({"G_yz": 0}, r"G_yz \(SHEAR_MODULUS_YZ\) 0 must be > 0 Pa"),
     ],
 )
-def test_impossible_orthotropic_constants_are_refused(constants, text):
-    good = dict.fromkeys(("E_x", "E_y", "E_z", "G_xy", "G_yz", "G_xz"), 1)
+def test_impossible_material_constants_are_refused(constants, text):
+    is_plain = constants.keys() <= {"E", "nu", "density"}
+    law, good = (kl.Isotropic3D, ISOTROPIC) if is_plain else (kl.Orthotropic3D, ORTHOTROPIC)
     with pytest.raises(kl.MaterialError, match=text):
-        kl.Orthotropic3D(**{**good, **dict.fromkeys(("nu_xy", "nu_yz", "nu_xz"), 0), **constants})
+        law(**{**good, **constants})
 
 
-def test_nearly_incompressible_bricks_warn_that_they_lock():
-    model = model_of(kl.box(element="KinematicLinear3D8N"))
-    model.assign(kl.Isotropic3D(E=1e6, nu=0.4999, density=1.0))
-    assert any("KinematicLinear3D8N may lock" in text for text in model.solve().report.warnings)
-    tets = model_of(kl.box(element=kind(10)))
-    tets.assign(kl.Isotropic3D(E=1e6, nu=0.4999, density=1.0))
-    assert tets.solve().report.warnings == []
+SOFT = kl.Isotropic3D(E=1e6, nu=0.4999, density=1.0)
+BRICK = kl.box(element=named(8))
 
 
-def test_broken_coordinates_and_node_lists_are_named():
-    mesh = kl.box(element="KinematicLinear3D8N")
-    nodes = mesh.blocks[0].nodes
-    with pytest.raises(kl.MeshError, match=r"points must be finite; got nan at \[3, 1\]"):
-        mesh.replace(points=changed_at(mesh.points, (3, 1), np.nan))
-    twice = with_block(mesh, nodes=changed_at(nodes, (0, 1), nodes[0, 0]))
-    with pytest.raises(kl.MeshError, match=r"element 1 \(KinematicLinear3D8N\) uses node 1 more than once"):
-        model_of(twice).solve()
-    with pytest.raises(kl.MeshError, match=r"element 1 .* uses node indices \[.*\]; indices are 0 … 7"):
-        with_block(mesh, nodes=changed_at(nodes, (0, 6), 8))
-    with pytest.raises(kl.MeshError, match="nodes are indices of points, from 0; got -1"):
-        with_block(mesh, nodes=changed_at(nodes, (0, 6), -1))
+def folded():
+    mesh = kl.box()
+    corner = mesh.nodes(lambda X: X.sum(axis=1) == 3)
+    return model_of(mesh.replace(points=changed_at(mesh.points, corner, (0.65, 0.65, 0.65))))
+
+
+def with_quarter_points():
+    mesh = kl.box(element=named(20))
+    edge = mesh.nodes(lambda X: X[:, 0] == 0.5)
+    return model_of(mesh.replace(points=changed_at(mesh.points, (edge, 0), 0.25)))
+
+
+def without_mass():
+    light = kl.Model(kl.box(), kl.Isotropic3D(E=1.0, nu=0.0))
+    light.fix("z-")
+    light.add(kl.Gravity((0, 0, -9.81)))
+    return light
+
+
+def loaded_where_fixed():
+    model = kl.Model(kl.box(), STEEL)
+    model.fix("z-")
+    model.add(kl.PointLoad("z-", (0, 0, 1.0), each=True))
+    return model
+
+
+def stacked(element):
+    """Return a brick under a cell of another kind."""
+    return model_of(joined(kl.box(), kl.box(element=element, origin=(0, 0, 1)), welded=True))
+
+
+@pytest.mark.parametrize(
+    ("made", "text"),
+    [
+        (folded, "1 elements have det J slightly < 0 at a node"),
+        (with_quarter_points, "1 elements have det J = 0 at a corner node (singular corner)"),
+        (lambda: model_of(BRICK, SOFT), "KinematicLinear3D8N may lock"),
+        (
+            lambda: model_of(
+                kl.Mesh(BRICK.points, {named(8): [BRICK.blocks[0].nodes[0]] * 2}, parts=BRICK.parts)
+            ),
+            "1 elements have the same nodes as another (1 and 2): both count",
+        ),
+        (lambda: stacked(named(20)), "share the corners of a face but not its further nodes"),
+        (lambda: stacked(named(4)), "1 four-sided faces (the first of element 1) meet triangles"),
+        (without_mass, "gravity acts on no mass: every material has density 0; give density in kg/m³"),
+        (loaded_where_fixed, "all loads act on fixed components, so nothing moves"),
+    ],
+)
+def test_what_is_odd_is_solved_with_a_warning(made, text):
+    assert any(text in warning for warning in made().solve().report.warnings)
+
+
+def test_quadratic_tetrahedra_do_not_lock():
+    assert model_of(kl.box(element=named(10)), SOFT).solve().report.warnings == []
+
+
+NODES = kl.box().blocks[0].nodes
+POINTS = kl.box().points
+
+
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (lambda: kl.box().replace(points=changed_at(POINTS, (3, 1), np.nan)), r"finite; got nan at \[3, 1\]"),
+        (
+            lambda: model_of(with_block(BRICK, nodes=changed_at(NODES, (0, 1), NODES[0, 0]))).solve(),
+            r"element 1 \(KinematicLinear3D8N\) uses node 1 more than once",
+        ),
+        (
+            lambda: with_block(kl.box(), nodes=changed_at(NODES, (0, 6), 8)),
+            r"element 1 .* uses node indices \[.*\]; indices are 0 … 7",
+        ),
+        (
+            lambda: with_block(kl.box(), nodes=changed_at(NODES, (0, 6), -1)),
+            "nodes are indices of points, from 0; got -1",
+        ),
+    ],
+)
+def test_broken_coordinates_and_node_lists_are_named(make, text):
+    with pytest.raises(kl.MeshError, match=text):
+        make()
 
 
 @pytest.mark.parametrize(
@@ -260,32 +288,6 @@ def test_a_mesh_is_made_of_a_dict_or_of_blocks():
         kl.Mesh(box.points + 1j)
 
 
-def test_elements_that_cover_each_other_are_reported():
-    mesh = kl.box()
-    double = kl.Mesh(mesh.points, [block(np.vstack([mesh.blocks[0].nodes] * 2))], parts=mesh.parts)
-    result = model_of(double).solve()
-    assert "1 elements have the same nodes as another (1 and 2): both count" in result.report.warnings
-
-
-def test_a_face_between_linear_and_quadratic_bricks_is_reported():
-    low, high = kl.box(), kl.box(element=kind(20), origin=(0, 0, 1))
-    warnings = model_of(joined(low, high, welded=True)).solve().report.warnings
-    assert any("share the corners of a face but not its further nodes" in text for text in warnings)
-
-
-def test_loads_that_cannot_do_anything_are_reported():
-    light = kl.Model(kl.box(), kl.Isotropic3D(E=1.0, nu=0.0))
-    light.fix("z-")
-    light.add(kl.Gravity((0, 0, -9.81)))
-    assert light.solve().report.warnings == [
-        "gravity acts on no mass: every material has density 0; give density in kg/m³"
-    ]
-    held = kl.Model(kl.box(), STEEL)
-    held.fix("z-")
-    held.add(kl.PointLoad("z-", (0, 0, 1.0), each=True))
-    assert held.solve().report.warnings == ["all loads act on fixed components, so nothing moves"]
-
-
 def test_a_rule_that_leaves_hourglass_modes_is_reported_and_one_of_another_cell_refused():
     from kratos_lite.quadrature import pyramid, tetrahedron
 
@@ -300,23 +302,17 @@ def test_a_rule_that_leaves_hourglass_modes_is_reported_and_one_of_another_cell_
 
 @pytest.mark.parametrize("nodes", KINDS)
 def test_one_gauss_point_still_gives_a_constant_stress_at_the_nodes(nodes):
-    mesh = kl.box(element=kind(nodes))
+    mesh = kl.box(element=named(nodes))
     model = kl.Model(mesh, STEEL)
     model.use_rule(1)
     model.fix(np.arange(mesh.n_nodes), "xyz", 1e-3 * mesh.points)
     np.testing.assert_allclose(model.solve().stress("node")[:, :3], 525e3, rtol=1e-10)
 
 
-def test_a_square_that_meets_two_triangles_is_reported():
-    low, high = kl.box(), kl.box(element=kind(4), origin=(0, 0, 1))
-    warnings = model_of(joined(low, high, welded=True)).solve().report.warnings
-    assert any("1 four-sided faces (the first of element 1) meet triangles" in text for text in warnings)
-
-
 @pytest.mark.parametrize("nodes", KINDS)
 def test_sound_meshes_of_every_kind_give_no_warning_but_of_locking(nodes):
-    assert others(model_of(kl.box(cells=(2, 2, 2), element=kind(nodes)))) == []
-    wheel = kl.Model(kl.annulus(1.0, 2.0, 0.5, (1, 5, 1), kind(nodes)), STEEL)
+    assert others(model_of(kl.box(cells=(2, 2, 2), element=named(nodes)))) == []
+    wheel = kl.Model(kl.annulus(1.0, 2.0, 0.5, (1, 5, 1), named(nodes)), STEEL)
     wheel.fix("inner")
     assert others(wheel) == []
 

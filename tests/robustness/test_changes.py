@@ -60,9 +60,8 @@ def carried(kind, shift, cells=(4, 4, 4), held="xyz"):
 
 @pytest.mark.parametrize("solver", ["direct", "amg"])
 @pytest.mark.parametrize("kind", ["KinematicLinear3D8N", "KinematicLinear3D20N", "KinematicLinear3D10N"])
-@pytest.mark.parametrize("seed", range(4))
-def test_supports_may_carry_a_body_along(kind, solver, seed):
-    shift = np.random.default_rng(seed).normal(size=3) * 1e-3
+def test_supports_may_carry_a_body_along(kind, solver):
+    shift = np.random.default_rng(4).normal(size=3) * 1e-3
     result = carried(kind, shift).solve(solver)
     np.testing.assert_allclose(result.u, np.tile(shift, (len(result.u), 1)), rtol=0, atol=1e-15)
     assert np.abs(result.stress("element")).max() < 1e-4  # Pa, of a modulus of 1e9
@@ -77,12 +76,13 @@ def test_a_body_that_is_carried_along_deforms_as_one_that_stays():
     np.testing.assert_allclose(a.u - b.u, np.tile((1e-3, 2e-3, 0), (len(a.u), 1)), rtol=0, atol=1e-16)
 
 
-def test_lost_equilibrium_of_prescribed_values_is_an_error(monkeypatch):
+@pytest.mark.parametrize("lift", [0.0, 1e-3])
+def test_lost_equilibrium_is_an_error(monkeypatch, lift):
     right = system.assemble_dense
     monkeypatch.setattr(system, "assemble_dense", lambda *a: right(*a) * (1 + 0.1 * np.eye(24)))
     model = kl.Model(kl.box(), ROCK)
     model.fix("z-")
-    model.fix("z+", "z", 1e-3)
+    model.fix("z+", "z", lift) if lift else model.add(kl.Gravity((0, 0, -9.81)))
     with pytest.raises(kl.SolveError, match="miss equilibrium by"):
         model.solve("dense")
 
@@ -95,16 +95,13 @@ def test_a_mesh_does_not_change_and_gives_others():
     assert mesh.points.min() == 0
     assert mesh.blocks[0].nodes.max() == 7
     for name, value in (("points", points), ("blocks", ()), ("parts", {}), ("node_ids", [1])):
-        with pytest.raises((kl.MeshError), match=rf"does not change; .* mesh\.replace\({name}=\.\.\.\)"):
+        with pytest.raises(kl.MeshError, match=rf"does not change; .* mesh\.replace\({name}=\.\.\.\)"):
             setattr(mesh, name, value)
-    with pytest.raises(AttributeError):
-        pressed().mesh = mesh
+    for owner, name in ((pressed(), "mesh"), (mesh.blocks[0], "nodes"), (mesh.parts["top"], "nodes")):
+        with pytest.raises(AttributeError):
+            setattr(owner, name, None)
     with pytest.raises(TypeError):
         mesh.parts["top"] = kl.Part()
-    with pytest.raises(AttributeError):
-        mesh.blocks[0].nodes = cells
-    with pytest.raises(AttributeError):
-        mesh.parts["top"].nodes = [1]
     taller = mesh.replace(points=mesh.points * [1, 1, 2])
     assert (mesh.points[:, 2].max(), taller.points[:, 2].max()) == (1, 2)
     assert taller.parts == mesh.parts

@@ -16,7 +16,7 @@ def clamped(mesh, load=None):
 
 
 @pytest.mark.parametrize("solver", ["dense", "direct"])
-@pytest.mark.parametrize(("contrast", "bound"), [(1e3, 1e-11), (1e6, 1e-8), (1e9, 1e-5), (1e12, 1e-2)])
+@pytest.mark.parametrize(("contrast", "bound"), [(1e3, 1e-11), (1e9, 1e-5), (1e12, 1e-2)])
 def test_stiffness_contrast_costs_its_digits_and_no_more(solver, contrast, bound):
     model = kl.Model(kl.box(cells=(1, 1, 2)))
     model.assign(kl.Isotropic3D(E=1.0, nu=0.0), [0])
