@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any
 
 MAX_PROBLEMS = 20
 """Problems shown in one message; the rest are counted."""
@@ -46,21 +45,12 @@ class Problems:
         self.messages: list[str] = []
         self.count = 0
 
-    def add(self, message: str, line: int | None = None, column: int | None = None) -> None:
-        """Note one problem, at a line and column (both from 1) of the source if known."""
+    def add(self, message: str, line: int | None = None) -> None:
+        """Note one problem, at a line (from 1) of the source if known."""
         self.count += 1
         if self.count <= MAX_PROBLEMS:
-            place = [self.source] if self.source else []
-            place += [str(part) for part in (line, column) if part is not None]
-            self.messages.append(f"{':'.join(place)}: {message}" if place else message)
-
-    def of(self, action: Callable[..., Any], *arguments: Any) -> Any:
-        """Return what an action returns; if it raises one of our errors, note it and return None."""
-        try:
-            return action(*arguments)
-        except KratosLiteError as error:
-            self.add(str(error))
-            return None
+            place = ":".join(str(part) for part in (self.source or None, line) if part is not None)
+            self.messages.append(f"{place}: {message}" if place else message)
 
     def __bool__(self) -> bool:
         return self.count > 0

@@ -8,20 +8,19 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
 from importlib import import_module
-from typing import Generic, ParamSpec, TypeVar, cast
+from typing import Any, Generic, TypeVar, cast
 
 from kratos_lite.errors import InputError, nearest
 
 T = TypeVar("T")
-P = ParamSpec("P")
-R = TypeVar("R")
+F = TypeVar("F", bound=Callable[..., Any])
 FEW = 24
 """Names that are all listed where none is near to an unknown one."""
 
 
-def remembered(function: Callable[P, R]) -> Callable[P, R]:
+def remembered(function: F) -> F:
     """Keep the results of a function of classes, rules and numbers, so that each is made once."""
-    return cast("Callable[P, R]", lru_cache(maxsize=256)(function))
+    return cast("F", lru_cache(maxsize=256)(function))
 
 
 class Registry(Generic[T]):
@@ -71,9 +70,9 @@ class Registry(Generic[T]):
             if not hint and 0 < len(shown) <= FEW:
                 hint = f" There are {', '.join(shown)}"
             raise InputError(f"unknown {self.kind} {name!r}.{hint}")
-        key = name if self._has(name) else self._aliases[name]
-        self._import(key)
-        return self._items[key]
+        name = name if self._has(name) else self._aliases[name]
+        self._import(name)
+        return self._items[name]
 
     def __contains__(self, name: object) -> bool:
         if not (self._has(name) or name in self._aliases):

@@ -67,9 +67,8 @@ class TimeSeries:
         """
         gaps = np.diff(self.times)
         slopes = np.concatenate([[0.0], np.diff(self.values) / gaps, [0.0]])
-        near = min(
-            1e-9 * abs(time) + 1e-15, 1e-3 * float(gaps.min(initial=np.inf))
-        )  # for times that are sums
+        # for times that are sums
+        near = min(1e-9 * abs(time) + 1e-15, 1e-3 * float(gaps.min(initial=np.inf)))
         after = slopes[np.searchsorted(self.times, time + near)]
         before = slopes[np.searchsorted(self.times, time - near)] if time > near else after
         return float(before + after) / 2
@@ -101,12 +100,7 @@ def function_of(value: Factor, what: str) -> Callable[[float], float]:
     if callable(value):
         if isinstance(value, type) or not takes(value, 1):
             raise InputError(f"{what} must be a function of the time alone; got {short(value)}")
-        given = value
-
-        def checked(time: float) -> float:
-            return number(given(time), f"{what} at t = {time:g} s")
-
-        return checked
+        return lambda time: number(value(time), f"{what} at t = {time:g} s")
     constant = finite(value, what)
     if constant.ndim:
         raise InputError(f"{what} must be a number, a TimeSeries or a function of time; got {value!r}")

@@ -23,7 +23,7 @@ import math
 import operator
 from collections.abc import Iterable
 from os import PathLike
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -37,19 +37,16 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 AnyArray = TypeVar("AnyArray", bound="NDArray[Any]")
+Axes: TypeAlias = "tuple[int | str, ...]"
+"""A shape: lengths of axes, or words for any length."""
+Error: TypeAlias = type[KratosLiteError]
 LARGEST = 1e50
 """Size of the largest number that is taken, so that products of some of them are finite."""
 MOST = 1e11
 """Numbers of an array at most."""
 
 
-def finite(
-    value: Any,
-    what: str,
-    shape: tuple[int | str, ...] | None = None,
-    *,
-    error: type[KratosLiteError] = InputError,
-) -> Array:
+def finite(value: Any, what: str, shape: Axes | None = None, *, error: Error = InputError) -> Array:
     """Return finite real numbers as floats, of a shape such as (3,) or ("n", 3).
 
     A word stands for any length, "..." at the start for any leading axes.
@@ -57,17 +54,16 @@ def finite(
     array = reals(value, what, error, copy=True)
     if shape is not None and not _has(array.shape, shape):
         raise error(f"{what} must have shape ({_axes(shape)}); got {array.shape}")
-    if not (np.abs(array) <= LARGEST).all():
-        first = tuple(map(int, np.argwhere(~(np.abs(array) <= LARGEST))[0]))
+    fits = np.abs(array) <= LARGEST
+    if not fits.all():
+        first = tuple(map(int, np.argwhere(~fits)[0]))
         wanted = f"at most {LARGEST:g} in size" if math.isfinite(array[first]) else "finite"
         found = f"{float(array[first])} at {list(first)}" if array.size > 9 else short(value)
         raise error(f"{what} must be {wanted}; got {found}")
     return array
 
 
-def reals(
-    value: Any, what: str, error: type[KratosLiteError] = InputError, *, cure: str = "", copy: bool = False
-) -> Array:
+def reals(value: Any, what: str, error: Error = InputError, *, cure: str = "", copy: bool = False) -> Array:
     """Return real numbers as floats; they need not be finite, as results may not be."""
     try:
         array = np.asarray(value)
@@ -76,8 +72,8 @@ def reals(
         with np.errstate(all="ignore"):  # what is too large for a float becomes infinite
             array = array.astype(float, copy=copy) if array.size <= MOST else array
     except (TypeError, ValueError, OverflowError):
-        cure = f"; {cure}" if cure else ""
-        raise error(f"{what} must be made of real numbers; got {short(value)}{cure}") from None
+        text = f"{what} must be made of real numbers; got {short(value)}"
+        raise error(f"{text}; {cure}" if cure else text) from None
     _check_size(array, what, error)
     return array
 
@@ -85,11 +81,11 @@ def reals(
 def whole_numbers(
     value: Any,
     what: str,
-    shape: tuple[int | str, ...] | None = None,
+    shape: Axes | None = None,
     *,
     size: int | None = None,
     dtype: type[np.signedinteger[Any]] = np.int64,
-    error: type[KratosLiteError] = InputError,
+    error: Error = InputError,
 ) -> Numbers:
     """Return an array of whole numbers, such as rows and ids; an empty list is one, too."""
     try:
@@ -114,7 +110,7 @@ def whole_numbers(
     return array.astype(dtype, copy=False)
 
 
-def _check_size(array: AnyArray, what: str, error: type[KratosLiteError]) -> None:
+def _check_size(array: AnyArray, what: str, error: Error) -> None:
     """Raise an error for an array that claims more numbers than any memory holds."""
     if array.size > MOST:
         raise error(f"{what} must have at most {MOST:g} numbers; got shape {array.shape}")
@@ -128,16 +124,15 @@ def read_only(array: AnyArray) -> AnyArray:
     return array
 
 
-def _axes(shape: tuple[int | str, ...]) -> str:
+def _axes(shape: Axes) -> str:
     return ", ".join(map(str, shape)) + ("," if len(shape) == 1 else "")
 
 
-def _has(found: tuple[int, ...], wanted: tuple[int | str, ...]) -> bool:
+def _has(found: tuple[int, ...], wanted: Axes) -> bool:
     if wanted[:1] == ("...",):  # any leading axes
         found, wanted = found[max(len(found) - len(wanted) + 1, 0) :], wanted[1:]
-    return len(found) == len(wanted) and all(
-        isinstance(w, str) or w == n for n, w in zip(found, wanted, strict=True)
-    )
+    fits = (isinstance(w, str) or w == n for n, w in zip(found, wanted, strict=False))
+    return len(found) == len(wanted) and all(fits)
 
 
 def number(
@@ -148,7 +143,7 @@ def number(
     least: float | None = None,
     below: float | None = None,
     unit: str = "",
-    error: type[KratosLiteError] = InputError,
+    error: Error = InputError,
 ) -> float:
     """Return one finite real number > `above`, ≥ `least` and < `below`, each if given, as a float."""
     array = finite(value, what, error=error)
@@ -176,7 +171,7 @@ def whole_number(
     *,
     least: int = 1,
     most: int | None = None,
-    error: type[KratosLiteError] = InputError,
+    error: Error = InputError,
 ) -> int:
     """Return a whole number from `least` to `most`; `otherwise` says what else the caller takes."""
     fits = isinstance(value, (int, np.integer)) and not isinstance(value, bool) and value >= least
@@ -186,13 +181,13 @@ def whole_number(
     return int(value)
 
 
-def choice(value: Any, what: str, known: Iterable[str], *, error: type[KratosLiteError] = InputError) -> str:
+def choice(value: Any, what: str, known: Iterable[str], *, error: Error = InputError) -> str:
     """Return one of some names."""
     names = list(known)
     if not isinstance(value, str) or value not in names:
         hint = nearest(value, names, 1) if isinstance(value, str) else ""
-        text = f"{what} must be one of {', '.join(names)}; got {short(value)}"
-        raise error(f"{text}.{hint}" if hint else text)
+        point = "." if hint else ""
+        raise error(f"{what} must be one of {', '.join(names)}; got {short(value)}{point}{hint}")
     return value
 
 
@@ -239,7 +234,7 @@ def instance(
     kind: type[T] | tuple[type[T], ...],
     example: str = "",
     *,
-    error: type[KratosLiteError] = InputError,
+    error: Error = InputError,
 ) -> T:
     """Return an instance of a class, or of one of several; `example` says how to make one."""
     if not isinstance(value, kind):

@@ -27,8 +27,8 @@ def tensor(stress: ArrayLike) -> Array:
 def vector(stress: ArrayLike) -> Array:
     """Return the vector (..., 6) of a symmetric stress tensor (..., 3, 3)."""
     t = np.asarray(stress, dtype=float)
-    rows, columns = np.array(PAIRS).T
-    return t[..., rows, columns]
+    i, j = np.array(PAIRS).T
+    return t[..., i, j]
 
 
 def acoustic_tensor(C: Array, direction: Array) -> Array:

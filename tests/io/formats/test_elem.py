@@ -57,28 +57,24 @@ def problem(make):
     return read
 
 
-def same(first, second):
-    """Whether two documents say the same, apart from lines and notes."""
-    assert np.array_equal(first.mesh.points, second.mesh.points)
-    assert np.array_equal(first.mesh.node_ids, second.mesh.node_ids)
-    for blocks, others in (
-        (first.mesh.blocks, second.mesh.blocks),
-        (first.mesh.conditions, second.mesh.conditions),
-    ):
-        assert [(b.name, b.shape) for b in blocks] == [(b.name, b.shape) for b in others]
-        for block, other in zip(blocks, others, strict=True):
-            for field in ("nodes", "ids", "properties"):
-                assert np.array_equal(getattr(block, field), getattr(other, field))
-    assert list(first.properties) == list(second.properties)
-    for number, properties in first.properties.items():
-        others = second.properties[number].values
-        assert list(properties.values) == list(others)
-        assert all(np.array_equal(value, others[name]) for name, value in properties.values.items())
-    assert [d.variable for d in first.nodal_data] == [d.variable for d in second.nodal_data]
-    for data, other in zip(first.nodal_data, second.nodal_data, strict=True):
-        for field in ("ids", "fixed", "values"):
-            assert np.array_equal(getattr(data, field), getattr(other, field))
-    return True
+def said(document):
+    """Return all that a document says, apart from lines and notes, as it is compared."""
+    mesh = document.mesh
+    blocks = [[b.name, b.shape, b.nodes, b.ids, b.properties] for b in (*mesh.blocks, *mesh.conditions)]
+    values = [[number, p.values] for number, p in document.properties.items()]
+    data = [[d.variable, d.ids, d.fixed, d.values] for d in document.nodal_data]
+    return repr([mesh.points.tolist(), mesh.node_ids.tolist(), plain([blocks, values, data])])
+
+
+def plain(value):
+    """Return nested values with arrays as lists."""
+    if isinstance(value, dict):
+        return [[key, plain(one)] for key, one in value.items()]
+    return (
+        [plain(one) for one in value]
+        if isinstance(value, list)
+        else getattr(value, "tolist", lambda: value)()
+    )
 
 
 # ---- real sets -----------------------------------------------------------------------------
@@ -118,7 +114,7 @@ def test_real_set_equals_its_converted_mdpa(folder, name):
 def test_real_set_survives_a_round_trip(tmp_path, folder, name):
     document = read_elem(case(folder) / name)
     assert write_elem(tmp_path / name, document) == []
-    assert same(document, read_elem(tmp_path / name))
+    assert said(document) == said(read_elem(tmp_path / name))
 
 
 def test_column_is_read_in_full():
@@ -144,32 +140,6 @@ def test_column_is_read_in_full():
         ["1", "conditions", "MasterContactFace3D9"],
         ["1", "conditions", "SlaveContactFace3D9"],
     ]
-
-
-def test_beam_is_read_in_full(shared):
-    document = read_elem(shared / "cases/elem_beam3d_KL4N/beam_3d.node")
-    (block,) = document.mesh.blocks
-    assert (block.name, block.shape, len(block)) == ("KinematicLinear3D4N", Tetrahedron4, 2798)
-    assert document.mesh.node_ids[block.nodes[0]].tolist() == [644, 645, 647, 622]
-    assert block.lines[[0, -1]].tolist() == [4, 2801]
-    assert [(d.variable, len(d.ids), d.fixed.all()) for d in document.nodal_data] == [
-        (f"DISPLACEMENT_{axis}", 10, True) for axis in "XYZ"
-    ]
-    assert document.properties[1].values["BODY_FORCE"].tolist() == [0, -74752, 0]
-    assert document.properties[1].lines["YOUNG_MODULUS"] == 6
-    assert "'])' closes no list" in document.notes[0].text
-    assert document.notes[0].line == 40
-
-
-def test_contact_faces_of_the_real_set_are_kept_and_noted(shared):
-    document = read_elem(shared / "cases/elem_balken_27N/balken")
-    assert [(b.name, b.shape, b.nodes.shape) for b in document.mesh.conditions] == [
-        ("MasterContactFace3D9", None, (13, 9)),
-        ("SlaveContactFace3D9", None, (12, 9)),
-    ]
-    texts = [note.text for note in document.notes]
-    assert "13 conditions MasterContactFace3D9 are kept without use" in texts[0]
-    assert "12 conditions SlaveContactFace3D9 are kept without use" in texts[1]
 
 
 @pytest.mark.parametrize("name", ["80_ragged", "81_unknown_keyword"])
@@ -549,16 +519,8 @@ def sample():
 def test_round_trip_keeps_every_digit(tmp_path):
     document = sample()
     assert write_elem(tmp_path / "b.elem", document) == []
-    assert sorted(path.name for path in tmp_path.iterdir()) == [
-        "b.cond",
-        "b.elem",
-        "b.init",
-        "b.node",
-        "b.prop",
-    ]
-    again = read_elem(tmp_path / "b")
-    assert same(document, again)
-    assert np.signbit(again.nodal_data[0].values[0])
+    assert sorted(path.suffix for path in tmp_path.iterdir()) == [".cond", ".elem", ".init", ".node", ".prop"]
+    assert said(document) == said(read_elem(tmp_path / "b"))  # -0.0 is not 0.0
 
 
 def test_round_trip_of_properties_without_values(tmp_path):
@@ -585,42 +547,25 @@ def test_what_the_format_cannot_hold_is_noted(tmp_path):
         "left out: LUMPED of properties 4",
         "left out: EMPTY of properties 4",
     ]
-    assert same(sample(), read_elem(tmp_path / "b"))
+    assert said(sample()) == said(read_elem(tmp_path / "b"))
 
 
-def bad_value(document):
-    document.nodal_data[0].values[0] = np.inf
-
-
-def bad_name(document):
-    document.mesh = with_block(document.mesh, name="tetra 4")
-
-
-def empty_properties(document):
-    document.mesh = with_block(document.mesh, properties=5 + 0 * document.mesh.blocks[0].properties)
-
-
-def fixed_vector(document):
-    document.nodal_data.append(Data("VELOCITY", np.array([7]), np.array([True]), np.zeros((1, 3))))
-
-
-def no_nodes(document):
-    document.mesh = Mesh(np.zeros((0, 3)))
+WRONG = Data("VELOCITY", np.array([7]), np.array([True]), np.zeros((1, 3)))
 
 
 @pytest.mark.parametrize(
     ("damage", "expected"),
     [
-        (bad_value, "some values of DISPLACEMENT_X are not finite"),
-        (bad_name, "'tetra 4' cannot be written"),
-        (empty_properties, "properties 5 have no number to write"),
-        (fixed_vector, "VELOCITY is fixed as a whole"),
-        (no_nodes, "there are no nodes to write"),
+        (lambda d: d.nodal_data[0].values.fill(np.inf), "some values of DISPLACEMENT_X are not finite"),
+        (lambda d: {"mesh": with_block(d.mesh, name="tetra 4")}, "'tetra 4' cannot be written"),
+        (lambda d: {"mesh": with_block(d.mesh, properties=[5, 5])}, "properties 5 have no number to write"),
+        (lambda d: d.nodal_data.append(WRONG), "VELOCITY is fixed as a whole"),
+        (lambda d: {"mesh": Mesh(np.zeros((0, 3)))}, "there are no nodes to write"),
     ],
 )
 def test_what_would_be_another_model_is_refused_and_nothing_is_written(tmp_path, damage, expected):
     document = sample()
-    damage(document)
+    vars(document).update(damage(document) or {})
     with pytest.raises(InputError, match=expected):
         write_elem(tmp_path / "b", document)
     assert list(tmp_path.iterdir()) == []
@@ -656,25 +601,20 @@ def names_a_file(result, name):
     )
 
 
-@pytest.mark.parametrize("ending", SMALL)
-def test_every_prefix_ends_in_a_document_or_an_error(make, ending):
-    name = make(**SMALL)
-    data = SMALL[ending].encode()
-    results = [outcome(name.with_suffix(f".{ending}"), name, data[:end]) for end in range(len(data) + 1)]
-    assert isinstance(results[-1], Document)
-    assert any(isinstance(result, str) for result in results)
-    assert all(names_a_file(result, name) for result in results)
+def cut(data, _):
+    return [data[:end] for end in range(len(data) + 1)]
+
+
+def flipped(data, rng):
+    """Return copies of data, each with one byte that is another."""
+    at = [(rng.randrange(len(data)), bytes([rng.randrange(256)])) for _ in range(300)]
+    return [data[:i] + byte + data[i + 1 :] for i, byte in at]
 
 
 @pytest.mark.parametrize("ending", SMALL)
-def test_every_flipped_byte_ends_in_a_document_or_an_error(make, ending):
-    name = make(**SMALL)
-    data = SMALL[ending].encode()
-    rng = random.Random(11)
-    results = []
-    for _ in range(300):
-        damaged = bytearray(data)
-        damaged[rng.randrange(len(data))] = rng.randrange(256)
-        results.append(outcome(name.with_suffix(f".{ending}"), name, bytes(damaged)))
+@pytest.mark.parametrize("damaged", [cut, flipped])
+def test_every_damaged_file_ends_in_a_document_or_an_error(make, damaged, ending):
+    name, files = make(**SMALL), damaged(SMALL[ending].encode(), random.Random(11))
+    results = [outcome(name.with_suffix(f".{ending}"), name, data) for data in files]
     assert {type(result) for result in results} == {Document, str}
     assert all(names_a_file(result, name) for result in results)

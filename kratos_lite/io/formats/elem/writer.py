@@ -15,12 +15,6 @@ from kratos_lite.io.formats.document import Data, Document
 from kratos_lite.io.formats.elem.reader import stem
 from kratos_lite.mesh import Block, Mesh
 
-NOT_HELD = {
-    **{"constraints": "constraints", "geometries": "geometries", "tables": "tables"},
-    **{"model_data": "variables of the model", "element_data": "variables on elements"},
-    "condition_data": "variables on conditions",
-}
-
 
 def write_elem(path: str | Path, document: Document) -> list[str]:
     """Write a document as a five-file set, all files or none; return notes on what the format cannot hold.
@@ -55,8 +49,9 @@ def write_elem(path: str | Path, document: Document) -> list[str]:
 
 
 def _left_out(document: Document) -> list[str]:
-    have = {"parts": document.mesh.parts} | {name: getattr(document, key) for key, name in NOT_HELD.items()}
-    texts = [f"{len(items)} {name}" for name, items in have.items() if items]
+    kinds = ("constraints", "geometries", "tables", "model_data", "element_data", "condition_data")
+    have = {"parts": document.mesh.parts} | {kind: getattr(document, kind) for kind in kinds}
+    texts = [f"{len(items)} {kind.replace('_', ' ')}" for kind, items in have.items() if items]
     texts += [f"nodal {data.variable}" for data in document.nodal_data if not _is_scalar(data)]
     return [f"left out: {text}; a five-file set cannot hold it" for text in texts]
 
@@ -107,10 +102,9 @@ def _property_lines(document: Document, problems: Problems, notes: list[str]) ->
                 written.add(number)
                 yield f"PROPERTIES[{number}][{name}] = {text};"
             else:
-                notes.append(
-                    f"left out: {name} of properties {number}; .prop files hold numbers, not {value!r}"
-                )
-    used = {0, *(int(number) for block in document.mesh.blocks for number in np.unique(block.properties))}
+                why = f".prop files hold numbers, not {value!r}"
+                notes.append(f"left out: {name} of properties {number}; {why}")
+    used = {int(number) for block in document.mesh.blocks for number in np.unique(block.properties)}
     for number in sorted(used - written - {0}) if written else ():
         problems.add(f"properties {number} have no number to write, but elements use them; give them a value")
 
