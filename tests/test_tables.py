@@ -1,7 +1,5 @@
 """Tables that notebooks show: the rows that are printed, as HTML."""
 
-import subprocess
-import sys
 from html.parser import HTMLParser
 
 import numpy as np
@@ -81,9 +79,3 @@ def test_tables_of_elements_count_them():
     X = np.array([kl.KinematicLinear3D8N.nodes] * 2)
     rows = dict(kl.KinematicLinear3D8N(X).table())
     assert (rows["elements"], rows["volume"]) == ("2", "16 m³")
-
-
-def test_html_is_imported_by_notebooks_alone():
-    code = "import sys, kratos_lite as kl; mesh = kl.box(); print(mesh, 'html' in sys.modules)"
-    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
-    assert out.split()[-1] == "False"

@@ -22,14 +22,19 @@ def test_damaged_and_random_inputs_end_in_a_result_or_in_one_error():
     assert "400 inputs of seed 12: 0 findings" in run.stdout
 
 
-def test_an_input_depends_on_its_seed_and_number_alone(tmp_path):
-    words = [sys.executable, "-m", "tests.fuzz", "--write", str(tmp_path)]
-    subprocess.run([*words, "--count", "5"], cwd=ROOT, check=True, capture_output=True)
-    whole = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+def test_an_input_depends_on_its_seed_and_number_alone(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(ROOT)
+    from tests.fuzz.__main__ import main
+
+    def written(*words):
+        monkeypatch.setattr(sys, "argv", ["fuzz", "--write", str(tmp_path), *words])
+        assert main() == 0
+        return {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+
+    whole = written("--count", "5")
     assert len(whole) > 10
     shutil.rmtree(tmp_path / "3")
-    subprocess.run([*words, "--start", "3", "--count", "1"], cwd=ROOT, check=True, capture_output=True)
-    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == whole
+    assert written("--start", "3", "--count", "1") == whole
 
 
 @pytest.fixture(scope="module")
