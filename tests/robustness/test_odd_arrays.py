@@ -87,7 +87,7 @@ def enhanced(name, *arguments):
 
 
 PRESCRIBED = (POINT, VECTOR, 0.0)
-NODES, CELLS = np.arange(4), np.arange(8)[None]
+NODES, CELLS, TOP = np.arange(4), np.arange(8)[None], CUBE.nodes("z+")
 TURNED = 1e-3 * CUBE.points[:, ::-1]
 U, STRESS = np.full((8, 3), 1e-3), np.full(6, 1e3)
 CONSTRAINTS = (
@@ -105,33 +105,15 @@ CASES: Case = {
     ("Part", "elements"): (lambda v: CUBE.replace(parts={"a": kl.Part(elements=v)}).elements("a"), [0]),
     ("Mesh", "points"): (lambda v: kl.Model(kl.Mesh(v, CUBE.blocks), ROCK).check_geometry(), CUBE.points),
     ("Mesh", "node_ids"): (lambda v: kl.Mesh(CUBE.points, node_ids=v).node_rows([3]), np.arange(8)),
-    ("Mesh", "blocks"): (lambda v: kl.Mesh(CUBE.points, {BRICK.__name__: v}).boundary, CELLS),
-    ("Mesh", "conditions"): (
-        lambda v: kl.Mesh(CUBE.points, conditions={BRICK.__name__: v}).n_elements,
-        CELLS,
-    ),
-    ("Mesh.replace", "points"): (lambda v: CUBE.replace(points=v).points, CUBE.points),
-    ("Mesh.replace", "blocks"): (lambda v: CUBE.replace(blocks={BRICK.__name__: v}).boundary, CELLS),
-    ("Mesh.replace", "conditions"): (
-        lambda v: CUBE.replace(conditions={BRICK.__name__: v}).n_elements,
-        CELLS,
-    ),
     ("Mesh.nodes", "where"): (CUBE.nodes, NODES),
     ("Mesh.elements", "where"): (CUBE.elements, [0]),
     ("Mesh.faces", "where"): (CUBE.faces, NODES),
     ("Mesh.add_part", "where"): (lambda v: CUBE.replace().add_part("a", v), NODES),
     ("Mesh.node_rows", "ids"): (CUBE.node_rows, NODES),
     ("Mesh.locate", "points"): (lambda v: CUBE.locate(v).rows, [POINT]),
-    ("box", "size"): (lambda v: kl.box(v).points, POINT),
-    ("box", "cells"): (lambda v: kl.box(cells=v).n_elements, (1, 2, 1)),
-    ("box", "origin"): (lambda v: kl.box(origin=v).points, VECTOR),
     ("annulus", "cells"): (lambda v: kl.annulus(1, 2, 1, v).points, (1, 4, 1)),
     ("Structure.fix", "where"): (lambda v: changed("fix", v), NODES),
     ("Structure.release", "where"): (released, NODES),
-    ("Structure.constrain", "dependents"): (tied, [0, 1]),
-    ("Structure.constrain", "independents"): (lambda v: tied(independents=v), [12, 13]),
-    ("Structure.constrain", "constant"): (lambda v: tied(constant=v), [0.0, 1e-3]),
-    ("Structure.constrain", "weights"): (lambda v: tied(weights=v), 0.5),
     ("Structure.fix", "value"): (lambda v: changed("fix", "z+", "xyz", v), VECTOR),
     ("Structure.assign", "where"): (lambda v: changed("assign", ROCK, v), [0]),
     ("Structure.use_rule", "where"): (lambda v: changed("use_rule", 2, v), [0]),
@@ -142,66 +124,33 @@ CASES: Case = {
         1e-3 * CUBE.points[:, ::-1],
     ),
     ("Structure.add", "amplitude"): (lambda v: loaded(kl.Gravity(VECTOR), v), 2.0),
-    ("BodyForce", "force"): (lambda v: loaded(kl.BodyForce(v)), VECTOR),
-    ("BodyForce", "where"): (lambda v: loaded(kl.BodyForce(VECTOR, v)), [0]),
-    ("Gravity", "acceleration"): (lambda v: loaded(kl.Gravity(v)), VECTOR),
-    ("Gravity", "where"): (lambda v: loaded(kl.Gravity(VECTOR, v)), [0]),
-    ("Resultant", "where"): (lambda v: loaded(kl.Resultant(v, VECTOR)), CUBE.nodes("z+")),
-    ("Resultant", "force"): (lambda v: loaded(kl.Resultant("z+", v)), VECTOR),
-    ("Resultant", "moment"): (lambda v: loaded(kl.Resultant("z+", VECTOR, v)), VECTOR),
-    ("Resultant", "about"): (lambda v: loaded(kl.Resultant("z+", VECTOR, VECTOR, v)), POINT),
-    ("Mesh.area", "where"): (CUBE.area, CUBE.nodes("z+")),
-    ("Traction", "where"): (lambda v: loaded(kl.Traction(v, VECTOR)), CUBE.nodes("z+")),
-    ("Traction", "traction"): (lambda v: loaded(kl.Traction("z+", v)), VECTOR),
+    ("Mesh.area", "where"): (CUBE.area, TOP),
     ("LineLoad", "where"): (lambda v: loaded(kl.LineLoad(v, VECTOR)), NODES),
     ("LineLoad", "traction"): (lambda v: kl.LineLoad("z+", v).traction, VECTOR),
-    ("Pressure", "where"): (lambda v: loaded(kl.Pressure(v, 1.0)), CUBE.nodes("z+")),
-    ("Pressure", "pressure"): (lambda v: loaded(kl.Pressure("z+", v)), 1.0),
-    ("PointLoad", "where"): (lambda v: loaded(kl.PointLoad(v, VECTOR)), NODES),
-    ("PointLoad", "force"): (lambda v: loaded(kl.PointLoad("z+", v, each=True)), VECTOR),
     ("NodalForces", "values"): (lambda v: loaded(kl.NodalForces(v)), U),
-    ("TimeSeries", "times"): (lambda v: [kl.TimeSeries(v, [0.0, 2.0])(0.5)], [0.0, 1.0]),
-    ("TimeSeries", "values"): (lambda v: [kl.TimeSeries([0.0, 1.0], v)(t) for t in (0.5, 2)], [0.0, 1.0]),
-    ("TransientAnalysis", "displacement"): (lambda v: stepped(displacement=v), 0 * U),
-    ("TransientAnalysis", "velocity"): (lambda v: stepped(velocity=v), 0 * U),
     ("Result.displacement", "where"): (RESULT.displacement, NODES),
     ("Result.reaction", "where"): (RESULT.reaction, NODES),
     ("reaction_resultant", "where"): (lambda v: kl.reaction_resultant(static(), RESULT, v), NODES),
     ("reaction_resultant", "center"): (lambda v: kl.reaction_resultant(static(), RESULT, "z-", v), VECTOR),
     ("DisplacementAt", "point"): (lambda v: kl.DisplacementAt(v, "z").value(RESULT), POINT),
     ("StressAt", "point"): (lambda v: kl.StressAt(v, "zz").value(RESULT), POINT),
-    ("MeanDisplacement", "part"): (lambda v: kl.MeanDisplacement(v, "z").value(RESULT), CUBE.nodes("z+")),
+    ("MeanDisplacement", "part"): (lambda v: kl.MeanDisplacement(v, "z").value(RESULT), TOP),
     ("ReactionOf", "part"): (lambda v: kl.ReactionOf(v, "z").value(RESULT), NODES),
     ("Structure.fix", "field"): (
         lambda v: changed("fix", "z+", "xyz", field=lambda X: v),
         VECTOR,
     ),
-    ("Force", "point"): (lambda v: moved(kl.RigidBody, kl.Force(v, VECTOR)), POINT),
-    ("Force", "force"): (lambda v: moved(kl.RigidBody, kl.Force((0.5, 0.5, 0.5), v)), VECTOR),
     ("Torque", "torque"): (lambda v: moved(kl.RigidBody, kl.Torque(v)), VECTOR),
     ("Body.add", "amplitude"): (lambda v: moved(kl.RigidBody, kl.Gravity(VECTOR), amplitude=v), 2.0),
-    ("Spring", "point"): (lambda v: moved(kl.PseudoRigidBody, kl.Spring(v, VECTOR, 1e3)), (0.5, 0.5, 0.5)),
-    ("Spring", "anchor"): (lambda v: moved(kl.PseudoRigidBody, kl.Spring((0.5, 0.5, 1), v, 1e3)), VECTOR),
     ("LinearMaterial.stress", "strain"): (ROCK.stress, STRESS * 1e-6),
     ("KinematicLinear", "X"): (lambda v: BRICK(v).detJ(VECTOR), BRICK.nodes),
     **{
         (f"KinematicLinear.{name}", "xi"): (lambda v, name=name: element(name, v), VECTOR)
         for name in ("B", "J", "dNdX", "detJ", "position")
     },
-    ("KinematicLinear.strain_at", "xi"): (lambda v: element("strain_at", v, U), VECTOR),
-    ("KinematicLinear.strain_at", "u"): (lambda v: element("strain_at", VECTOR, v), U),
     ("EnhancedStrain3D8N.strain_at", "C"): (lambda v: enhanced("strain_at", VECTOR, U, v), ROCK.C),
     ("EnhancedStrain3D8N.B", "C"): (lambda v: enhanced("B", VECTOR, v), ROCK.C),
-    ("KinematicLinear.local_system", "C"): (lambda v: element("local_system", v, U), ROCK.C),
-    ("KinematicLinear.local_system", "u"): (lambda v: element("local_system", ROCK.C, v), U),
     ("BBar3D10N.kept", "C"): (lambda v: kl.BBar3D10N(kl.BBar3D10N.nodes).kept(v), ROCK.C),
-    ("KinematicLinear.body_force", "b"): (lambda v: element("body_force", v), VECTOR),
-    ("KinematicLinear.internal_force", "stress"): (lambda v: element("internal_force", v), np.ones((8, 6))),
-    ("KinematicLinear.strain", "u"): (lambda v: element("strain", v), U),
-    ("KinematicLinear.stress", "u"): (lambda v: element("stress", ROCK.C, v), U),
-    ("KinematicLinear.stress", "C"): (lambda v: element("stress", v, U), ROCK.C),
-    ("KinematicLinear.stiffness", "C"): (lambda v: element("stiffness", v), ROCK.C),
-    ("KinematicLinear.stiffness_by_axis", "C"): (lambda v: element("stiffness_by_axis", v), ROCK.C),
     **{
         (f"KinematicLinear.{name}", "density"): (lambda v, name=name: element(name, v), 2.0)
         for name in ("mass", "scalar_mass", "lumped_mass")
@@ -227,8 +176,6 @@ CASES: Case = {
     ("material_derivative", "field"): (lambda v: kl.material_derivative(flowing(), v), U),
     ("material_derivative", "partial"): (lambda v: kl.material_derivative(flowing(), U, partial=[v]), U),
     ("Constraint", "points"): (lambda v: moved(kl.PseudoRigidBody, kl.FixPoint(v)), [POINT]),
-    ("FixDirection", "points"): (lambda v: moved(kl.RigidBody, kl.FixDirection(v, VECTOR)), POINT),
-    ("FixDirection", "direction"): (lambda v: moved(kl.RigidBody, kl.FixDirection(POINT, v)), VECTOR),
     **{
         (f"Prescribed{what}", argument): (
             lambda v, what=what, i=i: moved(
@@ -239,12 +186,10 @@ CASES: Case = {
         for what in ("Displacement", "Velocity", "Acceleration")
         for i, argument in enumerate(("points", "direction", what.lower()))
     },
-    ("RigidLink", "point"): (lambda v: moved(kl.RigidBody, kl.RigidLink(v, VECTOR)), POINT),
-    ("RigidLink", "anchor"): (lambda v: moved(kl.RigidBody, kl.RigidLink(POINT, v)), VECTOR),
     ("Callback", "function"): (lambda v: moved(kl.RigidBody, kl.Callback(lambda *_: v)), np.zeros(6)),
     ("FollowerPressure", "where"): (
         lambda v: moved(kl.FiniteElementBody, kl.FollowerPressure(v, 1.0)),
-        CUBE.nodes("z+"),
+        TOP,
     ),
     ("MassProperties.with_", "changes"): (
         lambda v: kl.MassProperties(2.0, np.eye(3)).with_(mass=v).mass,
@@ -257,6 +202,60 @@ CASES: Case = {
     ("write_modes", "values"): (lambda v: written_modes(v, np.ones((1, 8, 3))), [1.0]),
     ("write_modes", "shapes"): (lambda v: written_modes([1.0], v), np.ones((1, 8, 3))),
 }
+
+
+def each(owner, call, **samples):
+    """Return a case for every argument of a call; the others are as given."""
+    return {
+        (owner, name): (lambda v, name=name: call(**{**samples, name: v}), sample)
+        for name, sample in samples.items()
+    }
+
+
+def loads(kind, **samples):
+    return each(kind.__name__, lambda **given: loaded(kind(**given)), **samples)
+
+
+def on(body, kind, *more, **samples):
+    return each(kind.__name__, lambda **given: moved(body, kind(*given.values(), *more)), **samples)
+
+
+def of_element(name, **samples):
+    return each(f"KinematicLinear.{name}", lambda **given: element(name, *given.values()), **samples)
+
+
+CASES |= {
+    **loads(kl.BodyForce, force=VECTOR, where=[0]),
+    **loads(kl.Gravity, acceleration=VECTOR, where=[0]),
+    **loads(kl.Resultant, where=TOP, force=VECTOR, moment=VECTOR, about=POINT),
+    **loads(kl.Traction, where=TOP, traction=VECTOR),
+    **loads(kl.Pressure, where=TOP, pressure=1.0),
+    **loads(kl.PointLoad, where=NODES, force=VECTOR),
+    **each(
+        "TimeSeries", lambda **v: [kl.TimeSeries(**v)(t) for t in (0.5, 2)], times=[0, 1.0], values=[0, 1]
+    ),
+    **each("TransientAnalysis", stepped, displacement=0 * U, velocity=0 * U),
+    **each(
+        "Structure.constrain", tied, dependents=[0, 1], independents=[12, 13], constant=[0, 0.1], weights=0.5
+    ),
+    **each("box", lambda **v: kl.box(**v).points, size=POINT, cells=(1, 2, 1), origin=VECTOR),
+    **on(kl.RigidBody, kl.Force, point=POINT, force=VECTOR),
+    **on(kl.RigidBody, kl.FixDirection, points=POINT, direction=VECTOR),
+    **on(kl.RigidBody, kl.RigidLink, point=POINT, anchor=VECTOR),
+    **on(kl.PseudoRigidBody, kl.Spring, 1e3, point=(0.5, 0.5, 0.5), anchor=VECTOR),
+    **of_element("strain_at", xi=VECTOR, u=U),
+    **of_element("local_system", C=ROCK.C, u=U),
+    **of_element("stress", C=ROCK.C, u=U),
+    **of_element("strain", u=U),
+    **of_element("stiffness", C=ROCK.C),
+    **of_element("stiffness_by_axis", C=ROCK.C),
+    **of_element("body_force", b=VECTOR),
+    **of_element("internal_force", stress=np.ones((8, 6))),
+}
+for made, owner in ((lambda **v: kl.Mesh(CUBE.points, **v), "Mesh"), (CUBE.replace, "Mesh.replace")):
+    for name in ("blocks", "conditions"):
+        CASES[owner, name] = (lambda v, m=made, n=name: m(**{n: {BRICK.__name__: v}}).boundary, CELLS)
+CASES["Mesh.replace", "points"] = (lambda v: CUBE.replace(points=v).points, CUBE.points)
 for kind in KINDS:
     own = kind.__name__
     CASES |= {
