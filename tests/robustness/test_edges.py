@@ -14,7 +14,7 @@ from kratos_lite.solvers.constraints import rigid_modes
 STEEL = kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0)
 
 
-def fan(n, levels=2):
+def fan(n, levels=1):
     """Return n wedges around the z axis per level."""
     angle = 2 * np.pi * np.arange(n) / n
     ring = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
