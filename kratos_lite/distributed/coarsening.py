@@ -14,7 +14,6 @@ import numpy as np
 
 from kratos_lite.distributed.communicator import Alone
 from kratos_lite.distributed.ghosts import Ghosts
-from kratos_lite.solvers.multigrid import STRENGTH
 from kratos_lite.typing import Array, Ints
 
 LEAST_GAIN = 0.9
@@ -69,12 +68,10 @@ class Coarser:
     modes: Array
 
 
-def coarsened(
-    kernel: Any, ghosts: Ghosts, all_nodes: int, b: int, modes: Array, largest: float
-) -> Coarser | None:
+def coarsened(kernel: Any, ghosts: Ghosts, all_nodes: int, b: int, modes: Array) -> Coarser | None:
     """Return the next level, or None if it would have hardly fewer unknowns."""
     ranks, own = ghosts.ranks, ghosts.own
-    of, count = kernel.aggregates(STRENGTH)
+    of, count = kernel.aggregates()
     offsets = np.concatenate([[0], np.cumsum(ranks.gather(count))])
     if not 0 < 6 * offsets[-1] <= LEAST_GAIN * b * ghosts.offsets[-1]:
         return None
@@ -86,7 +83,7 @@ def coarsened(
     modes_of = np.zeros((all_nodes, 6 * b))
     modes_of[:own] = T.reshape(own, 6 * b)
     ghosts.update(modes_of)
-    P = _prolongator(kernel, aggregate[:, 0], modes_of, count, first, 4.0 / 3.0 / largest)
+    P = _prolongator(kernel, aggregate[:, 0], modes_of, count, first)
     around = _rows_of_ghosts(P, ghosts, all_nodes)
     A = _galerkin(kernel, ranks, around, offsets)
     _stand_alone(A, first)
@@ -95,13 +92,13 @@ def coarsened(
     return Coarser(below, A, P, R.reshape(count, 6, 6))
 
 
-def _prolongator(kernel: Any, aggregate: Ints, T: Array, count: int, first: int, omega: float) -> Rows:
+def _prolongator(kernel: Any, aggregate: Ints, T: Array, count: int, first: int) -> Rows:
     """Return own rows of T - omega D^-1 A T."""
     mine = (aggregate >= first) & (aggregate < first + count)
     others = np.unique(aggregate[(aggregate >= 0) & ~mine])
     of = np.where(mine, aggregate - first, count + np.searchsorted(others, aggregate))
     of[aggregate < 0] = -1
-    indptr, indices, data = kernel.prolongator(of.astype(np.int32), np.ascontiguousarray(T), omega)
+    indptr, indices, data = kernel.prolongator(of.astype(np.int32), np.ascontiguousarray(T))
     numbers = np.concatenate([first + np.arange(count), others])
     return Rows(indptr, numbers[indices], data.reshape(len(indices), T.shape[1]))
 

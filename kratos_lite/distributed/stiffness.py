@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -20,14 +19,13 @@ from kratos_lite.assembly.stiffness import assemble_stiffness
 from kratos_lite.distributed.communicator import Alone
 from kratos_lite.distributed.cut import Part
 from kratos_lite.distributed.ghosts import Ghosts
-from kratos_lite.distributed.multigrid import Level, Multigrid
-from kratos_lite.native import kernels
+from kratos_lite.distributed.multigrid import Multigrid
 from kratos_lite.solvers.coarse_level import has_corners, has_middle_nodes, is_stretched, p_coarse_level
 from kratos_lite.solvers.constraints import rigid_modes
 from kratos_lite.solvers.multigrid import multigrid
 from kratos_lite.solvers.plan import Facts, needs_no_matrix
 from kratos_lite.solvers.plate_level import plate_axes
-from kratos_lite.typing import Array, Mask, Progress
+from kratos_lite.typing import Array, Ints, Mask, Progress
 
 
 class OneProcess:
@@ -151,17 +149,16 @@ class SharedStiffness:
         """Return the multigrid of K: on one rank that of one process, which takes stretched cells, too."""
         if self.ranks.size == 1:
             return OneProcess(self.K, self.free, self.points, self.groups, self.own)
-        module, fixed = kernels("multigrid"), ~self.free
-        held, own = fixed.ravel().astype(np.uint8), self.ghosts.own
+        found, fixed, own = Multigrid(self.ranks.rank), ~self.free, self.ghosts.own
         if isinstance(self.K, MatrixFree):
-            kernel = module.SharedProduct(self.K.product, held, own)
+            found.add_product(self.K.product, self.ghosts, fixed)
         else:
-            kernel = module.SharedLevel(self.K.indptr, self.K.indices, self.K.data, held, 3)
-        first = Level(kernel, self.ghosts, 3, fixed)
-        quadratic = self.ranks.any(has_middle_nodes(self.groups)) and self.ranks.all(has_corners(self.groups))
-        linear = self._linear(module, fixed) if quadratic else None
-        points, free = (self.points[:own], self.free[:own]) if linear is None else linear[2:]
-        return Multigrid(first, self.modes(points, free), None if linear is None else linear[:2])
+            found.add((self.K.indptr, self.K.indices, self.K.data), self.ghosts, fixed)
+        nodes = np.arange(len(self.points))
+        if self.ranks.any(has_middle_nodes(self.groups)) and self.ranks.all(has_corners(self.groups)):
+            nodes, own = self._add_linear(found, fixed)
+        found.coarsen(self.modes(self.points[nodes[:own]], self.free[nodes[:own]]), len(nodes))
+        return found
 
     def modes(self, points: Array, free: Mask) -> Array:
         """Return the rigid-body modes (m, 3, 6) at own nodes, 0 where they are not free."""
@@ -169,14 +166,13 @@ class SharedStiffness:
         modes = rigid_modes(points, self.ranks.sum(points.sum(axis=0)) / count)
         return (modes * free.reshape(-1, 1)).reshape(-1, 3, 6)
 
-    def _linear(self, module: Any, fixed: Mask) -> tuple[Level, Any, Array, Mask]:
-        """Return the level of linear elements, the way to it, and places and freedom of its own nodes."""
+    def _add_linear(self, multigrid: Multigrid, fixed: Mask) -> tuple[Ints, int]:
+        """Add the level of linear elements; return its nodes, and how many of them are own ones."""
         n, own = len(self.points), self.ghosts.own
         if self.groups:
             linear = p_coarse_level(self.points, self.groups, whole=False)
             assert linear is not None
-            nodes, weights = linear.nodes, (linear.indptr, linear.indices, linear.weights)
-            K = linear.K
+            nodes, K, weights = linear.nodes, linear.K, (linear.indptr, linear.indices, linear.weights)
         else:  # a rank without elements
             nodes, none = np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int32)
             weights = np.zeros(n + 1, dtype=np.int32), none, np.zeros(0)
@@ -188,22 +184,13 @@ class SharedStiffness:
         self.ghosts.update(number)
         beyond = int(np.searchsorted(nodes, own + len(self.ghosts)))
         ghosts = Ghosts(self.ranks, offsets, number[nodes[mine:beyond], 0])
-        indptr, indices, shares = weights
+        indptr, indices, values = weights
         stop, rows = int(indptr[own]), int(K.indptr[mine])
-        held = fixed[nodes]
-        flat = held.ravel().astype(np.uint8)
-        transfer = module.SharedTransfer(
+        A = K.indptr[: mine + 1], K.indices[:rows], K.data[:rows]
+        P = (
             indptr[: own + 1].astype(np.int32),
             indices[:stop].astype(np.int32),
-            shares[:stop].astype(np.float32),
-            3,
-            n,
-            len(nodes),
-            fixed.ravel().astype(np.uint8),
-            flat,
+            values[:stop].astype(np.float32),
         )
-        kernel = module.SharedLevel(
-            K.indptr[: mine + 1], K.indices[:rows], np.ascontiguousarray(K.data[:rows]), flat, 3
-        )
-        level = Level(kernel, ghosts, 3, held)
-        return level, transfer, self.points[nodes[:mine]], ~held[:mine]
+        multigrid.add(A, ghosts, fixed[nodes], P)
+        return nodes, mine

@@ -16,7 +16,6 @@ namespace kl {
 
 using Bytes = std::vector<uint8_t>;
 using Doubles = std::vector<double>;
-constexpr int MODES = 6;  // near-nullspace vectors, and unknowns of a coarse node
 
 // Squared Frobenius norms of blocks.
 inline double squared_norm(const double* block, int size) {
@@ -33,7 +32,7 @@ inline Doubles diagonal_norms(const Graph& g, const double* A, int size) {
     return norms;
 }
 
-// Links that are not weaker than theta sqrt(|A_ii| |A_jj|); none for all of them.
+// Links within the rows that are not weaker than theta sqrt(|A_ii| |A_jj|); none for all of them.
 inline Bytes strong_links(const Graph& g, const double* A, int size, double theta) {
     if (theta == 0) return {};
     const Doubles own = diagonal_norms(g, A, size);
@@ -41,8 +40,9 @@ inline Bytes strong_links(const Graph& g, const double* A, int size, double thet
     parallel_ranges(g.rows, ROW_GRAIN, [&](int64_t first, int64_t last) {
         for (int64_t i = first; i < last; ++i)
             for (int32_t k = g.indptr[i]; k < g.indptr[i + 1]; ++k) {
+                const int32_t j = g.indices[k];
                 const double norm = std::sqrt(squared_norm(A + int64_t{k} * size, size));
-                strong[k] = g.indices[k] == i || norm >= theta * std::sqrt(own[i] * own[g.indices[k]]);
+                strong[k] = j == i || (j < g.rows && norm >= theta * std::sqrt(own[i] * own[j]));
             }
     });
     return strong;

@@ -93,6 +93,7 @@ public:
         require(writeable(), "array is not writeable");
         return reinterpret_cast<T*>(fields()->data);
     }
+    std::vector<T> copy() const { return {data(), data() + size()}; }
     T at(int64_t row, int64_t column) const { return data()[row * shape(1) + column]; }
     const Object& object() const { return array; }
 

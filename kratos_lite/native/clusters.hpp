@@ -69,6 +69,10 @@ public:
     Skyline<float> factor;
 
     bool empty() const { return of.empty(); }
+    void forget() {
+        exact = {};
+        near = {};
+    }
     int64_t count() const { return empty() ? 0 : static_cast<int64_t>(starts.size()) - 1; }
     int64_t bytes() const {
         return 4 * static_cast<int64_t>(of.size() + starts.size() + members.size() + factor.rows.size() +

@@ -9,6 +9,14 @@
 
 namespace kl {
 
+constexpr int MODES = 6;  // near-nullspace vectors of a multigrid, and unknowns of a coarse node
+
+// f(b) with the size of blocks, 3 or 6, as a constant.
+template <class F>
+auto with_size(int b, const F& f) {
+    return b == 3 ? f(std::integral_constant<int, 3>()) : f(std::integral_constant<int, MODES>());
+}
+
 // Rows of six numbers, as four and two lanes.
 struct Six {
     typedef vec<double, 4> Four;

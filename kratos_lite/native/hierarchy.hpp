@@ -21,33 +21,34 @@ public:
 
     // The finest level of 3x3 blocks, with nodes at points (n, 3); and, for quadratic elements, the
     // linear level below it.
-    void add_nodal(const Graph& g, const double* data, const Bytes& fixed,
-                   Doubles points) {
-        add_level();
+    void add_nodal(const Graph& g, const double* data, const Bytes& fixed, Doubles points) {
+        Level& level = add_level();
         X = std::move(points);
-        inverse = levels.back().set_matrix(g, data, fixed, 3, settings.thin > 1);
-        levels.back().cluster(data, fixed, X.data(), settings.theta, FAR);
-        levels.back().largest = largest_eigenvalue(levels.back());
+        inverse = level.set_matrix(g, data, fixed, 3, settings.thin > 1);
+        level.cluster(data, fixed, X.data(), settings.theta, FAR);
+        level.largest = largest_eigenvalue(level);
     }
 
     // The finest level without a matrix, with nodes at points (n, 3).
     void add_elements(const MatrixFree& product, const Bytes& fixed, Doubles points) {
-        levels.emplace_back();
         X = std::move(points);
-        inverse = levels.back().set_elements(product, fixed);
-        levels.back().largest = largest_eigenvalue(levels.back());
+        add_shared(nullptr, [&](Level& level) { return level.set_elements(product, fixed, product.n); });
+    }
+
+    // A level that ranks may share, without clusters; set(level) makes it and returns D^-1.
+    template <class F>
+    void add_shared(std::shared_ptr<const Halo> halo, const F& set, uint32_t noise = 0) {
+        Level& level = add_level();
+        if (halo) level.halo = std::move(halo);
+        level.noise += noise;
+        inverse = set(level);
+        level.largest = largest_eigenvalue(level);
     }
 
     // The linear level of quadratic elements below the level that is last: weights (n, m) from its
     // nodes to all.
-    void add_linear(const Graph& g, const double* data, Bytes fixed, Transfer transfer,
-                    const Bytes& fine_fixed, Doubles points) {
-        levels.back().clusters.exact = {};
-        levels.back().clusters.near = {};
-        transfer.weights = true;
-        transfer.fine_fixed = fine_fixed;
-        transfer.coarse_fixed = fixed;
-        transfer.columns = Transposed(g.rows, transfer.P.indptr, transfer.P.indices);
+    void add_linear(const Graph& g, const double* data, const Bytes& fixed, Transfer transfer, Doubles points) {
+        levels.back().clusters.forget();
         transfers.push_back(std::move(transfer));
         add_nodal(g, data, fixed, std::move(points));
     }
@@ -60,16 +61,13 @@ public:
         fine.thin = true;
         X.clear();
         settings.thin = std::max(settings.thin, 1);
-        transfers.emplace_back();
-        Transfer& t = transfers.back();
-        t.P = std::move(P);
-        t.columns = Transposed(nodes, t.P.indptr, t.P.indices);
+        const Transfer& t = transfers.emplace_back(std::move(P), nodes);
         const CoarseMatrix plate = galerkin<3>(fine.graph, data, t.P, t.columns, nodes);
         const Bytes fixed(int64_t{nodes} * MODES, 0);
-        add_coarse(plate, fixed);
-        levels.back().largest = largest_eigenvalue(levels.back());
+        Level& coarse = add_coarse(plate, fixed);
+        coarse.largest = largest_eigenvalue(coarse);
         patched = true;
-        coarsen(levels.back().graph, plate.data.data(), fixed, std::move(B));
+        coarsen(coarse.graph, plate.data.data(), fixed, std::move(B));
     }
 
     // Coarsen the last level, of blocks `data`, by smoothed aggregation until little is left.
@@ -100,8 +98,7 @@ public:
                 sets = 1;
                 count = add_transfer(graph, data, fixed, B, R, next);
             }
-            fine.clusters.exact = {};
-            fine.clusters.near = {};
+            fine.clusters.forget();
             if (count == 0) break;
             patched = patched || shears(graph, data, fixed, static_cast<int32_t>(count / sets));
             if (patched) {
@@ -122,10 +119,8 @@ public:
             coarse.largest = largest_eigenvalue(coarse);
         }
         factorize(data, fixed);
-        inverse.clear();
-        inverse.shrink_to_fit();
-        levels.back().clusters.exact = {};
-        levels.back().clusters.near = {};
+        inverse = {};
+        levels.back().clusters.forget();
     }
 
     // z = M r, the V-cycle on a right side of any size.
@@ -133,6 +128,7 @@ public:
         Level& top = levels.front();
         double norm = 0;
         for (int64_t i = 0; i < top.size(); ++i) norm = std::max(norm, std::fabs(r[i]));
+        norm = top.halo->max(norm);
         if (norm == 0) {
             std::fill(z, z + top.size(), 0.0);
             return;
@@ -158,6 +154,8 @@ public:
 
     std::deque<Level> levels;
     std::deque<Transfer> transfers;
+    Doubles inverse;  // D^-1 of the last level, while setting up
+    Settings settings;
 
 private:
     // Does the smoothing of lines leave fields without shear in parts of this level, of a plate's nodes?
@@ -192,9 +190,9 @@ private:
         Level& coarse = levels[l + 1];
         smooth(level, true);
         level.residual(level.y);
-        transfers[l].restrict_to(level, level.y, coarse, coarse.c);
+        transfers[l].restrict_to(level, coarse);
         descend(l + 1);
-        transfers[l].prolong(coarse.x, level, level.x);
+        transfers[l].prolong(coarse, level);
         smooth(level, false);
     }
 
@@ -204,10 +202,8 @@ private:
     }
 
     void solve_coarsest(Level& level) {
-        if (level.size() > FULL_LIMIT) {  // aggregation came to a halt: smooth well instead
-            level.smooth(20, 400, true);
-            return;
-        }
+        if (level.halo->solve(level.c.data(), level.x.data())) return;
+        if (coarsest.at.empty()) return level.smooth(20, 400, true);  // aggregation came to a halt
         Doubles x(level.c.begin(), level.c.begin() + level.size());
         dispatch<double>([&](auto V) KL_INLINE_LAMBDA { substitute_rows<V>(coarsest, 0, level.size(), x.data()); });
         for (int64_t i = 0; i < level.size(); ++i) level.x[i] = static_cast<float>(x[i]);
@@ -258,24 +254,20 @@ private:
         return out;
     }
 
+    // Aggregate, smooth and multiply; returns the number of coarse nodes, or 0 if nothing is gained.
     int64_t add_transfer(const Graph& g, const double* data, const Bytes& fixed, Doubles& B, Doubles& R,
                          CoarseMatrix& next) {
-        return levels.back().b == 3 ? add_transfer<3>(g, data, fixed, B, R, next)
-                                    : add_transfer<6>(g, data, fixed, B, R, next);
+        return with_size(levels.back().b, [&](auto b) { return add_transfer<b>(g, data, fixed, B, R, next); });
     }
 
-    // Aggregate, smooth and multiply; returns the number of coarse nodes, or 0 if nothing is gained.
     template <int b>
-    int64_t add_transfer(const Graph& g, const double* data, const Bytes& fixed,
-                         Doubles& B, Doubles& R, CoarseMatrix& next) {
-        Bytes excluded(g.rows);
-        for (int64_t i = 0; i < g.rows; ++i) {
-            excluded[i] = 1;
-            for (int c = 0; c < b; ++c) excluded[i] &= fixed[i * b + c];
-        }
+    int64_t add_transfer(const Graph& g, const double* data, const Bytes& fixed, Doubles& B, Doubles& R,
+                         CoarseMatrix& next) {
+        const Level& fine = levels.back();
+        const Bytes excluded = fine.excluded(fixed);
         Bytes strong = strong_links(g, data, b * b, settings.theta);
         Ints& of = aggregates;
-        Clusters& clusters = levels.back().clusters;
+        const Clusters& clusters = fine.clusters;
         if (strong.empty()) strong = clusters.near;
         for (size_t k = 0; k < clusters.near.size(); ++k) strong[k] &= clusters.near[k];
         const int32_t count = clusters.empty() ? aggregate(g, excluded, strong, of)
@@ -283,24 +275,20 @@ private:
         const int32_t nodes = count * sets;
         if (count == 0 || nodes * MODES > 0.9 * b * g.rows) return 0;
         R = tentative_prolongator<b>(of, count, B, sets);
-        const Smoothing smoothing{g, data, fixed, of, B, sets, 4.0 / 3.0 / levels.back().largest};
-        transfers.emplace_back();
-        Transfer& t = transfers.back();
-        t.P = clusters.empty() ? smoothed_prolongator<b>(smoothing, inverse.data())
-                               : smoothed_prolongator<b>(smoothing, clusters);
-        t.columns = Transposed(nodes, t.P.indptr, t.P.indices);
+        const Smoothing smoothing{g, data, fixed, of, B, sets, 4.0 / 3.0 / fine.largest};
+        const Transfer& t = transfers.emplace_back(clusters.empty() ? smoothed_prolongator<b>(smoothing, inverse.data())
+                                                                    : smoothed_prolongator<b>(smoothing, clusters),
+                                                   nodes);
         next = galerkin<b>(g, data, t.P, t.columns, nodes);
         return nodes;
     }
 
     static constexpr int64_t FULL_LIMIT = 1500;
     static constexpr double LARGEST_PLANES = 2.5, LARGEST_SETS = 1.25;  // memory of a level to that above it
-    Settings settings;
     int sets = 1;          // coarse nodes of each aggregate
     bool patched = false;  // whether overlapping parts smooth
     Ints aggregates;       // of the nodes of the last level
     Skyline<double> coarsest;  // a direction without stiffness is left at zero
-    Doubles inverse;  // D^-1 of the last level, while setting up
     Doubles X;        // nodes of the last level, where they are known
 };
 

@@ -1,6 +1,8 @@
 // One level of a multigrid hierarchy in float32: products and Chebyshev smoothing.
 
 #pragma once
+#include <memory>
+
 #include "matrix_free.hpp"
 #include "patches.hpp"
 
@@ -62,10 +64,22 @@ KL_INLINE void residual_rows(const Graph& g, const double* A, const uint8_t* hel
     }
 }
 
+// How ranks keep the nodes of a level that they share in step; one process has nothing to do.
+struct Halo {
+    virtual ~Halo() = default;
+    virtual void update(float*) const {}  // give copies of nodes, behind the own ones, what their owners have
+    virtual void add(float*) const {}     // add what copies have to what their owners have
+    virtual double sum(double x) const { return x; }
+    virtual double max(double x) const { return x; }
+    virtual bool solve(float*, float*) const { return false; }  // A x = c on the coarsest level
+};
+
 class Level {
 public:
     int b = 3;
-    int64_t n = 0;
+    int64_t n = 0;  // own nodes; copies of those of other ranks stand behind them
+    std::shared_ptr<const Halo> halo = std::make_shared<Halo>();
+    uint32_t noise = 12345;  // from which the largest eigenvalue is found
     Graph graph{};
     Ints own_indptr, own_indices;  // where the pattern is not borrowed
     Floats A, Dinv;
@@ -86,6 +100,13 @@ public:
                (elements ? elements->bytes() : 0);
     }
 
+    // Nodes without free components, and copies.
+    Bytes excluded(const Bytes& fixed) const {
+        Bytes out(fixed.size() / b, 1);
+        for (int64_t i = 0; i < n; ++i) out[i] = !std::count(&fixed[i * b], &fixed[i * b] + b, 0);
+        return out;
+    }
+
     // Solve exactly within clusters of the nodes at X, if it has any.
     void cluster(const double* data, const Bytes& fixed, const double* X, double theta, double far) {
         clusters = find_clusters(graph, data, b, fixed, X, theta, far);
@@ -103,32 +124,28 @@ public:
 
     // Make a float copy of the blocks with rows and columns of fixed components uncoupled, and the
     // inverse of the diagonal blocks, which is also returned in double.
-    Doubles set_matrix(const Graph& g, const double* data, const Bytes& fixed, int block,
-                       bool in_double = false) {
-        b = block;
-        n = g.rows;
+    Doubles set_matrix(const Graph& g, const double* data, const Bytes& fixed, int block, bool in_double = false) {
         graph = g;
+        allocate(g.rows, block, fixed);
         if (in_double) {
             exact = data;
             held = fixed;
         } else {
             A.resize(numbers() + 8);
         }
-        Dinv.assign(static_cast<size_t>(n) * b * b + 8, 0.0f);
-        Doubles inverse(static_cast<size_t>(n) * b * b);
+        Doubles inverse(size() * b);
         parallel_ranges(n, grain(), [&](int64_t first, int64_t last) {
-            b == 3 ? set_rows<3>(data, fixed, inverse, first, last) : set_rows<6>(data, fixed, inverse, first, last);
+            with_size(b, [&](auto B) { set_rows<B>(data, fixed, inverse, first, last); });
         });
-        for (Floats* v : {&x, &y, &d, &c}) v->assign(size() + 8, 0.0f);
         return inverse;
     }
 
-    // Take the product of elements in place of a matrix; return the inverse of the diagonal blocks in double.
-    Doubles set_elements(const MatrixFree& product, const Bytes& fixed) {
+    // Take the product of elements, the first of whose nodes are own ones, in place of a matrix; return the
+    // inverse of the diagonal blocks in double.
+    Doubles set_elements(const MatrixFree& product, const Bytes& fixed, int64_t own) {
         elements = &product;
         held = fixed;
-        n = product.n;
-        Dinv.assign(static_cast<size_t>(n) * 9 + 8, 0.0f);
+        allocate(own, 3, fixed);
         Doubles D = product.diagonal();
         parallel_ranges(n, grain(), [&](int64_t first, int64_t last) {
             for (int64_t i = first; i < last; ++i) {
@@ -139,13 +156,13 @@ public:
                 std::copy(&D[9 * i], &D[9 * i] + 9, &Dinv[9 * i]);
             }
         });
-        for (Floats* v : {&x, &y, &d, &c}) v->assign(size() + 8, 0.0f);
         return D;
     }
 
     // next = x + d with d = alpha d + beta D^-1 (c - A x); or next = c - A x without smoothing.
-    void step(const float* from, float* to, float alpha, float beta, bool smooth) {
-        if (elements) return step_elements(from, c.data(), d.data(), to, alpha, beta, smooth);
+    void step(float* from, float* to, float alpha, float beta, bool smooth) {
+        halo->update(from);
+        if (elements) return step_elements(from, to, alpha, beta, smooth);
         const bool single = clusters.empty() && patches.empty();
         const float* inverse = smooth && single ? Dinv.data() : nullptr;
         parallel_ranges(n, grain(), [&](int64_t first, int64_t last) {
@@ -153,8 +170,10 @@ public:
                 return dispatch<double>([&](auto) KL_INLINE_LAMBDA {
                     residual_rows(graph, exact, held.data(), c.data(), from, to, first, last);
                 });
-            b == 3 ? step<3>(inverse, from, to, alpha, beta, first, last)
-                   : step<6>(inverse, from, to, alpha, beta, first, last);
+            with_size(b, [&](auto B) {
+                thin ? step<B, double>(inverse, from, to, alpha, beta, first, last)
+                     : step<B, float>(inverse, from, to, alpha, beta, first, last);
+            });
         });
         if (!smooth) return;
         if (!patches.empty())
@@ -169,11 +188,6 @@ public:
     void first_step(float beta) {
         if (!patches.empty()) return patches.step(b, c.data(), nullptr, d.data(), x.data(), 0, beta);
         if (!clusters.empty()) return clusters.step(b, c.data(), nullptr, d.data(), x.data(), 0, beta);
-        first_step(c.data(), d.data(), x.data(), beta);
-    }
-
-    // The same with the diagonal blocks, in vectors of the caller.
-    void first_step(const float* c, float* d, float* x, float beta) const {
         parallel_ranges(n, 8 * grain(), [&](int64_t first, int64_t last) {
             for (int64_t i = first; i < last; ++i)
                 for (int r = 0; r < b; ++r) {
@@ -181,26 +195,6 @@ public:
                     for (int j = 0; j < b; ++j) z += Dinv[(i * b + j) * b + r] * c[i * b + j];
                     d[i * b + r] = x[i * b + r] = beta * z;
                 }
-        });
-    }
-
-    // A step in vectors of the caller, of n nodes: the product may have more.
-    void step_elements(const float* from, const float* c, float* d, float* to, float alpha, float beta,
-                       bool smooth) const {
-        elements->multiply(from, [&](int64_t i, const float* sum) {
-            if (i >= n) return;
-            float r[3];
-            for (int j = 0; j < 3; ++j) r[j] = held[3 * i + j] ? 0.0f : c[3 * i + j] - sum[j];
-            if (!smooth) {
-                std::copy(r, r + 3, to + 3 * i);
-                return;
-            }
-            const float* D = &Dinv[9 * i];
-            for (int j = 0; j < 3; ++j) {
-                float& change = d[3 * i + j];
-                change = alpha * change + beta * (D[j] * r[0] + D[3 + j] * r[1] + D[6 + j] * r[2]);
-                to[3 * i + j] = from[3 * i + j] + change;
-            }
         });
     }
 
@@ -224,11 +218,11 @@ public:
     void residual(Floats& out) { step(x.data(), out.data(), 0, 0, false); }
 
 private:
-    template <int B>
-    void step(const float* inverse, const float* from, float* to, float alpha, float beta, int64_t first,
-              int64_t last) {
-        if (thin) return step<B, double>(inverse, from, to, alpha, beta, first, last);
-        step<B, float>(inverse, from, to, alpha, beta, first, last);
+    void allocate(int64_t own, int block, const Bytes& fixed) {
+        n = own;
+        b = block;
+        Dinv.assign(size() * b + 8, 0.0f);
+        for (Floats* v : {&x, &y, &d, &c}) v->assign(fixed.size() + 8, 0.0f);
     }
 
     template <int B, class Sum>
@@ -236,6 +230,24 @@ private:
               int64_t last) {
         dispatch<float>([&](auto) KL_INLINE_LAMBDA {
             step_rows<B, Sum>(graph, A.data(), inverse, c.data(), from, d.data(), to, alpha, beta, first, last);
+        });
+    }
+
+    void step_elements(const float* from, float* to, float alpha, float beta, bool smooth) {
+        elements->multiply(from, [&](int64_t i, const float* sum) {
+            if (i >= n) return;
+            float r[3];
+            for (int j = 0; j < 3; ++j) r[j] = held[3 * i + j] ? 0.0f : c[3 * i + j] - sum[j];
+            if (!smooth) {
+                std::copy(r, r + 3, to + 3 * i);
+                return;
+            }
+            const float* D = &Dinv[9 * i];
+            for (int j = 0; j < 3; ++j) {
+                float& change = d[3 * i + j];
+                change = alpha * change + beta * (D[j] * r[0] + D[3 + j] * r[1] + D[6 + j] * r[2]);
+                to[3 * i + j] = from[3 * i + j] + change;
+            }
         });
     }
 
@@ -309,8 +321,8 @@ inline double largest_tridiagonal(const Doubles& diagonal, const Doubles& off_di
 // Source: Saad, Iterative Methods for Sparse Linear Systems (2003), section 6.7.3.
 inline float largest_eigenvalue(Level& level, int steps = 15) {
     const int64_t size = level.size();
-    Floats r(size + 8), z(size + 8);
-    uint32_t noise = 12345;
+    Floats r(level.x.size()), z(level.x.size());
+    uint32_t noise = level.noise;
     for (int64_t i = 0; i < size; ++i) {
         noise = noise * 1664525u + 1013904223u;
         if (level.held.empty() || !level.held[i]) r[i] = static_cast<float>(noise >> 8) / 16777216.0f - 0.5f;
@@ -323,12 +335,12 @@ inline float largest_eigenvalue(Level& level, int steps = 15) {
         level.first_step(1);  // d = x = D^-1 r
         level.c.swap(r);
         const double old_rz = rz, old_alpha = alpha;
-        rz = dot(r.data(), level.x.data(), size);
+        rz = level.halo->sum(dot(r.data(), level.x.data(), size));
         if (!(rz > 0)) break;
         beta = k ? rz / old_rz : 0;
         for_each(size, [&](int64_t i) { z[i] = level.x[i] + static_cast<float>(beta) * z[i]; });
         level.step(z.data(), level.y.data(), 0, 0, false);  // y = -A z
-        const double curvature = -dot(z.data(), level.y.data(), size);
+        const double curvature = -level.halo->sum(dot(z.data(), level.y.data(), size));
         if (!(curvature > 0)) break;
         alpha = rz / curvature;
         if (k) off_diagonal.push_back(std::sqrt(beta) / old_alpha);

@@ -1,30 +1,11 @@
 // Algebraic multigrid for matrices of 3x3 blocks, as a preconditioner and as a solver.
 
 #include "displacement_pressure.hpp"
-#include "elements.hpp"
 #include "rank_multigrid.hpp"
 
 namespace {
 
 using namespace kl;
-
-// A sparse matrix of blocks, whose arrays were checked, and are kept.
-template <class T>
-struct Blocks {
-    Array<int32_t> indptr, indices;
-    Array<T> data;
-
-    Blocks() = default;
-    Blocks(Array<int32_t> starts, Array<int32_t> columns, Array<T> blocks, int64_t rows, int64_t width)
-        : indptr(std::move(starts)), indices(std::move(columns)), data(std::move(blocks)) {
-        require(data.ndim() == 3 && data.shape(0) == indices.size(), "data must be (nnz, R, C)");
-        require(indptr.size() == rows + 1, "the matrix must have a row for each row of blocks");
-        check_rows(indptr, indices.size());
-        require(are_rows(indices, width), "indices must be columns of the matrix");
-    }
-    int64_t rows() const { return indptr.size() - 1; }
-    Graph graph() const { return {rows(), indptr.data(), indices.data()}; }
-};
 
 // A square matrix of 3x3 blocks.
 struct Matrix : Blocks<double> {
@@ -36,85 +17,9 @@ struct Matrix : Blocks<double> {
     BlockMatrix blocks() const { return {graph(), data.data(), static_cast<uint32_t>(rows())}; }
 };
 
-// From places to points and to slopes (n, n), and from nodes to places (n^3, k), of a tensor product rule whose
-// points come in the order of the places.
-using Factors = std::optional<std::tuple<Array<double>, Array<double>, Array<double>>>;
-
-TensorTables<double> tensor_tables(const Factors& factors, const Elements& w) {
-    TensorTables<double> t;
-    if (!factors) return t;
-    const auto& [values, slopes, places] = *factors;
-    t.n = static_cast<int>(values.shape(0));
-    require((t.n == 2 || t.n == 3) && has_shape(values, t.n, t.n) && has_shape(slopes, t.n, t.n) &&
-                w.g == t.n * t.n * t.n && has_shape(places, w.g, w.k),
-            "factors must be two (n, n) with n = 2 or 3, and (n^3, k)");
-    std::copy(values.data(), values.data() + values.size(), t.values);
-    std::copy(slopes.data(), slopes.data() + slopes.size(), t.slopes);
-    t.place.assign(w.k, -1);
-    for (int p = 0; p < w.g; ++p) {
-        const double* row = places.data() + static_cast<int64_t>(p) * w.k;
-        const auto is_one = [](double weight) { return weight == 1; };
-        const bool single = std::count(row, row + w.k, 0.0) == w.k - 1 && std::count_if(row, row + w.k, is_one);
-        if (single)
-            t.place[std::find_if(row, row + w.k, is_one) - row] = p;
-        else {
-            t.extra.push_back(p);
-            t.weights.insert(t.weights.end(), row, row + w.k);
-        }
-    }
-    for (int p : t.place) require(p >= 0, "each node must have a place");
-    return t;
-}
-
-// Elements of a kind (nodes, dN, weights, C, factors), whose arrays are kept.
-using ElementTables = std::tuple<Array<int32_t>, Array<double>, Array<double>, Array<double>, Factors>;
-
-class Product : public MatrixFree {
-public:
-    Product(Numbers points, std::vector<ElementTables> groups)
-        : MatrixFree(points.size() / 3, points.data()), groups(std::move(groups)) {
-        for (const auto& [nodes, dN, weights, C, factors] : this->groups) {
-            Elements w = elements(points, nodes, dN, weights);
-            set_law(w, C, {});
-            add(w, tensor_tables(factors, w));
-        }
-        GilReleased release;
-        prepare();
-    }
-
-    // Components that depend on others from now on, with their weights.
-    void tie(Array<int32_t> dependents, Array<int32_t> indptr, Array<int32_t> independents, Array<double> weights) {
-        require(indptr.size() == dependents.size() + 1, "indptr must have a row for each dependent component");
-        require(weights.size() == independents.size(), "one weight for each index is needed");
-        check_rows(indptr, independents.size());
-        require(are_rows(dependents, 3 * n) && are_rows(independents, 3 * n), "indices must be components of nodes");
-        const auto copied = [](const auto& array) { return std::vector(array.data(), array.data() + array.size()); };
-        ties = Ties(copied(dependents), copied(indptr), copied(independents), copied(weights), n);
-    }
-
-    Array<double> times(Array<double> x, bool tied) const {
-        require(x.size() == 3 * n, "x must have three numbers for each point");
-        Array<double> y(3 * n);
-        Doubles from(x.data(), x.data() + 3 * n);
-        from.push_back(0);
-        double* to = y.mutable_data();
-        GilReleased release;
-        multiply(from.data(), to, tied);
-        return y;
-    }
-
-    double largest_row_sum() const {
-        GilReleased release;
-        return norm();
-    }
-
-private:
-    std::vector<ElementTables> groups;
-};
-
 Doubles coordinates(Numbers points, size_t unknowns) {
     require(static_cast<size_t>(points.size()) == unknowns, "points must be (n, 3)");
-    return {points.data(), points.data() + points.size()};
+    return points.copy();
 }
 
 // Tell a callback a residual; it may say stop.
@@ -130,7 +35,7 @@ bool goes_on(const Object& progress, double residual) {
 Doubles free_modes(Numbers modes, const Bytes& fixed) {
     const int64_t six = MODES * static_cast<int64_t>(fixed.size());
     require(modes.size() == six || modes.size() == 2 * six, "modes must be (3n, 6) or (3n, 12)");
-    Doubles B(modes.data(), modes.data() + modes.size());
+    Doubles B = modes.copy();
     const size_t columns = modes.size() == six ? MODES : 2 * MODES;
     for (size_t i = 0; i < B.size(); ++i)
         if (fixed[i / columns]) B[i] = 0;
@@ -140,7 +45,7 @@ Doubles free_modes(Numbers modes, const Bytes& fixed) {
 class Multigrid {
 public:
     Multigrid(Matrix matrix, Array<uint8_t> fixed, Numbers points, Settings settings)
-        : A(std::move(matrix)), fixed(bytes_in(fixed)), hierarchy(settings) {
+        : A(std::move(matrix)), fixed(fixed.copy()), hierarchy(settings) {
         require(A.rows() > 0, "there must be a node");
         require(fixed.size() == 3 * A.rows(), "fixed must have one entry for each unknown");
         Doubles X = coordinates(points, this->fixed.size());
@@ -149,7 +54,7 @@ public:
     }
 
     Multigrid(std::shared_ptr<Product> product, Array<uint8_t> fixed, Numbers points, Settings settings)
-        : elements(std::move(product)), fixed(bytes_in(fixed)), hierarchy(settings) {
+        : elements(std::move(product)), fixed(fixed.copy()), hierarchy(settings) {
         require(elements->n > 0, "there must be a node");
         require(fixed.size() == 3 * elements->n, "fixed must have one entry for each unknown");
         Doubles X = coordinates(points, this->fixed.size());
@@ -175,14 +80,12 @@ public:
         require(3 * (indptr.size() - 1) == static_cast<int64_t>(fixed.size()), "weights must have one row for each node");
         require(weights.size() == indices.size(), "one weight for each index is needed");
         require(are_rows(indices, finest.rows()), "indices must be nodes of the linear level");
-        Bytes coarse_fixed = bytes_in(linear_fixed);
+        Bytes coarse_fixed = linear_fixed.copy();
         Doubles B = free_modes(modes, coarse_fixed), X = coordinates(points, coarse_fixed.size());
-        Transfer transfer;
-        transfer.P = prolongator_of(indptr, indices, weights, false);
+        Transfer transfer(prolongator_of(indptr, indices, weights, false), fixed, coarse_fixed);
         coarsen([&] {
             below = std::move(linear);
-            hierarchy.add_linear(finest.graph(), finest.data.data(), coarse_fixed, std::move(transfer), fixed,
-                                 std::move(X));
+            hierarchy.add_linear(finest.graph(), finest.data.data(), coarse_fixed, std::move(transfer), std::move(X));
             hierarchy.coarsen(finest.graph(), finest.data.data(), coarse_fixed, std::move(B));
         });
     }
@@ -195,7 +98,7 @@ public:
         require(modes.size() == nodes * MODES * 2 * MODES, "modes must be (6m, 12)");
         require(are_rows(indices, nodes), "indices must be nodes of the plate");
         Prolongator P = prolongator_of(indptr, indices, blocks);
-        Doubles B(modes.data(), modes.data() + modes.size());
+        Doubles B = modes.copy();
         coarsen([&] {
             hierarchy.coarsen_plate(A.data.data(), std::move(P), static_cast<int32_t>(nodes), std::move(B));
         });
@@ -283,14 +186,10 @@ private:
 // Displacements by a multigrid, and pressures.
 class Pressures {
 public:
-    // Arrays (indptr, indices, data) of a sparse matrix.
-    template <class T>
-    using Parts = std::tuple<Array<int32_t>, Array<int32_t>, Array<T>>;
-
     Pressures(std::shared_ptr<Multigrid> multigrid, const Parts<double>& D, const Parts<float>& S, Array<double> scale,
               Array<double> bulk, Array<double> kept, Array<double> weight, double share, int most)
         : multigrid(std::move(multigrid)), M(*this->multigrid), R(block_size(D)),
-          D(blocks(D, bulk.size() / R, M.A.rows())), S(blocks(S, bulk.size() / R, bulk.size() / R)),
+          D(D, bulk.size() / R, M.A.rows()), S(S, bulk.size() / R, bulk.size() / R),
           scale(std::move(scale)), bulk(std::move(bulk)),
           kept(std::move(kept)), solver(made(weight, share, most)) {}
 
@@ -317,11 +216,6 @@ private:
         return static_cast<int>(size);
     }
 
-    template <class T>
-    static Blocks<T> blocks(const Parts<T>& parts, int64_t rows, int64_t columns) {
-        return {std::get<0>(parts), std::get<1>(parts), std::get<2>(parts), rows, columns};
-    }
-
     DisplacementPressure made(const Array<double>& weight, double share, int most) {
         const int64_t pressures = bulk.size();
         require(D.data.shape(1) == R && D.data.shape(2) == 3, "blocks of D must be R x 3");
@@ -329,10 +223,8 @@ private:
         require(pressures % R == 0 && scale.size() == pressures && kept.size() == pressures &&
                     weight.size() == 3 * M.A.rows() + pressures,
                 "each pressure needs a scale, a bulk modulus, one that is kept, and a weight");
-        const Ints starts(D.indptr.data(), D.indptr.data() + D.indptr.size());
-        const Ints columns(D.indices.data(), D.indices.data() + D.indices.size());
         return {M.A.blocks(), M.fixed, M.hierarchy,
-                Dilatations{D.graph(), D.data.data(), R, Transposed(M.A.rows(), starts, columns)},
+                Dilatations{D.graph(), D.data.data(), R, Transposed(M.A.rows(), D.indptr.copy(), D.indices.copy())},
                 PressureOperator{S.graph(), S.data.data(), scale.data(), R, share, most, {}, {}, {}, {}},
                 bulk.data(), kept.data(), Doubles(weight.data(), weight.data() + weight.size())};
     }
@@ -346,14 +238,6 @@ private:
     DisplacementPressure solver;
 };
 
-auto matrix(Array<int32_t> indptr, Array<int32_t> indices, Array<double> data) {
-    return std::make_shared<Matrix>(std::move(indptr), std::move(indices), std::move(data));
-}
-
-auto product(Numbers points, std::vector<ElementTables> groups) {
-    return std::make_shared<Product>(points, std::move(groups));
-}
-
 // A multigrid of a matrix or of a product.
 std::shared_ptr<Multigrid> multigrid(const Object& A, Array<uint8_t> fixed, Numbers points, int degree, float ratio,
                                      double theta, int thin) {
@@ -362,26 +246,6 @@ std::shared_ptr<Multigrid> multigrid(const Object& A, Array<uint8_t> fixed, Numb
         return std::make_shared<Multigrid>(held<Product>(A.get()), std::move(fixed), points, settings);
     if (!is_instance<Matrix>(A.get())) signature<&multigrid>.refuse("A must be a Matrix or a Product, not ", A.get());
     return std::make_shared<Multigrid>(*held<Matrix>(A.get()), std::move(fixed), points, settings);
-}
-
-auto pressures(std::shared_ptr<Multigrid> multigrid, const Pressures::Parts<double>& D, const Pressures::Parts<float>& S,
-               Array<double> scale, Array<double> bulk, Array<double> kept, Array<double> weight, double share,
-               int most) {
-    return std::make_shared<Pressures>(std::move(multigrid), D, S, std::move(scale), std::move(bulk), std::move(kept),
-                                       std::move(weight), share, most);
-}
-
-auto shared_level(Array<int32_t> indptr, Array<int32_t> indices, Array<double> data, Array<uint8_t> fixed, int b) {
-    return std::make_shared<SharedLevel>(std::move(indptr), std::move(indices), std::move(data), std::move(fixed), b);
-}
-
-auto shared_product(std::shared_ptr<Product> product, Array<uint8_t> fixed, int64_t own) {
-    return std::make_shared<SharedLevel>(*product, product, std::move(fixed), own);
-}
-
-auto shared_transfer(Array<int32_t> indptr, Array<int32_t> indices, Array<float> data, int b, int64_t fine,
-                     int64_t coarse, Array<uint8_t> fine_fixed, Array<uint8_t> coarse_fixed) {
-    return std::make_shared<SharedTransfer>(indptr, indices, data, b, fine, coarse, fine_fixed, coarse_fixed);
 }
 
 }  // namespace
@@ -404,25 +268,24 @@ KL_MODULE(_multigrid, m) {
                           method<&Multigrid::has_planes>("has_planes"),
                           method<&Multigrid::bytes>("bytes"),
                           method<&Multigrid::complexity>("complexity")});
-    add_class<SharedLevel>("kratos_lite.native.SharedLevel",
-                           {method<&SharedLevel::step>("step"), method<&SharedLevel::first_step>("first_step"),
-                            method<&SharedLevel::aggregates>("aggregates"), method<&SharedLevel::tentative>("tentative"),
-                            method<&SharedLevel::prolongator>("prolongator"),
-                            method<&SharedLevel::galerkin>("galerkin"), method<&SharedLevel::forget>("forget"),
-                            method<&SharedLevel::bytes>("bytes")});
-    add_class<SharedTransfer>("kratos_lite.native.SharedTransfer",
-                              {method<&SharedTransfer::restrict_to>("restrict_to"),
-                               method<&SharedTransfer::prolong>("prolong"), method<&SharedTransfer::bytes>("bytes")});
-    define<&shared_level>(m, "SharedLevel", "a level of a multigrid over ranks, of a matrix",
-                          {"indptr", "indices", "data", "fixed", "b"});
-    define<&shared_product>(m, "SharedProduct", "a level of a multigrid over ranks, of a Product",
-                            {"product", "fixed", "own"});
-    define<&shared_transfer>(m, "SharedTransfer", "a transfer between levels of a multigrid over ranks",
-                             {"indptr", "indices", "data", "b", "fine", "coarse", "fine_fixed", "coarse_fixed"});
-    define<&matrix>(m, "Matrix", "a matrix of 3x3 blocks", {"indptr", "indices", "data"});
-    define<&product>(m, "Product", "products of the stiffness of elements, without a matrix", {"points", "groups"});
+    add_class<RankMultigrid>("kratos_lite.native.RankMultigrid",
+                             {method<&RankMultigrid::add_product>("add_product"),
+                              method<&RankMultigrid::add_matrix>("add_matrix"),
+                              method<&RankMultigrid::aggregates>("aggregates"),
+                              method<&RankMultigrid::tentative>("tentative"),
+                              method<&RankMultigrid::prolongator>("prolongator"),
+                              method<&RankMultigrid::galerkin>("galerkin"), method<&RankMultigrid::finish>("finish"),
+                              method<&RankMultigrid::cycle>("cycle")});
+    define<&make<RankMultigrid, int, float, double, uint32_t>>(m, "RankMultigrid", "a multigrid over ranks",
+                                                               {"degree", "ratio", "theta", "rank"});
+    define<&make<Matrix, Array<int32_t>, Array<int32_t>, Array<double>>>(m, "Matrix", "a matrix of 3x3 blocks",
+                                                                         {"indptr", "indices", "data"});
+    define<&make<Product, Array<double>, std::vector<ElementTables>>>(
+        m, "Product", "products of the stiffness of elements, without a matrix", {"points", "groups"});
     define<&multigrid>(m, "Multigrid", "a multigrid of a Matrix or a Product",
                        {"A", "fixed", "points", "degree", "ratio", "theta", {"thin", PyLong_FromLong(0)}});
-    define<&pressures>(m, "Pressures", "displacements by a multigrid, and pressures",
-                       {"multigrid", "D", "S", "scale", "bulk", "kept", "weight", "share", "most"});
+    define<&make<Pressures, std::shared_ptr<Multigrid>, Parts<double>, Parts<float>, Array<double>, Array<double>,
+                 Array<double>, Array<double>, double, int>>(
+        m, "Pressures", "displacements by a multigrid, and pressures",
+        {"multigrid", "D", "S", "scale", "bulk", "kept", "weight", "share", "most"});
 }

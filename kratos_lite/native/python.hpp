@@ -78,6 +78,13 @@ struct GilReleased {
     ~GilReleased() { PyEval_RestoreThread(state); }
 };
 
+// What f() returns, which needs nothing of Python.
+template <class F>
+auto without_gil(const F& f) {
+    GilReleased release;
+    return f();
+}
+
 struct GilHeld {
     PyGILState_STATE state = PyGILState_Ensure();
     GilHeld() = default;
@@ -373,6 +380,10 @@ void define(const Object& m, const char* name, const char* doc, const std::vecto
     if (PyModule_AddObject(m.get(), name, made.get())) throw PythonError{};
     made.release();
 }
+
+// A function that makes an object of a class.
+template <class C, class... A>
+std::shared_ptr<C> make(A... arguments) { return std::make_shared<C>(std::move(arguments)...); }
 
 // A class whose objects functions return.
 template <class C>

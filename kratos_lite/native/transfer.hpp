@@ -50,22 +50,29 @@ struct Transfer {
     bool weights = false;
     Bytes fine_fixed, coarse_fixed;  // components that weights must not touch
 
+    Transfer(Prolongator prolongator, int64_t coarse_nodes)
+        : P(std::move(prolongator)), columns(coarse_nodes, P.indptr, P.indices) {}
+    Transfer(Prolongator prolongator, Bytes fine_fixed, Bytes coarse_fixed)
+        : P(std::move(prolongator)), columns(static_cast<int64_t>(coarse_fixed.size()) / 3, P.indptr, P.indices),
+          weights(true), fine_fixed(std::move(fine_fixed)), coarse_fixed(std::move(coarse_fixed)) {}
+
     int64_t bytes() const {
         return 4 * static_cast<int64_t>(P.indptr.size() + P.indices.size() + P.data.size() + columns.indptr.size() +
                                         columns.rows.size() + columns.entries.size());
     }
 
-    // coarse = P^T fine
-    void restrict_to(const Level& fine, const Floats& from, const Level& coarse, Floats& to) const {
-        restrict_to(fine.b, from.data(), coarse.n, to.data());
-    }
-
-    // The same between vectors, to `count` coarse nodes.
-    void restrict_to(int b, const float* from, int64_t count, float* to) const {
-        parallel_ranges(count, 64, [&](int64_t first, int64_t last) {
+    // c of the coarse level = P^T y of the fine one
+    void restrict_to(const Level& fine, Level& coarse) const {
+        const float* from = fine.y.data();
+        float* to = coarse.c.data();
+        parallel_ranges(static_cast<int64_t>(columns.indptr.size()) - 1, 64, [&](int64_t first, int64_t last) {
             if (!weights)
-                return b == 3 ? restrict_blocks<3>(from, to, first, last)
-                                   : restrict_blocks<6>(from, to, first, last);
+                return with_size(fine.b, [&](auto B) {
+                    constexpr int b = decltype(B)::value;
+                    dispatch<float>([&](auto) KL_INLINE_LAMBDA {
+                        restrict_rows<b>(columns, P.data.data(), from, to, first, last);
+                    });
+                });
             for (int64_t I = first; I < last; ++I) {
                 float sum[3] = {};
                 for (int32_t k = columns.indptr[I]; k < columns.indptr[I + 1]; ++k)
@@ -74,19 +81,20 @@ struct Transfer {
                 for (int c = 0; c < 3; ++c) to[3 * I + c] = coarse_fixed[3 * I + c] ? 0.0f : sum[c];
             }
         });
+        coarse.halo->add(to);
     }
 
-    // fine += P coarse
-    void prolong(const Floats& from, const Level& fine, Floats& to) const {
-        prolong(from.data(), fine.b, fine.n, to.data());
-    }
-
-    // The same between vectors, to `count` fine nodes.
-    void prolong(const float* from, int b, int64_t count, float* to) const {
-        parallel_ranges(count, 1024, [&](int64_t first, int64_t last) {
+    // x of the fine level += P x of the coarse one
+    void prolong(Level& coarse, Level& fine) const {
+        coarse.halo->update(coarse.x.data());
+        const float* from = coarse.x.data();
+        float* to = fine.x.data();
+        parallel_ranges(fine.n, 1024, [&](int64_t first, int64_t last) {
             if (!weights)
-                return b == 3 ? prolong_blocks<3>(from, to, first, last)
-                                   : prolong_blocks<6>(from, to, first, last);
+                return with_size(fine.b, [&](auto B) {
+                    constexpr int b = decltype(B)::value;
+                    dispatch<float>([&](auto) KL_INLINE_LAMBDA { prolong_rows<b>(P, from, to, first, last); });
+                });
             for (int64_t i = first; i < last; ++i) {
                 float sum[3] = {};
                 for (int32_t k = P.indptr[i]; k < P.indptr[i + 1]; ++k)
@@ -96,19 +104,6 @@ struct Transfer {
                     if (!fine_fixed[3 * i + c]) to[3 * i + c] += sum[c];
             }
         });
-    }
-
-private:
-    template <int b>
-    void restrict_blocks(const float* from, float* to, int64_t first, int64_t last) const {
-        dispatch<float>([&](auto) KL_INLINE_LAMBDA {
-            restrict_rows<b>(columns, P.data.data(), from, to, first, last);
-        });
-    }
-
-    template <int b>
-    void prolong_blocks(const float* from, float* to, int64_t first, int64_t last) const {
-        dispatch<float>([&](auto) KL_INLINE_LAMBDA { prolong_rows<b>(P, from, to, first, last); });
     }
 };
 

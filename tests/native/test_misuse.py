@@ -20,20 +20,46 @@ def ints(*numbers):
     return np.array(numbers, np.int32)
 
 
+class OneRank:
+    """What a level of a multigrid over ranks calls, on one."""
+
+    def update(self, memory):
+        """Do nothing: there are no copies."""
+
+    add = update
+
+    def sum(self, value):
+        return value
+
+    max = sum
+
+    def solve(self, c, x):
+        return False
+
+
+def over_ranks(n, data=None):
+    """Return a multigrid over ranks of n nodes, each by itself, all fixed; its first level has been added."""
+    found = kernels("multigrid").RankMultigrid(2, 12.0, 0.0, 0)
+    blocks = np.tile(np.eye(3), (n, 1, 1)) if data is None else data
+    A = np.arange(n + 1, dtype=np.int32), np.arange(n, dtype=np.int32), blocks
+    found.add_matrix(A, np.full(3 * n, data is None, np.uint8), OneRank(), None)
+    return found
+
+
 def test_a_rank_without_free_nodes_has_blocks_and_no_weights():
-    none, module = np.zeros(0, np.uint8), kernels("multigrid")
-    blocks = module.SharedTransfer(
-        ints(0, 0, 0), ints(), np.zeros((0, 3, 6), np.float32), 3, 2, 1, none, none
-    )
-    sums = np.full(14, 7, np.float32)
-    blocks.restrict_to(np.ones(14, np.float32), sums)
-    np.testing.assert_array_equal(sums, [0] * 6 + [7] * 8)
-    with pytest.raises(ValueError, match="weights need what is fixed"):
-        module.SharedTransfer(ints(0, 0, 0), ints(), np.zeros(0, np.float32), 3, 2, 1, none, none)
+    found, coarse = over_ranks(2), (ints(0, 1), ints(0), np.eye(6)[None])
+    blocks = ints(0, 0, 0), ints(), np.zeros((0, 3, 6), np.float32)
+    found.add_matrix(coarse, np.zeros(6, np.uint8), OneRank(), blocks)
+    found.finish()
+    np.testing.assert_array_equal(np.isfinite(found.cycle(np.ones(6))), [True] * 6)
+    with pytest.raises(ValueError, match="a way leads to each level"):
+        over_ranks(2).add_matrix(coarse, np.zeros(6, np.uint8), OneRank(), None)
+    with pytest.raises(ValueError, match="from own nodes to coarse ones"):
+        over_ranks(3).add_matrix(coarse, np.zeros(6, np.uint8), OneRank(), blocks)
 
 
 def test_columns_of_a_prolongator_must_rise():
-    module, model = kernels("multigrid"), stiffness((2, 2, 2))
+    model = stiffness((2, 2, 2))
     n, shape = model.n, (2 * model.n, 3, 6)
     indptr = np.arange(0, 2 * n + 1, 2, dtype=np.int32)
     blocks = np.random.default_rng(1).random(shape).astype(np.float32)
@@ -41,10 +67,10 @@ def test_columns_of_a_prolongator_must_rise():
     solver, _ = multigrid((2, 2, 2), aggregated=False)
     with pytest.raises(ValueError, match="columns of each row of P must rise"):
         solver.aggregate_plate(indptr, swapped, blocks, np.ones((12, 12)))
-    A = module.SharedLevel(ints(0, 1), ints(0), np.eye(3)[None], np.zeros(6, np.uint8), 3)
+    A = over_ranks(1, np.eye(3)[None])
     with pytest.raises(ValueError, match="columns of each row of P must rise"):
-        A.galerkin(ints(0, 2, 2), ints(1, 0), blocks[:2], 2)
-    sums = A.galerkin(ints(0, 2, 2), ints(0, 1), blocks[[1, 0]], 2)[2]
+        A.galerkin(ints(0, 2), ints(1, 0), blocks[:2], 2)
+    sums = A.galerkin(ints(0, 2), ints(0, 1), blocks[[1, 0]], 2)[2]
     P = blocks[[1, 0]].astype(float)
     np.testing.assert_allclose(sums[:36].reshape(6, 6), P[0].T @ P[0], rtol=1e-14)
 

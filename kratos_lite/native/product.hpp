@@ -1,0 +1,84 @@
+// Products of the stiffness of elements from NumPy arrays, without a matrix.
+
+#pragma once
+#include "elements.hpp"
+#include "matrix_free.hpp"
+
+namespace kl {
+
+// From places to points and to slopes (n, n), and from nodes to places (n^3, k), of a tensor product rule whose
+// points come in the order of the places.
+using Factors = std::optional<std::tuple<Array<double>, Array<double>, Array<double>>>;
+
+inline TensorTables<double> tensor_tables(const Factors& factors, const Elements& w) {
+    TensorTables<double> t;
+    if (!factors) return t;
+    const auto& [values, slopes, places] = *factors;
+    t.n = static_cast<int>(values.shape(0));
+    require((t.n == 2 || t.n == 3) && has_shape(values, t.n, t.n) && has_shape(slopes, t.n, t.n) &&
+                w.g == t.n * t.n * t.n && has_shape(places, w.g, w.k),
+            "factors must be two (n, n) with n = 2 or 3, and (n^3, k)");
+    std::copy(values.data(), values.data() + values.size(), t.values);
+    std::copy(slopes.data(), slopes.data() + slopes.size(), t.slopes);
+    t.place.assign(w.k, -1);
+    for (int p = 0; p < w.g; ++p) {
+        const double* row = places.data() + static_cast<int64_t>(p) * w.k;
+        const auto is_one = [](double weight) { return weight == 1; };
+        const bool single = std::count(row, row + w.k, 0.0) == w.k - 1 && std::count_if(row, row + w.k, is_one);
+        if (single)
+            t.place[std::find_if(row, row + w.k, is_one) - row] = p;
+        else {
+            t.extra.push_back(p);
+            t.weights.insert(t.weights.end(), row, row + w.k);
+        }
+    }
+    for (int p : t.place) require(p >= 0, "each node must have a place");
+    return t;
+}
+
+// Elements of a kind (nodes, dN, weights, C, factors), whose arrays are kept.
+using ElementTables = std::tuple<Array<int32_t>, Array<double>, Array<double>, Array<double>, Factors>;
+
+class Product : public MatrixFree {
+public:
+    Product(Numbers points, std::vector<ElementTables> groups)
+        : MatrixFree(points.size() / 3, points.data()), groups(std::move(groups)) {
+        for (const auto& [nodes, dN, weights, C, factors] : this->groups) {
+            Elements w = elements(points, nodes, dN, weights);
+            set_law(w, C, {});
+            add(w, tensor_tables(factors, w));
+        }
+        GilReleased release;
+        prepare();
+    }
+
+    // Components that depend on others from now on, with their weights.
+    void tie(Array<int32_t> dependents, Array<int32_t> indptr, Array<int32_t> independents, Array<double> weights) {
+        require(indptr.size() == dependents.size() + 1, "indptr must have a row for each dependent component");
+        require(weights.size() == independents.size(), "one weight for each index is needed");
+        check_rows(indptr, independents.size());
+        require(are_rows(dependents, 3 * n) && are_rows(independents, 3 * n), "indices must be components of nodes");
+        ties = Ties(dependents.copy(), indptr.copy(), independents.copy(), weights.copy(), n);
+    }
+
+    Array<double> times(Array<double> x, bool tied) const {
+        require(x.size() == 3 * n, "x must have three numbers for each point");
+        Array<double> y(3 * n);
+        std::vector<double> from = x.copy();
+        from.push_back(0);
+        double* to = y.mutable_data();
+        GilReleased release;
+        multiply(from.data(), to, tied);
+        return y;
+    }
+
+    double largest_row_sum() const {
+        GilReleased release;
+        return norm();
+    }
+
+private:
+    std::vector<ElementTables> groups;
+};
+
+}  // namespace kl
