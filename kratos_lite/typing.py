@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
     from numpy.typing import NDArray
+    from scipy.sparse import bsr_array, csr_array
 
 Array: TypeAlias = "NDArray[np.float64]"
 """Numbers."""
@@ -24,5 +25,9 @@ Numbers: TypeAlias = "NDArray[Any]"
 """Numbers of any kind: real, complex or whole."""
 Mask: TypeAlias = "NDArray[np.bool_]"
 """Which of many."""
+Csr: TypeAlias = "csr_array[Any, Any]"
+"""A sparse matrix in compressed rows."""
+Bsr: TypeAlias = "bsr_array"
+"""A sparse matrix in compressed rows of blocks."""
 Progress: TypeAlias = Callable[[str, float], None]
 """Called with the phase and the fraction done, 0 … 1."""

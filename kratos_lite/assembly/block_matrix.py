@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from kratos_lite.native import kernels
-from kratos_lite.typing import Array, Ints, Rows
-
-if TYPE_CHECKING:
-    from scipy.sparse import bsr_array
+from kratos_lite.typing import Array, Bsr, Ints, Rows
 
 
 def block_rows(indptr: Rows) -> Ints:
@@ -49,7 +46,7 @@ class BlockMatrix:
         x = np.ascontiguousarray(x, dtype=float)
         return compiled.multiply(self.indptr, self.indices, self.data, x)
 
-    def scipy(self) -> bsr_array:
+    def scipy(self) -> Bsr:
         """Return the matrix as a scipy.sparse.bsr_array on the same memory."""
         from scipy.sparse import bsr_array
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from copy import copy
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -20,10 +20,7 @@ from kratos_lite.elements.tables import tabulate
 from kratos_lite.quadrature import Rule
 from kratos_lite.registry import remembered
 from kratos_lite.shapes import Shape
-from kratos_lite.typing import Array, Ints
-
-if TYPE_CHECKING:
-    from scipy.sparse import bsr_array
+from kratos_lite.typing import Array, Bsr, Ints
 
 
 class MatrixFree:
@@ -71,7 +68,7 @@ class MatrixFree:
         """Return the largest row sum of |K| over the nodes of an element at the stiffest node."""
         return float(self.product.norm())
 
-    def scipy(self) -> bsr_array:
+    def scipy(self) -> Bsr:
         """Return the matrix itself, made now."""
         return self.assembled().scipy()
 

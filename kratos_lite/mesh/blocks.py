@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -12,11 +12,8 @@ from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import MeshError
 from kratos_lite.shapes import Shape
 from kratos_lite.tabular import names_of
-from kratos_lite.typing import Array, Ints, Mask, Numbers, Rows
+from kratos_lite.typing import Array, ArrayLike, Ints, Mask, Numbers, Rows
 from kratos_lite.validation import instance, read_only, short, whole_numbers
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
 
 NO_ROWS: Ints = read_only(np.zeros(0, dtype=np.int64))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,12 +14,8 @@ from kratos_lite.mesh.blocks import NO_ROWS, Cells, with_rows
 from kratos_lite.mesh.boxes import BoxTree, cell_boxes, curvature, is_solid, nearest_element
 from kratos_lite.shapes import Shape
 from kratos_lite.shapes.inverse import inverse_map, outside_by
-from kratos_lite.typing import Array, Ints, Mask, Rows
+from kratos_lite.typing import Array, ArrayLike, Csr, Ints, Mask, Rows
 from kratos_lite.validation import finite
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-    from scipy.sparse import csr_array
 
 POINTS_AT_ONCE = 2**14
 """Points that are searched for together, so that candidates take little memory."""
@@ -84,7 +80,7 @@ class Located:
             out[at] = np.einsum("ma,ma...->m...", N, values[nodes])
         return out.reshape((*self.rows.shape, *values.shape[1:]))
 
-    def weights(self) -> csr_array[Any]:
+    def weights(self) -> Csr:
         """Return the shape functions as a sparse matrix W (m, n), one row per point."""
         from scipy.sparse import csr_array
 

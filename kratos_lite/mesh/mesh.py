@@ -21,12 +21,10 @@ from kratos_lite.mesh.selection import (
 )
 from kratos_lite.mesh.topology import Faces, inverted, mirror
 from kratos_lite.tabular import Tabular
-from kratos_lite.typing import Array, Ints, Mask
+from kratos_lite.typing import Array, ArrayLike, Ints, Mask
 from kratos_lite.validation import finite, instance, read_only, whole_numbers
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
     from kratos_lite.mesh.hanging import HangingNodes
     from kratos_lite.mesh.locate import Located
 

@@ -7,7 +7,6 @@ points and nodal values follow the isoparametric map of the cell that they are m
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -33,11 +32,8 @@ from kratos_lite.shapes.hexahedra import Hexahedron20
 from kratos_lite.shapes.pyramids import Pyramid13
 from kratos_lite.shapes.tetrahedra import Tetrahedron4, Tetrahedron10
 from kratos_lite.shapes.wedges import Wedge15
-from kratos_lite.typing import Array, Ints, Mask
+from kratos_lite.typing import Array, ArrayLike, Ints, Mask
 from kratos_lite.validation import finite
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
 
 QUADRATIC: dict[str, type[Shape]] = {
     shape.cell: shape

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from kratos_lite.errors import MeshError, nearest
 from kratos_lite.mesh.blocks import NO_ROWS, Cells, Part, distinct, without_repeats
-from kratos_lite.typing import Array, Ints
+from kratos_lite.typing import Array, ArrayLike, Ints
 from kratos_lite.validation import finite, whole_numbers
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
 
 Where: TypeAlias = "str | Callable[[Array], ArrayLike] | ArrayLike"
 """Nodes by part name, by a point (x, y, z) in m, by a predicate on the points (n, 3), by rows or a mask."""

@@ -8,17 +8,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup, by_mass_rule
 from kratos_lite.errors import InputError, MeshError, ModelError
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, ArrayLike, Mask
 from kratos_lite.validation import finite
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
 
 SYMMETRIC = 1e-10
 """How far, relative to its largest entry, a tensor may be from symmetric, or two values from each other."""
@@ -352,7 +349,7 @@ def _symmetric(A: Array, what: str) -> Array:
     return (A + np.swapaxes(A, -1, -2)) / 2
 
 
-def _smallest(A: Array) -> tuple[Array, NDArray[np.bool_]]:
+def _smallest(A: Array) -> tuple[Array, Mask]:
     """Return the smallest eigenvalues (...) and a mask of those that are not positive."""
     values = np.linalg.eigvalsh(A)
     smallest = np.asarray(values[..., 0])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -34,11 +34,8 @@ from kratos_lite.quadrature import Rule
 from kratos_lite.solvers.constraints import rigid_modes
 from kratos_lite.tabular import Tabular
 from kratos_lite.time_series import Factor
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, ArrayLike
 from kratos_lite.validation import finite, function_or_none, instance
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
 
 
 class Attachment(ABC):

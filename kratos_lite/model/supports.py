@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,11 +13,8 @@ from kratos_lite.mesh import Mesh, Where
 from kratos_lite.model.loads.base import key_of
 from kratos_lite.solvers.constraints import ConstraintMap, Constraints, constraint_map, eliminate
 from kratos_lite.time_series import function_of
-from kratos_lite.typing import Array, Ints, Mask
+from kratos_lite.typing import Array, ArrayLike, Ints, Mask
 from kratos_lite.validation import finite, short, whole_numbers
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
 
 AXES = "xyz"
 CONSTANT = -1

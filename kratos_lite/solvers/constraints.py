@@ -9,16 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from kratos_lite.errors import ModelError
-from kratos_lite.typing import Array, Ints, Mask
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-    from scipy.sparse import csr_array
+from kratos_lite.typing import Array, ArrayLike, Csr, Ints, Mask, Numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +137,7 @@ class ConstraintMap:
     free: Ints  # (q,) int, the free degrees of freedom
     c: Array  # (N,) float, the displacement at q = 0 in m
     # (N, q) sparse; None without dependent dofs, where q is added to the free components of c
-    T: csr_array[Any, Any] | None = None
+    T: Csr | None = None
 
     @property
     def is_free(self) -> Mask:
@@ -157,7 +153,7 @@ class ConstraintMap:
             return self
         return ConstraintMap(self.free[keep], self.c, None if self.T is None else self.T[:, keep])
 
-    def transform(self, q: NDArray[Any]) -> NDArray[Any]:
+    def transform(self, q: Numbers) -> Numbers:
         """Return T q, (N, ...), of the free degrees of freedom (q, ...): without what is prescribed."""
         if self.T is not None:
             return np.asarray(self.T @ q)
@@ -165,7 +161,7 @@ class ConstraintMap:
         u[self.free] = q
         return u
 
-    def transform_matrix(self) -> csr_array[Any, Any]:
+    def transform_matrix(self) -> Csr:
         """Return T (N, q) as a sparse matrix, whether or not there are dependents."""
         from scipy.sparse import csr_array
 

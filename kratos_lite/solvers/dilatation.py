@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import numpy as np
 
@@ -26,10 +26,7 @@ from kratos_lite.elements.tables import cofactors, tabulate
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.shapes import Shape
 from kratos_lite.solvers.coarse_level import sides_of
-from kratos_lite.typing import Array, Ints, Progress
-
-if TYPE_CHECKING:
-    from scipy.sparse import bsr_array, csr_array
+from kratos_lite.typing import Array, Bsr, Csr, Ints, Progress
 
 KEPT = 1.0
 """λ / μ that A keeps: pressures are better known the more it is, and multigrid is still as good."""
@@ -40,7 +37,7 @@ class SplitMatrix:
     """K = A + Dᵀ κ D, (3n, 3n) in N/m, which is only multiplied."""
 
     A: BlockMatrix  # the stiffness without most of the bulk modulus
-    D: bsr_array  # (p, 3n) orthonormal dilatations of elements, √m³ / m; R x 3 blocks, R = 1 or 4
+    D: Bsr  # (p, 3n) orthonormal dilatations of elements, √m³ / m; R x 3 blocks, R = 1 or 4
     bulk: Array  # (p,) Pa, κ
     kept: Array  # (p,) Pa, λ in A
     modulus: Array  # (p,) Pa, λ + 2μ in A
@@ -61,7 +58,7 @@ class SplitMatrix:
         size = abs(self.D.tocsr())
         return self.A.norm() + float((size.T @ (self.bulk * size.sum(axis=1))).max(initial=0.0))
 
-    def scipy(self) -> csr_array:
+    def scipy(self) -> Csr:
         """Return K as a scipy.sparse.csr_array."""
         from scipy.sparse import diags_array
 
@@ -197,7 +194,7 @@ def _softened(group: ElementGroup, bulk: float) -> ElementGroup:
     return replace(group, material=cast("LinearMaterial", SimpleNamespace(C=C)))
 
 
-def _assembled(n_nodes: int, parts: Sequence[_SplitGroup]) -> bsr_array:
+def _assembled(n_nodes: int, parts: Sequence[_SplitGroup]) -> Bsr:
     """Return D (p, 3n) of the dilatations of each group, a row of blocks for each element if they allow."""
     from scipy.sparse import bsr_array
 
@@ -225,7 +222,7 @@ LONG = 2.0
 class PressureMeans:
     """The means (p, c) of pressures around c places, over the root of the modulus there."""
 
-    matrix: csr_array  # (p, c) sparse
+    matrix: Csr  # (p, c) sparse
     ends: Ints  # (c, 2) int, the ends of the edge of each place, or a node twice
 
 

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from functools import cache
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 from weakref import finalize
 
 import numpy as np
@@ -19,10 +19,7 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.errors import SolveError
 from kratos_lite.solvers.plan import of_band
-from kratos_lite.typing import Array, Ints, Rows
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
+from kratos_lite.typing import Array, Csr, Ints, Rows
 
 NO_MEMORY = -2
 """PARDISO's error code for too little memory; the others mean a matrix it cannot factorize."""
@@ -60,7 +57,7 @@ def factorize_dense(A: Array) -> Factorization:
     return Factorization("dense", A, lambda b: inverse @ b)
 
 
-def factorize(A: csr_array, symmetric: bool = True) -> Factorization:
+def factorize(A: Csr, symmetric: bool = True) -> Factorization:
     """Return a sparse matrix (n, n) factorized, by the fastest of `BACKENDS` that does."""
     for backend in BACKENDS:
         try:
@@ -74,7 +71,7 @@ def factorize(A: csr_array, symmetric: bool = True) -> Factorization:
     raise singular()
 
 
-def pardiso(A: csr_array, symmetric: bool) -> Callable[[Array], Array]:
+def pardiso(A: Csr, symmetric: bool) -> Callable[[Array], Array]:
     """Factorize with MKL PARDISO: Cholesky with nested dissection, or LU for a matrix that is not symmetric.
 
     Where a pivot is not positive (Cholesky) or had to be replaced (LU), SuperLU has to say whether A is
@@ -101,7 +98,7 @@ def pardiso(A: csr_array, symmetric: bool) -> Callable[[Array], Array]:
     return lambda b: solver.solve(half, b)
 
 
-def superlu(A: csr_array, symmetric: bool) -> Callable[[Array], Array]:
+def superlu(A: Csr, symmetric: bool) -> Callable[[Array], Array]:
     """Factorize with SuperLU: pivots on the diagonal and minimum degree where A is symmetric."""
     from scipy.sparse.linalg import splu
 
@@ -126,7 +123,7 @@ def singular(detail: str = "") -> SolveError:
     return SolveError(f"the stiffness matrix is singular{detail}: part of the body can still move")
 
 
-BACKENDS: tuple[Callable[[csr_array, bool], Callable[[Array], Array]], ...] = (pardiso, superlu)
+BACKENDS: tuple[Callable[[Csr, bool], Callable[[Array], Array]], ...] = (pardiso, superlu)
 """Ways to factorize a sparse matrix, fastest first; each returns b -> x, or raises Unsuitable."""
 
 
@@ -217,7 +214,7 @@ def _numbering(pattern: Pattern, rows: Ints) -> tuple[Ints, int]:
     return orders[best], widths[best]
 
 
-def cuthill_mckee(pattern: Pattern) -> tuple[csr_array, Ints]:
+def cuthill_mckee(pattern: Pattern) -> tuple[Csr, Ints]:
     """Return the graph of the nodes (n, n), and their reverse Cuthill–McKee order (n,)."""
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import reverse_cuthill_mckee
@@ -234,7 +231,7 @@ def nodal_width(pattern: Pattern, rows: Ints, order: Ints) -> int:
     return int(np.abs(place[rows] - place[pattern.indices]).max(initial=0))
 
 
-def _layers(graph: csr_array, order: Ints) -> Ints:
+def _layers(graph: Csr, order: Ints) -> Ints:
     """Return the nodes by their distance from the end farthest from the last node of an order."""
     from scipy.sparse.csgraph import dijkstra
 

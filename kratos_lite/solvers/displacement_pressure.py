@@ -20,8 +20,6 @@ Olshanskii, SIAM J. Sci. Comput. 28 (2006) 2095-2113 (augmented Lagrangian).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from kratos_lite.assembly.block_matrix import BlockMatrix, block_rows
@@ -29,10 +27,7 @@ from kratos_lite.solvers.coarse_level import PCoarseLevel
 from kratos_lite.solvers.dilatation import SplitMatrix
 from kratos_lite.solvers.iteration import GoOn
 from kratos_lite.solvers.multigrid import Compiled
-from kratos_lite.typing import Array, Ints, Mask, Rows
-
-if TYPE_CHECKING:
-    from scipy.sparse import bsr_array
+from kratos_lite.typing import Array, Bsr, Ints, Mask, Rows
 
 DIRECTIONS = 80
 """Iterations after which they start anew from the residual."""
@@ -79,12 +74,12 @@ class DisplacementPressure:
         return self._kernel.solve(b, tolerance, norm, MAX_ITERATIONS, DIRECTIONS, REDUCED, each)
 
 
-def _arrays(A: bsr_array) -> tuple[Rows, Rows, Array]:
+def _arrays(A: Bsr) -> tuple[Rows, Rows, Array]:
     """Return what a kernel takes of a matrix of blocks."""
     return A.indptr.astype(np.int32), A.indices.astype(np.int32), np.ascontiguousarray(A.data)
 
 
-def _pressure_operator(K: SplitMatrix, inverse: bsr_array, free: Mask) -> tuple[bsr_array, Array]:
+def _pressure_operator(K: SplitMatrix, inverse: Bsr, free: Mask) -> tuple[Bsr, Array]:
     """Return S in single precision, scaled to a diagonal of 1, and the scale."""
     from scipy.sparse import diags_array
 
@@ -100,7 +95,7 @@ def _pressure_operator(K: SplitMatrix, inverse: bsr_array, free: Mask) -> tuple[
 # ---- the inverse within groups of strongly coupled nodes: lines in flat meshes, or single nodes ----------
 
 
-def block_inverse(A: BlockMatrix, free: Mask, points: Array, D: bsr_array, factor: Array) -> bsr_array:
+def block_inverse(A: BlockMatrix, free: Mask, points: Array, D: Bsr, factor: Array) -> Bsr:
     """Return the inverse (3n, 3n) of A - Dᵀ factor D within each group on its free components, else 0.
 
     Both are positive definite there; nodes that share a row of R x 3 blocks of D (p, 3n) share a block of A.
@@ -134,7 +129,7 @@ def block_inverse(A: BlockMatrix, free: Mask, points: Array, D: bsr_array, facto
     return bsr_array((data[order], j[order], starts), shape=A.shape)
 
 
-def _square(D: bsr_array, factor: Array, group: Ints) -> bsr_array:
+def _square(D: Bsr, factor: Array, group: Ints) -> Bsr:
     """Return Dᵀ factor D (3n, 3n) within each group of nodes."""
     from scipy.sparse import bsr_array
 

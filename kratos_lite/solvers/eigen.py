@@ -16,18 +16,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from kratos_lite.errors import InputError, SolveError
 from kratos_lite.solvers import direct
 from kratos_lite.solvers.plan import DENSE_MODES
-from kratos_lite.typing import Array, Complexes, Progress
+from kratos_lite.typing import Array, Complexes, Csr, Progress
 from kratos_lite.validation import whole_number
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
 
 Operator: TypeAlias = Callable[[Array], Array]
 """Takes vectors (k, n) to vectors (k, n)."""
@@ -55,9 +52,7 @@ COLUMNS = 1 << 14
 """Components of vectors that are combined at once: they stay in the cache."""
 
 
-def modes(
-    K: csr_array[Any, Any], M: csr_array[Any, Any], count: int, progress: Progress | None = None
-) -> tuple[Array, Array]:
+def modes(K: Csr, M: Csr, count: int, progress: Progress | None = None) -> tuple[Array, Array]:
     """Return the lowest ω (count,) in rad/s, ascending, and their shapes (n, count) with φ^T M φ = 1."""
     n = K.shape[0]
     if is_small(n, count):
@@ -309,9 +304,9 @@ class Pencil:
     φ^T M φ = 1, as `neutral_motions` makes them.
     """
 
-    M: csr_array[Any, Any]
-    C: csr_array[Any, Any]
-    K: csr_array[Any, Any]
+    M: Csr
+    C: Csr
+    K: Csr
     neutral: Array
     start: Callable[[int], Array]  # makes of a number so many real modes (k, n), and rigid motions
     precondition: Callable[[Array], Array]  # about K⁻¹, of one vector (n,)
@@ -359,10 +354,8 @@ class Pencil:
             values, Y = _all_values(*(V @ AV.T for AV in products))
             chosen = np.argsort(np.abs(values), kind="stable")[:count]
             values, Y = values[chosen], Y[:, chosen].T
-            residual = sum(
-                factor[:, None] * (Y @ AV)
-                for factor, AV in zip((values**2, values, np.ones(count)), products, strict=True)
-            )
+            MV, CV, KV = products
+            residual = values[:, None] ** 2 * (Y @ MV) + values[:, None] * (Y @ CV) + Y @ KV
             W = [np.stack([self.precondition(r) for r in part]) for part in (residual.real, residual.imag)]
             energies = (residual.real * W[0] + residual.imag * W[1]).sum(axis=1)
             sizes = (np.abs(values) + SMALL * np.abs(values).max()) ** 2

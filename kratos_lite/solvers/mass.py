@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,10 +18,7 @@ from kratos_lite.native import kernels
 from kratos_lite.solvers import direct
 from kratos_lite.solvers.constraints import ConstraintMap
 from kratos_lite.solvers.iteration import conjugate_gradients
-from kratos_lite.typing import Array
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
+from kratos_lite.typing import Array, Csr
 
 TOLERANCE = 1e-14
 """Relative residual of accelerations."""
@@ -54,7 +51,7 @@ class Mass:
         return {name: value for name, value in vars(self).items() if name != "_factors"}
 
     @cached_property
-    def scalar(self) -> csr_array[Any, Any]:
+    def scalar(self) -> Csr:
         """Mass for each pair of nodes, (n, n) sparse in kg; a diagonal for lumped mass."""
         from scipy.sparse import csr_array, diags_array
 
@@ -115,7 +112,7 @@ class Mass:
         data[self.pattern.diagonal] = self.nodal
         return data
 
-    def matrix(self) -> csr_array[Any, Any]:
+    def matrix(self) -> Csr:
         """Return the mass matrix of all components, (3n, 3n) in kg."""
         from scipy.sparse import csr_array, eye_array, kron
 

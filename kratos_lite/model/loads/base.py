@@ -15,12 +15,10 @@ from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh
 from kratos_lite.time_series import Factor, TimeSeries, function_of
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, ArrayLike
 from kratos_lite.validation import finite, short, takes
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
     from kratos_lite.mesh.refined_mesh import RefinedMesh
 
 OfPlace: TypeAlias = "Callable[[Array], ArrayLike]"

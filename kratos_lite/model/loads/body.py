@@ -12,11 +12,9 @@ from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh, WhereElements
 from kratos_lite.model.loads.base import DistributedLoad, OfPlace, at_places, vectors
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, ArrayLike
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
     from kratos_lite.mesh.refined_mesh import RefinedMesh
 
 

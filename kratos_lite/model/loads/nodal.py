@@ -12,12 +12,10 @@ from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.mesh import Mesh, Where
 from kratos_lite.mesh.selection import ONE_PLACE, nodes_at, point_of
 from kratos_lite.model.loads.base import Load, vectors
-from kratos_lite.typing import Array, Ints
+from kratos_lite.typing import Array, ArrayLike, Ints
 from kratos_lite.validation import flag, short
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
     from kratos_lite.mesh.refined_mesh import RefinedMesh
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -13,14 +13,10 @@ from kratos_lite.elements.surface import FUNCTION, area_vectors, face_rule, surf
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Block, Mesh, Where, outward_signs, with_rows
+from kratos_lite.mesh.refined_mesh import RefinedMesh
 from kratos_lite.model.loads.base import DistributedLoad, Load, OfPlace, at_places, vectors
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, ArrayLike
 from kratos_lite.validation import finite, number
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from kratos_lite.mesh.refined_mesh import RefinedMesh
 
 SURFACES = ("triangle", "quadrilateral")
 
