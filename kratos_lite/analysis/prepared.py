@@ -39,7 +39,7 @@ class Prepared:
     @cached_property
     def component(self) -> Ints:
         """The component of each node (n,), -1 without elements."""
-        return self.free.part
+        return self.free.component
 
     @cached_property
     def used(self) -> Mask:

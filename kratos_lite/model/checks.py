@@ -5,7 +5,7 @@ Each check either raises one clear error or returns warnings for the report.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -44,33 +44,25 @@ def checked_material(material: object) -> LinearMaterial:
 
 
 def check_geometry(mesh: Mesh, formulation: str | None = None) -> list[str]:
-    """Check coordinates, node lists and det J of all elements, whatever their material; return warnings.
+    """Check node lists and det J of all elements, whatever their material; return warnings.
 
     Raises MeshError, or InputError for elements of unknown types.
     """
     elements = [element_class(mesh, block, formulation) for block in mesh.blocks]
     for block, element in zip(mesh.blocks, elements, strict=True):
-        if block.nodes.shape[1] != len(element.nodes):
+        width = block.nodes.shape[1]
+        if width != len(element.nodes):
             raise MeshError(
                 f"block {block.name}: nodes must have shape (m, {len(element.nodes)}); "
                 f"got {block.nodes.shape}"
             )
-    check_repeated_nodes(mesh)
-    return check_jacobians(mesh, elements)
-
-
-def check_repeated_nodes(mesh: Mesh) -> None:
-    """Raise MeshError if an element uses a node twice."""
-    for block in mesh.blocks:
-        twice = (np.diff(np.sort(block.nodes, axis=1), axis=1) == 0).any(axis=1)
-        if twice.any():
-            cell = int(twice.argmax())
-            nodes = np.sort(block.nodes[cell])
-            node = mesh.node_ids[nodes[1:][np.diff(nodes) == 0][0]]
+        ordered = np.sort(block.nodes, axis=1)
+        for cell, place in np.argwhere(ordered[:, 1:] == ordered[:, :-1])[:1]:
             raise MeshError(
-                f"{mesh.place(block, cell)} uses node {node} more than once; "
-                f"give it {block.nodes.shape[1]} different nodes or use an element with fewer"
+                f"{mesh.place(block, cell)} uses node {mesh.node_ids[ordered[cell, place]]} more than once; "
+                f"give it {width} different nodes or use an element with fewer"
             )
+    return check_jacobians(mesh, elements)
 
 
 def check_jacobians(mesh: Mesh, elements: Sequence[type[KinematicLinear]]) -> list[str]:
@@ -85,17 +77,16 @@ def check_jacobians(mesh: Mesh, elements: Sequence[type[KinematicLinear]]) -> li
     for block, element in zip(mesh.blocks, elements, strict=True):
         shape, g = element.shape, len(element.rule)
         dN = np.concatenate([tabulate(shape, element.rule)[1], gradients_at_nodes(shape)])
-        limit = np.where(np.arange(len(dN)) < g, 0.0, -FOLD)
         doubtful = np.flatnonzero(~clearly_positive(mesh.points, block.nodes, element, dN, g))
         step = max(1, 4_000_000 // (72 * len(dN)))
         for start in range(0, len(doubtful), step):
             cells = doubtful[start : start + step]
             det = element(mesh.points[block.nodes[cells]]).determinants(dN)
             scale = np.abs(det[:, :g]).mean(axis=1, keepdims=True)
-            bad = np.where(np.arange(len(dN)) < g, det <= limit * scale, det < limit * scale).any(axis=1)
-            flat += int((np.abs(det[:, g:]) <= 1e-10 * scale).any(axis=1).sum())
-            folded += int((det[:, g:] < -1e-10 * scale).any(axis=1).sum())
-            wrong = np.flatnonzero(bad)
+            inside, at_nodes = det[:, :g], det[:, g:] / np.where(scale > 0, scale, 1.0)
+            flat += int((np.abs(at_nodes) <= 1e-10).any(axis=1).sum())
+            folded += int((at_nodes < -1e-10).any(axis=1).sum())
+            wrong = np.flatnonzero((inside <= 0).any(axis=1) | (at_nodes < -FOLD).any(axis=1))
             for e in wrong[:MAX_PROBLEMS]:
                 problems.add(_describe_inverted(mesh, block, int(cells[e]), det[e], g))
             problems.count += len(wrong[MAX_PROBLEMS:])
@@ -121,89 +112,86 @@ def _describe_inverted(mesh: Mesh, block: Block, cell: int, det: Array, g: int) 
     )
 
 
-def check_scales(mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
+def check_scales(mesh: Mesh, groups: Sequence[ElementGroup]) -> Iterator[str]:
     """Warn where the numbers themselves cost accuracy: far from the origin, or a large stiffness contrast."""
-    warnings = []
     low, high = mesh.extent
     spacing = float((high - low).max()) / max(1.0, mesh.n_elements ** (1 / 3))
-    far = float(np.maximum(-low, high).max())
-    loss = float(np.finfo(float).eps * far / spacing) if spacing > 0 else 0.0
+    loss = float(np.finfo(float).eps * np.maximum(-low, high).max()) / (spacing or np.inf)
     if loss > 1e-9:
-        warnings.append(
+        yield (
             f"the body lies so far from the origin that coordinates carry an error of {loss:.1e} of an "
             "element; move it to the origin"
         )
     stiff = [float(np.abs(group.material.C).max()) for group in groups]
     if stiff and max(stiff) > 1e10 * min(stiff):
-        warnings.append(
-            f"stiffnesses differ by a factor of {max(stiff) / min(stiff):.1e}; expect fewer digits"
-        )
-    if float((high - low).prod()) > BULKY and (volume := _metal(mesh, groups)) > BULKY:
-        warnings.append(
-            f"{volume:.3g} m³ are as stiff as metal: are lengths in mm (read with scale=1e-3, or --scale mm)?"
-        )
-    return warnings + check_wave_speeds(group.material for group in groups)
+        yield f"stiffnesses differ by a factor of {max(stiff) / min(stiff):.1e}; expect fewer digits"
+    if float((high - low).prod()) > BULKY:
+        metal = (group for group in groups if young_moduli(group.material)[1] > METAL)
+        volume = sum(float(volumes(mesh.points, group).sum()) for group in metal)
+        if volume > BULKY:
+            yield (
+                f"{volume:.3g} m³ are as stiff as metal: are lengths in mm (read with scale=1e-3, or "
+                "--scale mm)?"
+            )
+    yield from check_wave_speeds(group.material for group in groups)
 
 
-def _metal(mesh: Mesh, groups: Sequence[ElementGroup]) -> float:
-    """Return the volume in m³ of what is as stiff as metal."""
-    stiff = [group for group in groups if young_moduli(group.material)[1] > METAL]
-    return float(sum(volumes(mesh.points, group).sum() for group in stiff))
-
-
-def check_nodes(mesh: Mesh) -> list[str]:
+def check_nodes(mesh: Mesh) -> Iterator[str]:
     """Warn of nodes that no element uses."""
-    lost = mesh.node_ids[~mesh.used_nodes()]
-    if not len(lost):
-        return []
-    shown = " ".join(map(str, lost[:5])) + (" …" if len(lost) > 5 else "")
-    return [f"{len(lost)} nodes belong to no element and carry no equations: {shown}"]
+    unused = mesh.node_ids[~mesh.used_nodes()]
+    if len(unused):
+        shown = " ".join(map(str, unused[:5])) + (" …" if len(unused) > 5 else "")
+        yield f"{len(unused)} nodes belong to no element and carry no equations: {shown}"
 
 
 def check_wave_speeds(materials: Iterable[LinearMaterial]) -> list[str]:
     """Warn where the speed of waves sqrt(E/ρ) says that E and ρ can hardly both be in SI units."""
-    warnings = []
-    for material in materials:
-        if not material.density > 0:
-            continue
-        E = young_moduli(material)[1]
-        speed = float(np.sqrt(E) / np.sqrt(material.density))  # E/ρ may be too large
-        if not SLOWEST <= speed <= QUICKEST:
-            warnings.append(
-                f"the speed of waves sqrt(E/density) is {speed:.3g} m/s in {material}; solids have "
-                f"{SLOWEST:g} to {QUICKEST:g} m/s: are E in Pa and the density in kg/m³?"
-            )
-    return list(dict.fromkeys(warnings))
+    speeds = {
+        str(material): float(np.sqrt(young_moduli(material)[1]) / np.sqrt(material.density))
+        for material in materials
+        if material.density > 0
+    }  # E/ρ may be too large a number
+    return [
+        f"the speed of waves sqrt(E/density) is {speed:.3g} m/s in {material}; solids have "
+        f"{SLOWEST:g} to {QUICKEST:g} m/s: are E in Pa and the density in kg/m³?"
+        for material, speed in speeds.items()
+        if not SLOWEST <= speed <= QUICKEST
+    ]
 
 
-def unusual_constants(materials: Iterable[LinearMaterial]) -> list[str]:
-    """Return notes of constants far from those of all engineering materials, so that units may be wrong."""
-    notes = []
+def unusual_constants(materials: Iterable[LinearMaterial]) -> Iterator[str]:
+    """Note constants far from those of all engineering materials, so that units may be wrong."""
     for material in materials:
         (low, high), density = young_moduli(material), material.density
         soft = high < SOFTEST * (1 - 1e-9)
         if soft or low > STIFFEST:
-            notes.append(
+            yield (
                 f"E of {material} is far {'below' if soft else 'above'} that of any engineering "
                 "material, from 100 (gels) to 1.2e12 Pa (diamond): is it in Pa?"
             )
         elif density > HEAVY and high < HARD:
-            notes.append(
+            yield (
                 f"{material} is as heavy as concrete, rock or metal, whose E is 1e10 Pa and more, but soft "
                 "as rubber: is E in Pa (steel: 210e9)?"
             )
         if density > 0 and not LIGHTEST <= density <= HEAVIEST:
-            notes.append(
+            yield (
                 f"the density of {material} is far from that of any engineering material, 1 (aerogel) to "
                 "22,600 kg/m³ (osmium): is it in kg/m³ (steel: 7850)?"
             )
-    return list(dict.fromkeys(notes))
 
 
 def young_moduli(material: LinearMaterial) -> tuple[float, float]:
     """Return the smallest and the largest of Young's moduli along the axes, in Pa."""
     flexible = np.linalg.inv(material.C).diagonal()[:3]
     return 1 / float(flexible.max()), 1 / float(flexible.min())
+
+
+def _doubted(text: str, refused: bool) -> list[str]:
+    """Return a warning of a solution; SolveError where it means nothing."""
+    if refused:
+        raise SolveError(text)
+    return [text]
 
 
 def check_rounding(
@@ -216,13 +204,11 @@ def check_rounding(
     size = float(max(np.abs(part).max(initial=0.0) for part in (loads, initial, reactions)))
     if supports.values.any() or roundoff <= 1e-6 * size:
         return []
-    text = (
+    return _doubted(
         f"rounding errors may reach {roundoff / size:.0e} of the loads: something hardly resists them; "
-        "look for nearly free parts, spurious modes or a large stiffness contrast"
+        "look for nearly free parts, spurious modes or a large stiffness contrast",
+        refused=roundoff > 1e-2 * size,
     )
-    if roundoff > 1e-2 * size:
-        raise SolveError(text)
-    return [text]
 
 
 def work_of(u: Array, inner: Array, loads: Array, reactions: Array) -> Array:
@@ -239,35 +225,30 @@ def check_energy(work: Array, rounding: float = 0.0) -> list[str]:
     twice, missing = np.abs(work).tolist()
     if missing <= max(1e-3 * twice, rounding):
         return []
-    text = (
+    return _doubted(
         f"the work of the loads is {100 * missing / twice:.2g} % off twice the strain energy: the "
         "stiffness has lost its digits, as in very thin bodies; displacements are as wrong or more.  Take "
-        "cells less flat (smaller in the plane, fewer layers), or a shell program for bodies this thin"
+        "cells less flat (smaller in the plane, fewer layers), or a shell program for bodies this thin",
+        refused=missing > 0.05 * twice,
     )
-    if missing > 0.05 * twice:
-        raise SolveError(text)
-    return [text]
 
 
 def check_loads(
     loads: Sequence[Load], groups: Sequence[ElementGroup], forces: Array, supports: Supports
 ) -> list[str]:
     """Warn of loads that cannot do anything: gravity without mass, or forces on fixed components alone."""
-    moved = supports.values.any() or supports.constraints.constants.any()
     if any(isinstance(load, Gravity) for load in loads) and all(g.material.density == 0 for g in groups):
         return ["gravity acts on no mass: every material has density 0; give density in kg/m³"]
-    if not forces.any() and not moved:
-        return ["no load acts and no displacement is prescribed, so nothing moves"]
-    if not forces[~supports.fixed].any() and not moved:
+    if forces[~supports.fixed].any() or supports.values.any() or supports.constraints.constants.any():
+        return []
+    if forces.any():
         return [LOADS_ON_SUPPORTS]
-    return []
+    return ["no load acts and no displacement is prescribed, so nothing moves"]
 
 
 def check_carried(mesh: Mesh, forces: Array, used: Mask) -> None:
     """Raise ModelError for forces (n, 3) on nodes that no element uses, by the mask (n,) of those used."""
-    lost = np.flatnonzero(~used)
-    lost = lost[(forces[lost] != 0).any(axis=1)]
-    for node in lost[:1]:
+    for node in np.flatnonzero(~used & (forces != 0).any(axis=1))[:1]:
         raise ModelError(
             f"node {mesh.node_ids[node]} carries a load but belongs to no element; load another node, or "
             "give it an element"

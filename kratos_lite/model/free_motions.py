@@ -1,16 +1,16 @@
-"""Free motions: the rigid ones that supports leave to parts of a model, and solutions without them.
+"""Free motions: the rigid ones that supports leave to components of a model, and solutions without them.
 
-K alone resists no rigid motion R of a part that is free: K u = f has a solution where the load f does no work
-on any, R^T f = 0, and then one for each rigid motion that is added.  So many components of the displacement
-as there are free motions are held, at which nothing reacts as the load balances; then the free motions are
-taken out of u, which is the one with ∫ R^T u dV = 0.
+K alone resists no rigid motion R of a component that is free: K u = f has a solution where the load f does
+no work on any, R^T f = 0, and then one for each rigid motion that is added.  As many displacements as there
+are free motions are held, at which nothing reacts as the load balances; then the free motions are taken out
+of u, which is the one with ∫ R^T u dV = 0.
 
 Source: Farhat & Géradin, Int. J. Numer. Meth. Eng. 41 (1998) 675-696.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
@@ -19,32 +19,30 @@ import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import MAX_PROBLEMS, ModelError
-from kratos_lite.mesh import NO_ROWS, Mesh
-from kratos_lite.model.connected_bodies import Bodies
+from kratos_lite.mesh import Mesh
+from kratos_lite.model.rigid_body_modes import RigidBlocks, free_modes
 from kratos_lite.model.supports import Supports
 from kratos_lite.solvers.constraints import rigid_modes
 from kratos_lite.typing import Array, Ints, Mask
 
 ROUND_OFF, OF_PLACES = 1e4, 10.0
 """Roundings that the work of a balanced load on a motion R may be, beside the sum of |f| times the largest
-|R|: some for the sums over Gauss points, elements and nodes, and some for each spacing of nodes that the part
-lies away from the origin, where rounded coordinates change areas and volumes."""
+|R|: some for the sums over Gauss points, elements and nodes, and some for each spacing of nodes that the
+component lies away from the origin, where rounded coordinates change areas and volumes."""
 TOGETHER = 1e-5
-"""Difference of the rotations of bodies up to which they turn as one, where modes have the size 1."""
+"""Difference of the rotations of blocks up to which they turn as one, where modes have the size 1."""
 
 
 @dataclass(frozen=True, eq=False)
 class FreeMotions:
-    """Rigid motions that supports and constraints leave free, by parts of a model."""
+    """Rigid motions that supports and constraints leave free, by components of a model."""
 
-    mesh: Mesh  # of the model
     supports: Supports
     groups: Sequence[ElementGroup]
-    bodies: Bodies  # its bodies, their centers (b, 3) and sizes (b,)
-    frames: tuple[Array, Array]
-    group_of: Ints  # (b,) int, the part of each body: bodies that neither nodes nor constraints tie to others
-    counts: Ints  # (p,) int, how many free motions each part has
-    modes: Array  # (b, 6, k), what they are of the six modes of each body, 0 beyond their number
+    blocks: RigidBlocks
+    of_block: Ints  # (b,) int, the component of each block: blocks that nodes or constraints tie together
+    counts: Ints  # (p,) int, how many free motions each component has
+    modes: Array  # (b, 6, k), what they are of the six modes of each block, 0 beyond their number
 
     @property
     def any(self) -> bool:
@@ -52,35 +50,36 @@ class FreeMotions:
         return bool(self.counts.any())
 
     @cached_property
-    def part(self) -> Ints:
-        """The part of each node (n,), -1 for nodes without elements."""
-        return np.where(self.bodies.part >= 0, self.group_of[self.bodies.part], -1)
+    def component(self) -> Ints:
+        """The component of each node (n,), -1 for nodes without elements."""
+        of_node = self.blocks.of_node
+        return np.where(of_node >= 0, self.of_block[of_node], -1)
 
     @cached_property
     def _pair(self) -> tuple[Array, Array]:
-        """The motions R of nodes with their parts and ∫ N R dV, both (n, 3, k).
+        """The motions R of nodes with their components and ∫ N R dV, both (n, 3, k).
 
-        They are orthonormal over the volume of each part.
+        They are orthonormal over the volume of each component.
         """
         from kratos_lite.model.loads.body import BodyForce  # rarely needed
 
-        body, (center, size) = self.bodies.part, self.frames
-        R = rigid_modes(self.mesh.points, center[body]).reshape(-1, 3, 6)
-        R[body < 0] = 0.0
-        R[..., 3:] /= size[body, None, None]
-        R = R @ self.modes[body]
+        mesh, block, (center, size) = self.blocks.mesh, self.blocks.of_node, self.blocks.frames
+        R = rigid_modes(mesh.points, center[block]).reshape(-1, 3, 6)
+        R[block < 0] = 0.0
+        R[..., 3:] /= size[block, None, None]
+        R = R @ self.modes[block]
         numbers = np.arange(R.shape[2])
-        forces = [BodyForce(R[..., i]).forces(self.mesh, self.groups) for i in numbers]
+        forces = [BodyForce(R[..., i]).forces(mesh, self.groups) for i in numbers]
         over_volume = np.stack(forces, axis=2)
-        gram = self._by_part(np.swapaxes(R, 1, 2) @ over_volume)
+        gram = self._by_component(np.swapaxes(R, 1, 2) @ over_volume)
         gram[:, numbers, numbers] += numbers >= self.counts[:, None]
-        normal = np.swapaxes(np.linalg.inv(np.linalg.cholesky(gram)), 1, 2)[self.part]
+        normal = np.swapaxes(np.linalg.inv(np.linalg.cholesky(gram)), 1, 2)[self.component]
         return R @ normal, over_volume @ normal
 
-    def _by_part(self, values: Array, largest: bool = False) -> Array:
-        """Return sum or largest (p, ...) of values ≥ 0 at nodes (n, ...) in each part."""
-        totals, used = np.zeros((len(self.counts), *values.shape[1:])), self.part >= 0
-        (np.maximum if largest else np.add).at(totals, self.part[used], values[used])
+    def _by_component(self, values: Array, largest: bool = False) -> Array:
+        """Return sum or largest (p, ...) of values ≥ 0 at nodes (n, ...) in each component."""
+        totals, used = np.zeros((len(self.counts), *values.shape[1:])), self.component >= 0
+        (np.maximum if largest else np.add).at(totals, self.component[used], values[used])
         return totals
 
     # ---- solutions without them ----------------------------------------------------------------------
@@ -90,19 +89,19 @@ class FreeMotions:
         return self._less(forces, *self._pair) if self.any else forces
 
     def without(self, u: Array) -> Array:
-        """Return displacements (n, 3) without free motions: ∫ R^T u dV = 0 over each part."""
+        """Return displacements (n, 3) without free motions: ∫ R^T u dV = 0 over each component."""
         return self._less(u, *self._pair[::-1]) if self.any else u
 
     def _less(self, values: Array, tested: Array, taken: Array) -> Array:
-        components = self._by_part(_products(tested, values))[self.part]
-        return values - (taken @ components[..., None])[..., 0]
+        factors = self._by_component(_products(tested, values))[self.component]
+        return values - (taken @ factors[..., None])[..., 0]
 
     def basis(self) -> Array:
-        """Return the free motions of all parts (n, 3, k), those of each part 0 elsewhere."""
+        """Return the free motions of all components (n, 3, k), those of each 0 elsewhere."""
         if not self.any:
-            return np.zeros((*self.mesh.points.shape, 0))
-        parts, numbers = np.nonzero(np.arange(self.counts.max()) < self.counts[:, None])
-        return self._pair[0][..., numbers] * (self.part[:, None] == parts)[:, None]
+            return np.zeros((*self.supports.fixed.shape, 0))
+        components, numbers = np.nonzero(np.arange(self.counts.max()) < self.counts[:, None])
+        return self._pair[0][..., numbers] * (self.component[:, None] == components)[:, None]
 
     @cached_property
     def held(self) -> Mask:
@@ -110,21 +109,23 @@ class FreeMotions:
 
         Gram-Schmidt on the rows of R: each is that along which what remains of the motions goes farthest.
         """
-        chosen, part = np.zeros_like(self.supports.fixed), self.part
+        chosen, component = np.zeros_like(self.supports.fixed), self.component
         if not self.any:
             return chosen
         remaining = self._pair[0] * ~self.supports.fixed[..., None]
         remaining.reshape(-1, remaining.shape[2])[self.supports.dependents().dependents] = 0.0
         for step in range(remaining.shape[2]):
             size = (remaining**2).sum(axis=2)
-            best = self._by_part(size.max(axis=1), largest=True)
-            here = np.flatnonzero((size.max(axis=1) == best[part]) & (self.counts[part] > step) & (part >= 0))
-            node = here[np.unique(part[here], return_index=True)[1]]
+            best = self._by_component(size.max(axis=1), largest=True)
+            here = np.flatnonzero(
+                (size.max(axis=1) == best[component]) & (self.counts[component] > step) & (component >= 0)
+            )
+            node = here[np.unique(component[here], return_index=True)[1]]
             axis = size[node].argmax(axis=1)
             chosen[node, axis] = True
             row = np.zeros((len(best), remaining.shape[2]))
-            row[part[node]] = remaining[node, axis]
-            along = (row / np.sqrt(np.maximum(best, np.finfo(float).tiny))[:, None])[part, None]
+            row[component[node]] = remaining[node, axis]
+            along = (row / np.sqrt(np.maximum(best, np.finfo(float).tiny))[:, None])[component, None]
             remaining -= (remaining * along).sum(axis=2, keepdims=True) * along
         return chosen
 
@@ -133,16 +134,17 @@ class FreeMotions:
     def check(
         self, loads: Iterable[Array], moving: Mask | bool, cure: str = "add loads that balance them"
     ) -> None:
-        """Raise ModelError where a part can still move, unless loads act on it that balance."""
+        """Raise ModelError where a component can still move, unless loads act on it that balance."""
         if not self.any:
             return
-        total, size, R = np.zeros_like(self.mesh.points), np.zeros(self.mesh.n_nodes), self._pair[0]
+        points, R = self.blocks.mesh.points, self._pair[0]
+        total, size = np.zeros_like(points), np.zeros(len(points))
         for forces in loads:
             total += forces
             size += np.linalg.norm(forces, axis=1)
-        roundoff = self._rounding * self._by_part(size)
-        limit = roundoff[:, None] * self._by_part(np.linalg.norm(R, axis=1), largest=True)
-        off = (np.abs(self._by_part(_products(R, total))) > limit).any(axis=1)
+        roundoff = self._rounding * self._by_component(size)
+        limit = roundoff[:, None] * self._by_component(np.linalg.norm(R, axis=1), largest=True)
+        off = (np.abs(self._by_component(_products(R, total))) > limit).any(axis=1)
         wrong = (self.counts > 0) & (off | self._is_hinged | ~np.asarray(moving))
         if not wrong.any():
             return
@@ -150,9 +152,9 @@ class FreeMotions:
         if not off.any():
             raise ModelError(f"{text}. Fix more nodes or components")
         p = int(off.argmax())
-        center, arm = (values[self.group_of == p][0] for values in self.frames)
-        moment = self._by_part(np.cross(self.mesh.points - center, total))[p]
-        force, turn = _text(self._by_part(total)[p], roundoff[p]), _text(moment, roundoff[p] * arm)
+        center, arm = (values[self.of_block == p][0] for values in self.blocks.frames)
+        moment = self._by_component(np.cross(points - center, total))[p]
+        force, turn = _text(self._by_component(total)[p], roundoff[p]), _text(moment, roundoff[p] * arm)
         raise ModelError(
             f"{text}, and its loads do not balance: together they are {force} N and {turn} N m about "
             f"{_text(center)}. Fix more nodes or components, or {cure}"
@@ -160,51 +162,50 @@ class FreeMotions:
 
     @cached_property
     def _rounding(self) -> Array:
-        """What rounding may be, as a fraction of all loads on a part, (p,)."""
-        far = self._by_part(np.abs(self.mesh.points), largest=True).max(axis=1)
+        """What rounding may be, as a fraction of all loads on a component, (p,)."""
+        far = self._by_component(np.abs(self.blocks.mesh.points), largest=True).max(axis=1)
         size = np.zeros(len(far))
-        np.maximum.at(size, self.group_of, self.frames[1])
-        spacings = far / size * np.cbrt(self._by_part(np.ones(len(self.part))))
+        np.maximum.at(size, self.of_block, self.blocks.frames[1])
+        spacings = far / size * np.cbrt(self._by_component(np.ones(len(self.component))))
         return np.asarray(np.finfo(float).eps * (ROUND_OFF + OF_PLACES * spacings))
 
     @cached_property
     def _hangs(self) -> Mask:
-        """Which bodies (b,) hang on nodes or edges of others."""
-        bodies = self.bodies
-        at = np.concatenate(bodies.joined(self.mesh)[:2]) if bodies.count > 1 else NO_ROWS
-        return np.isin(np.arange(bodies.count), at)
+        """Which blocks (b,) hang on nodes or edges of others."""
+        return np.isin(np.arange(self.blocks.count), self.blocks.joints[1:])
 
     @cached_property
     def _is_hinged(self) -> Mask:
-        """In which parts (p,) bodies turn about nodes or edges of others: more likely a hole in the mesh."""
-        first = np.unique(self.group_of, return_index=True)[1][self.group_of]
-        turn = self.modes[:, 3:] / self.frames[1][:, None, None]
-        apart = np.abs(turn - turn[first]).max(axis=(1, 2), initial=0.0) * self.frames[1]
+        """In which components (p,) blocks turn about joints: more likely a hole in the mesh."""
+        first, size = np.unique(self.of_block, return_index=True)[1][self.of_block], self.blocks.frames[1]
+        turn = self.modes[:, 3:] / size[:, None, None]
+        apart = np.abs(turn - turn[first]).max(axis=(1, 2), initial=0.0) * size
         hinged = np.zeros(len(self.counts), dtype=bool)
-        hinged[self.group_of[self._hangs & (apart > TOGETHER)]] = True
+        hinged[self.of_block[self._hangs & (apart > TOGETHER)]] = True
         return hinged
 
-    def described(self, parts: Mask | None = None) -> str:
-        """Return which bodies, of some parts (p,) or all, can still move, and how; as many as are shown."""
-        chosen = self.counts > 0 if parts is None else parts & (self.counts > 0)
-        count, first = self.bodies.described(self.mesh)
+    def described(self, components: Mask | bool = True) -> str:
+        """Return which blocks, of some components (p,) or all, can still move, and how; the first of many."""
+        chosen = np.flatnonzero(((self.counts > 0) & components)[self.of_block])
+        several = np.bincount(self.of_block)[self.of_block] > 1
+        _, first, count = np.unique(self.blocks.block, return_index=True, return_counts=True)
+        ids = self.blocks.mesh.node_ids[self.blocks.node[first]]
+        moving = ((b, words) for b in chosen.tolist() if (words := _motions(self.modes[b])))
         return "; ".join(
-            f"the {'body' if self.bodies.count == 1 else f'part of node {first[p]}'} ({count[p]} nodes) "
-            f"can still move: {words}"
-            for p, words in islice(self._named(np.flatnonzero(chosen[self.group_of])), MAX_PROBLEMS)
+            f"the {'body' if len(ids) == 1 else f'component of node {ids[b]}'} ({count[b]} nodes) can still "
+            f"move: {words}{' (it hangs on a node or an edge only)' * bool(several[b] & self._hangs[b])}"
+            for b, words in islice(moving, MAX_PROBLEMS)
         )
 
-    def _named(self, chosen: Ints) -> Iterator[tuple[int, str]]:
-        """Return body and free motions of each that can still move."""
-        several = np.bincount(self.group_of)[self.group_of] > 1
-        for p in chosen.tolist():
-            if words := _motions(self.modes[p]):
-                yield p, words + " (it hangs on a node or an edge only)" * bool(several[p] & self._hangs[p])
-
-    def notes(self, moving: Mask) -> list[str]:
-        """Return a note of the parts (p,) among those strained that are free."""
-        text = self.described(moving) if self.any else ""
+    def notes(self, strained: Mask) -> list[str]:
+        """Return a note of the components (p,) among those strained that are free."""
+        text = self.described(strained)
         return [f"{text}; its loads balance, and the displacement is without these motions"] if text else []
+
+
+def free_motions(mesh: Mesh, supports: Supports, groups: Sequence[ElementGroup]) -> FreeMotions:
+    """Return the rigid motions that the supports leave free, component by component."""
+    return FreeMotions(supports, groups, *free_modes(mesh, supports))
 
 
 def _products(R: Array, values: Array) -> Array:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from kratos_lite.mesh import NO_ROWS, Mesh, equal_sets, with_rows
@@ -16,37 +18,30 @@ MOST = 64
 """Nodes at one place that are compared with one another."""
 
 
-def check_joints(mesh: Mesh) -> list[str]:
+def check_joints(mesh: Mesh) -> Iterator[str]:
     """Warn of elements with the same nodes, and of faces joined at their corners only."""
-    faces = mesh.all_faces
-    warnings = []
-    one, other = equal_sets([(block.nodes, [range(block.nodes.shape[1])]) for block in mesh.blocks])
-    count, ids = _pairs(mesh, one, other)
-    if count:
-        warnings.append(f"{count} elements have the same nodes as another ({ids}): both count")
-    open_ = faces.non_conforming()
-    count, ids = _pairs(mesh, *(faces.element[chosen] for chosen in open_))
-    if count:
-        warnings.append(
-            f"{count} pairs of elements ({ids}) share the corners of a face but not its further "
-            "nodes: the mesh is non-conforming there; use elements of the same order on both sides"
+    faces, ids = mesh.all_faces, mesh.element_ids
+    same = equal_sets([(block.nodes, [range(block.nodes.shape[1])]) for block in mesh.blocks])
+    if len(same[0]):
+        yield f"{len(same[0])} elements have the same nodes as another ({_first(ids, *same)}): both count"
+    one, other = (faces.element[face] for face in faces.non_conforming())
+    if len(one):
+        yield (
+            f"{len(one)} pairs of elements ({_first(ids, one, other)}) share the corners of a face but not "
+            "its further nodes: the mesh is non-conforming there; use elements of the same order on both "
+            "sides"
         )
-    elements = _halved_squares(mesh)
-    count, ids = _pairs(mesh, elements, elements)
-    if count:
-        warnings.append(
-            f"{count} four-sided faces (the first of element {ids.split()[0]}) meet "
+    squares = _halved_squares(mesh)
+    if len(squares):
+        yield (
+            f"{len(squares)} four-sided faces (the first of element {ids[squares[0]]}) meet "
             "triangles: the mesh is non-conforming there; put pyramids or wedges between"
         )
-    return warnings
 
 
-def _pairs(mesh: Mesh, one: Ints, other: Ints) -> tuple[int, str]:
-    """Return how many pairs of elements there are, and the ids of the first."""
-    if not len(one):
-        return 0, ""
-    a, b = sorted(mesh.element_ids[[one[0], other[0]]].tolist())
-    return len(one), f"{a} and {b}"
+def _first(ids: Ints, one: Ints, other: Ints) -> str:
+    """Return the ids of the first pair of elements."""
+    return "{} and {}".format(*sorted([ids[one[0]], ids[other[0]]]))
 
 
 def _halved_squares(mesh: Mesh) -> Ints:
@@ -63,36 +58,33 @@ def _halved_squares(mesh: Mesh) -> Ints:
     return np.concatenate(elements)
 
 
-def check_coincident(mesh: Mesh, constraints: Constraints | None = None) -> list[str]:
+def check_coincident(mesh: Mesh, constraints: Constraints) -> Iterator[str]:
     """Warn of different nodes at the same place (within 1e-8 of the mean spacing) that nothing ties."""
     used = np.flatnonzero(mesh.used_nodes())
     if len(used) < 2:
-        return []
-    X, ids = mesh.points[used], mesh.node_ids[used]
+        return
+    X = mesh.points[used]
     size = max(float(np.ptp(x)) for x in X.T)  # by columns, which is faster
-    coincident = _nodes_at_one_place(X, ids, 1e-8 * size / len(used) ** (1 / 3))
-    if coincident and constraints is not None:
+    pairs = mesh.node_ids[used[_at_one_place(X, 1e-8 * size / len(used) ** (1 / 3))]]
+    if len(pairs):
         ends = constraints.dependents[constraints.owner] // 3, constraints.independents // 3
-        pairs = np.unique(np.stack(ends, axis=1), axis=0)
-        tied = set(map(frozenset, mesh.node_ids[pairs].tolist()))
-        coincident = [pair for pair in coincident if frozenset(pair) not in tied]
-    if not coincident:
-        return []
-    shown = ", ".join(f"{min(pair)} and {max(pair)}" for pair in coincident[:3])
-    more = " …" if len(coincident) > 3 else ""
-    return [f"{len(coincident)} pairs of nodes coincide ({shown}{more}); they are not joined"]
+        tied = set(map(frozenset, mesh.node_ids[np.unique(np.stack(ends, axis=1), axis=0)].tolist()))
+        apart = [f"{min(pair)} and {max(pair)}" for pair in pairs.tolist() if frozenset(pair) not in tied]
+        if apart:
+            shown = ", ".join(apart[:3]) + (" …" if len(apart) > 3 else "")
+            yield f"{len(apart)} pairs of nodes coincide ({shown}); they are not joined"
 
 
-def _nodes_at_one_place(X: Array, ids: Ints, tolerance: float) -> list[tuple[int, int]]:
-    """Return the ids of nodes at the same place."""
+def _at_one_place(X: Array, tolerance: float) -> Ints:
+    """Return the rows (k, 2) of points at the same place."""
     along = X @ NORMAL
     order = np.argsort(along, kind="stable")
     X, along = X[order], along[order]
-    pairs: list[tuple[int, int]] = []
+    pairs = [np.zeros((0, 2), dtype=np.int64)]
     for step in range(1, min(len(X), MOST)):
         close = np.flatnonzero(along[step:] - along[:-step] <= 2 * tolerance)
         if not len(close):
             break
         near = close[(np.abs(X[close + step] - X[close]) <= tolerance).all(axis=1)]
-        pairs += [(int(ids[order[i]]), int(ids[order[i + step]])) for i in near]
-    return pairs
+        pairs.append(np.column_stack([order[near], order[near + step]]))
+    return np.concatenate(pairs)

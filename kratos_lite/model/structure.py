@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -21,13 +21,12 @@ from kratos_lite.errors import InputError, MeshError, ModelError, nearest
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Mesh, Where, WhereElements, distinct
 from kratos_lite.model import checks
-from kratos_lite.model.free_motions import FreeMotions
+from kratos_lite.model.free_motions import FreeMotions, free_motions
 from kratos_lite.model.hourglass_modes import check_rules
 from kratos_lite.model.joints import check_coincident, check_joints
 from kratos_lite.model.loads import Load, ScaledLoad
 from kratos_lite.model.loads.base import key_of
 from kratos_lite.model.locking import check_locking
-from kratos_lite.model.rigid_body_modes import free_motions
 from kratos_lite.model.spurious_modes import check_spurious_modes
 from kratos_lite.model.supports import DirichletCondition, Supports, axis_numbers
 from kratos_lite.quadrature import Rule
@@ -563,7 +562,7 @@ class Structure(Tabular):
 
     def remarks(self) -> list[str]:
         """Return what readers of files noted, and constants of materials that no engineering material has."""
-        return [*self.notes, *checks.unusual_constants(self._used_materials())]
+        return [*self.notes, *dict.fromkeys(checks.unusual_constants(self._used_materials()))]
 
     def _used_materials(self) -> list[LinearMaterial]:
         used = distinct(self._material_of)
@@ -598,7 +597,7 @@ def _element_name(group: ElementGroup) -> str:
     return f"{name} for {group.material}" if is_nearly_incompressible(group.material.C) else name
 
 
-CHECKS: tuple[Callable[[Structure, Sequence[ElementGroup]], list[str]], ...] = (
+CHECKS: tuple[Callable[[Structure, Sequence[ElementGroup]], Iterable[str]], ...] = (
     lambda model, groups: check_rules(model.mesh, groups),
     lambda model, groups: check_joints(model.mesh),
     lambda model, groups: check_coincident(model.mesh, model.supports.constraints),

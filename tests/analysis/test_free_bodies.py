@@ -146,7 +146,7 @@ def ends(*places):
 def test_bodies_apart_balance_each_for_itself():
     model, n = bars()
     pull(model, 1e6, ends(0, 3))
-    with pytest.raises(kl.ModelError, match=r"free: the part of node 37 \(36 nodes\) .* z\. Fix more"):
+    with pytest.raises(kl.ModelError, match=r"free: the component of node 37 \(36 nodes\) .* z\. Fix more"):
         model.solve()
     pull(model, -3e6, ends(4, 7))
     u = model.solve().u
@@ -173,7 +173,7 @@ def test_bodies_that_constraints_tie_balance_as_one(solver):
     model.add_prestress(np.random.default_rng(0).standard_normal((24, 6)) * 1e6)
     glued = kl.Model(model.mesh.replace(points=as_one), STEEL)
     assert np.abs(shared(glued, model.solve(solver).u)).max() < 1e-9
-    assert "rotation about x, y, z; the part of node 37 (36 nodes) can still" in result.report.notes[0]
+    assert "rotation about x, y, z; the component of node 37 (36 nodes) can still" in result.report.notes[0]
     model.add(kl.PointLoad([40], (0, 1e-3, 0)))
     with pytest.raises(kl.ModelError, match=r"together they are \(0 0.001 0\) N"):
         model.solve(solver)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.model import connected_bodies
+from kratos_lite.model.rigid_body_modes import rigid_blocks
 
 STEEL = kl.Isotropic3D(E=210e9, nu=0.3, density=7800.0)
 CUBE = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)])
@@ -43,7 +43,7 @@ def test_a_chain_on_edges_can_turn_about_them(n):
     with pytest.raises(kl.ModelError) as error:
         model.check()
     assert str(error.value).count("can still move") == 20
-    first, second, *_ = str(error.value).split("; the part")
+    first, second, *_ = str(error.value).split("; the component")
     assert "can still move: rotation about y (it hangs on a node or an edge only)" in first
     assert "can still move: translation (-1 0 1); rotation about y (it hangs" in second
 
@@ -102,12 +102,12 @@ def test_chains_and_blocks_mixed():
         model.check()
 
 
-def test_bodies_that_share_three_nodes_are_one_body():
+def test_blocks_that_share_three_nodes_are_one():
     """Linear cells beside quadratic ones share the corners of a face, but no face."""
     fine = kl.box((1, 1, 100), (1, 1, 100), "KinematicLinear3D20N")
     nodes = fine.blocks[0].nodes
     blocks = {"KinematicLinear3D20N": nodes[::2], "KinematicLinear3D8N": nodes[1::2, :8]}
-    assert connected_bodies.bodies(kl.Mesh(fine.points, blocks)).body.max() == 0
+    assert rigid_blocks(kl.Mesh(fine.points, blocks)).count == 1
 
 
 def test_the_cost_grows_with_the_number_of_cells(monkeypatch):

@@ -432,14 +432,14 @@ MUTATIONS = [
     # ---- supports, mass
     Mutation(
         "model/free_motions.py",
-        "return values - (taken @ components",
-        "return values + (taken @ components",
+        "return values - (taken @ factors",
+        "return values + (taken @ factors",
         "tests/analysis/test_free_bodies.py",
     ),
     Mutation(
         "model/free_motions.py",
-        "R[..., 3:] /= size[body, None, None]",
-        "R[..., 3:] *= size[body, None, None]",
+        "R[..., 3:] /= size[block, None, None]",
+        "R[..., 3:] *= size[block, None, None]",
         "tests/analysis/test_free_bodies.py",
     ),
     Mutation("solvers/constraints.py", "constants + P @ constants", "constants - P @ constants", CONSTRAINTS),

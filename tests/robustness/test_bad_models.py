@@ -81,7 +81,7 @@ def test_half_of_a_body_that_floats_is_named_and_coincident_nodes_are_counted():
     model = kl.Model(joined(low, high), STEEL)
     model.fix("z-")
     with pytest.raises(
-        kl.ModelError, match=r"the part of node 9 \(8 nodes\) can still move: translation x, y, z"
+        kl.ModelError, match=r"the component of node 9 \(8 nodes\) can still move: translation x, y, z"
     ):
         model.solve()
     model.fix("z+")

@@ -124,7 +124,7 @@ def test_parts_joined_by_an_edge_are_one():
 def test_parts_at_rest_are_checked_all_the_same():
     free = bodies(held=lambda X: (X[:, 2] == 0) & (X[:, 0] < 2.9))
     free.add(kl.Gravity((0, 0, -9.81), "b0"))
-    with pytest.raises(kl.ModelError, match=r"the part of node 55 \(27 nodes\) can still move"):
+    with pytest.raises(kl.ModelError, match=r"the component of node 55 \(27 nodes\) can still move"):
         free.solve()
     broken = bodies()
     broken = elsewhere(broken, np.where(np.arange(81)[:, None] < 54, 1, [-1, 1, 1]) * broken.mesh.points)
