@@ -14,9 +14,8 @@ from kratos_lite.errors import InputError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.checks import checked_material
-from kratos_lite.model.hourglass_modes import check_rules
 from kratos_lite.model.mass_properties import MassProperties
-from kratos_lite.model.spurious_modes import check_spurious_modes
+from kratos_lite.model.spurious_modes import check_rules, check_spurious_modes
 from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array
 from kratos_lite.validation import finite
@@ -30,7 +29,7 @@ def elements_of(mesh: Mesh, material: Material, unnamed: str = NON_LOCKING) -> l
     structure.check_geometry()
     groups = structure.element_groups(unnamed)
     check_rules(mesh, groups)
-    check_spurious_modes(mesh, groups)
+    check_spurious_modes(mesh, groups, structure.supports)
     return groups
 
 

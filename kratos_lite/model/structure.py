@@ -22,12 +22,11 @@ from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Mesh, Where, WhereElements, distinct
 from kratos_lite.model import checks
 from kratos_lite.model.free_motions import FreeMotions, free_motions
-from kratos_lite.model.hourglass_modes import check_rules
 from kratos_lite.model.joints import check_coincident, check_joints
 from kratos_lite.model.loads import Load, ScaledLoad
 from kratos_lite.model.loads.base import key_of
 from kratos_lite.model.locking import check_locking
-from kratos_lite.model.spurious_modes import check_spurious_modes
+from kratos_lite.model.spurious_modes import check_rules, check_spurious_modes
 from kratos_lite.model.supports import DirichletCondition, Supports, axis_numbers
 from kratos_lite.quadrature import Rule
 from kratos_lite.solvers.constraints import rigid_modes

@@ -124,4 +124,4 @@ def test_a_neighbor_with_full_integration_holds_a_reduced_one():
     )
     values = np.linalg.eigvalsh(stiffness(model))
     assert (values < 1e-9 * values.max()).sum() == 6
-    check_spurious_modes(model.mesh, model.element_groups())
+    check_spurious_modes(model.mesh, model.element_groups(), model.supports)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.model.hourglass_modes import check_rules
+from kratos_lite.model.spurious_modes import check_rules
 from kratos_lite.solvers import constrained_system as system
 
 ROCK = kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0)
