@@ -81,6 +81,12 @@ class Block:
     def __len__(self) -> int:
         return len(self.nodes)
 
+    @property
+    def known_shape(self) -> type[Shape]:
+        """The reference cell, of a block whose type is known."""
+        assert self.shape is not None
+        return self.shape
+
     def __reduce__(self) -> tuple[Any, ...]:  # copies are read-only as well
         return Block, tuple(getattr(self, name) for name in names_of(type(self)))
 

@@ -24,8 +24,7 @@ def cell_boxes(points: Array, block: Block) -> tuple[Array, Array]:
 
     A curved cell deviates from the straight one by at most Σ |N_a| |D_a|, D_a being the distance of node a.
     """
-    shape = block.shape
-    assert shape is not None
+    shape = block.known_shape
     low = high = points[block.nodes[:, 0]]
     for a in range(1, shape.corners):  # one after the other: faster than along an axis
         corner = points[block.nodes[:, a]]

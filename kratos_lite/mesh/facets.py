@@ -38,8 +38,7 @@ def _folds(mesh: Mesh) -> tuple[Ints, Ints, Array, Array, Ints]:
     """Return the two boundary faces at each edge (k,), how they meet, and the nodes of the edge (k, 2)."""
     edges, faces, ends, normals, centers = [], [NO_ROWS], [], [np.zeros((0, 3))], [np.zeros((0, 3))]
     for block in mesh.boundary:
-        assert block.shape is not None
-        c, count = block.shape.corners, sum(map(len, normals))
+        c, count = block.known_shape.corners, sum(map(len, normals))
         sides = [(i, (i + 1) % c) for i in range(c)]
         edges.append((block.nodes, sides))
         ends += [block.nodes[:, side] for side in sides]
@@ -58,8 +57,7 @@ def _folds(mesh: Mesh) -> tuple[Ints, Ints, Array, Array, Ints]:
 
 def _straight(mesh: Mesh, block: Block) -> Mask:
     """Return which faces (m,) have straight edges."""
-    shape, X = block.shape, mesh.points
-    assert shape is not None
+    shape, X = block.known_shape, mesh.points
     c, straight = shape.corners, np.ones(len(block), dtype=bool)
     if len(shape.nodes) == c:
         return straight

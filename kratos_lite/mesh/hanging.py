@@ -279,7 +279,6 @@ def existing_keys(blocks: Iterable[Block]) -> Keys:
 
 def entity_keys(block: Block) -> Keys:
     """Return the keys (m, e) of the edges and faces of the cells of a block."""
-    shape = block.shape
-    assert shape is not None
+    shape = block.known_shape
     sets = [*shape.edges, *(face[: FACE_SHAPES[len(face)].corners] for face in shape.faces)]
     return np.stack([keys_of(block.nodes[:, list(columns)]) for columns in sets], axis=1)

@@ -112,8 +112,7 @@ class CellRefiner:
 
     def _corners(self, block: Block, cells: Ints, pieces: Sequence[Piece]) -> list[Ints]:
         """Return the corners (m, c) of each piece of some cells."""
-        assert block.shape is not None
-        family, old = block.shape.cell, block.nodes[cells].astype(np.int64)
+        family, old = block.known_shape.cell, block.nodes[cells].astype(np.int64)
         at: dict[tuple[int, ...], Array] = {
             corners_around(family, xi): xi for piece in pieces for xi in piece.corners
         }
@@ -128,8 +127,7 @@ class CellRefiner:
 
     def _nodes(self, block: Block, cells: Ints, keys: Keys, places: Array) -> Ints:
         """Return the nodes of keys (m, ...) at places (p, d) in each cell; new ones are made."""
-        shape = block.shape
-        assert shape is not None
+        shape = block.known_shape
         self._recognize(block, cells, keys, places)
         new = self.centers.make(keys.ravel(), self._n_nodes)
         self._n_nodes += len(new)
@@ -145,13 +143,12 @@ class CellRefiner:
 
     def _recognize(self, block: Block, cells: Ints, keys: Keys, places: Array) -> None:
         """Let nodes in the middle of edges, faces or cells be those that the cells have there already."""
-        assert block.shape is not None
         keys = keys.reshape(len(cells), len(places))
         for column, xi in enumerate(places):
-            around = list(corners_around(block.shape.cell, xi))
+            around = list(corners_around(block.known_shape.cell, xi))
             if (
                 len(around) < 4
-                or np.abs(LINEAR[block.shape.cell].N(xi)[around] * len(around) - 1).max() > 1e-9
+                or np.abs(LINEAR[block.known_shape.cell].N(xi)[around] * len(around) - 1).max() > 1e-9
             ):
                 continue
             own = self.centers.find(keys_of(block.nodes[cells][:, around]))

@@ -63,8 +63,7 @@ def refine(mesh: Mesh, elements: ArrayLike | None = None, keep: ArrayLike | None
 
 def _target(block: Block, cell: str) -> tuple[str, type[Shape]]:
     """Return name and shape of the pieces of a block: of the same order."""
-    shape = block.shape
-    assert shape is not None
+    shape = block.known_shape
     if cell != shape.cell:
         shape = Tetrahedron4 if len(shape.nodes) == shape.corners else Tetrahedron10
         return name_of(block.name, shape), shape
@@ -73,8 +72,7 @@ def _target(block: Block, cell: str) -> tuple[str, type[Shape]]:
 
 def axes_along(mesh: Mesh, block: Block, direction: Array) -> Ints:
     """Return the axis of each cell (m,) all of whose edges are straight and along a direction (3,), or -1."""
-    shape = block.shape
-    assert shape is not None
+    shape = block.known_shape
     axes = np.full(len(block), -1)
     if shape.cell not in ("hexahedron", "wedge", "quadrilateral", "line"):
         return axes
@@ -91,10 +89,11 @@ def axes_along(mesh: Mesh, block: Block, direction: Array) -> Ints:
 
 def _cuts_across(mesh: Mesh, block: Block, cells: Ints, direction: Array) -> list[Cut]:
     """Return cells of a block with the pieces that they are cut into, edges along a direction kept."""
-    assert block.shape is not None
     axes = axes_along(mesh, block.take(cells), direction)
     return [
-        (cells[axes == axis], across(block.shape.cell, axis)) for axis in range(3) if (axes == axis).any()
+        (cells[axes == axis], across(block.known_shape.cell, axis))
+        for axis in range(3)
+        if (axes == axis).any()
     ]
 
 

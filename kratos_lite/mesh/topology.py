@@ -148,8 +148,7 @@ def corners(face: tuple[int, ...]) -> tuple[int, ...]:
 
 def outward_signs(boundary: Sequence[Block], block: Block) -> Array:
     """Return +1 for faces whose nodes run counter-clockwise from outside, -1 for others, 0 inside."""
-    assert block.shape is not None
-    c = block.shape.corners
+    c = block.known_shape.corners
     outside = [b.nodes[:, :c] for b in boundary if b.shape is not None and b.shape.corners == c]
     known = np.vstack([np.zeros((0, c), dtype=np.int32), *outside])
     corners = block.nodes[:, :c]

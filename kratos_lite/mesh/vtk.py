@@ -36,14 +36,14 @@ def vtk_cells(blocks: Sequence[Block], n_nodes: int) -> tuple[Numbers, Numbers, 
     nodes = np.empty(size, dtype=index)
     at = 0
     for block in blocks:
-        assert block.shape is not None
-        if not block.shape.vtk:
-            raise InputError(f"{block.name}: {block.shape.__name__} has no VTK number; set its `vtk`")
-        nodes[at : at + block.nodes.size] = block.nodes[:, list(block.shape.to_vtk)].ravel()
+        shape = block.known_shape
+        if not shape.vtk:
+            raise InputError(f"{block.name}: {shape.__name__} has no VTK number; set its `vtk`")
+        nodes[at : at + block.nodes.size] = block.nodes[:, list(shape.to_vtk)].ravel()
         at += block.nodes.size
     counts = [len(block) for block in blocks]
     sizes = np.repeat([block.nodes.shape[1] for block in blocks], counts)
-    types = np.repeat([block.shape.vtk for block in blocks if block.shape is not None], counts)
+    types = np.repeat([block.known_shape.vtk for block in blocks], counts)
     return nodes, np.cumsum(sizes, dtype=index), types.astype("|u1")
 
 

@@ -196,7 +196,9 @@ MUTATIONS = [
     # ---- modes
     Mutation("solvers/eigen.py", "return largest <= TOLERANCE", "return smallest <= TOLERANCE", BLOCK_MODES),
     Mutation("solvers/eigen.py", "if others[0] > last", "if True or others[0] > last", BLOCK_MODES),
-    Mutation("solvers/eigen.py", "(values**2, values, np", "(values, values, np", COMPLEX),
+    Mutation(
+        "solvers/eigen.py", "residual = values[:, None] ** 2 *", "residual = values[:, None] *", COMPLEX
+    ),
     Mutation("solvers/eigen.py", "W = W[_lengths(W) > ROUNDED]", "W = W[:]", COMPLEX),
     Mutation("solvers/coarse_level.py", "self.weights * nodal[fine]", "0.0 * nodal[fine]", BLOCK_MODES),
     Mutation("native/sparse.hpp", "s[v] += A.data[k]", "s[0] += A.data[k]", BLOCK_MODES),

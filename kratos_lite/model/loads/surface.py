@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -24,16 +24,18 @@ SURFACES = ("triangle", "quadrilateral")
 class FaceLoad(DistributedLoad):
     """A load on faces or lines."""
 
-    @abstractmethod
-    def on_faces(self, mesh: Mesh, factors: int = FUNCTION) -> Iterator[tuple[Block, Array]]:
-        """Yield blocks of m faces with the forces (m, k, 3) in N on the nodes of each face."""
-
+    what: ClassVar[str]
+    cells: ClassVar[tuple[str, ...]] = SURFACES
     factors = FUNCTION
+
+    @abstractmethod
+    def on_faces(self, mesh: Mesh, faces: list[Block], factors: int) -> Iterable[Array]:
+        """Return the forces (m, k, 3) in N on the nodes of the m faces of each block."""
 
     def integral(self, mesh: Mesh, groups: Sequence[ElementGroup], factors: int) -> Array:
         """Return the nodal forces (n, 3) in N of all faces."""
-        total = np.zeros_like(mesh.points)
-        for block, forces in self.on_faces(mesh, factors):
+        total, faces = np.zeros_like(mesh.points), _faces(mesh, self.where, self.what, self.cells)
+        for block, forces in zip(faces, self.on_faces(mesh, faces, factors), strict=True):
             add_nodal(total, block.nodes, forces)
         return total
 
@@ -48,7 +50,7 @@ class Traction(FaceLoad):
         (m, 3) that returns (m, 3), taken at quadrature points.
     """
 
-    cells: ClassVar[tuple[str, ...]] = SURFACES
+    what = "a traction"
     nodal = "traction", 2
 
     def __init__(self, where: Where, traction: ArrayLike | OfPlace) -> None:
@@ -56,13 +58,11 @@ class Traction(FaceLoad):
         if not callable(traction):
             self.traction = vectors(traction, "a traction", "(3,) or (n, 3) in Pa", (1, 2))
 
-    def on_faces(self, mesh: Mesh, factors: int = FUNCTION) -> Iterator[tuple[Block, Array]]:
-        """Yield blocks of faces with ∫ N t dA (m, k, 3) in N of each face."""
-        what = "a traction" if self.cells == SURFACES else "a line load"
-        for block in _faces(mesh, self.where, what, self.cells):
-            assert block.shape is not None
-            t = _on(block, self.traction, mesh, what, (3,))
-            yield block, surface_load(block.shape, mesh.points[block.nodes], t, factors)
+    def on_faces(self, mesh: Mesh, faces: list[Block], factors: int) -> Iterable[Array]:
+        """Return ∫ N t dA (m, k, 3) in N of each face."""
+        for block in faces:
+            t = _on(block, self.traction, mesh, self.what, (3,))
+            yield surface_load(block.known_shape, mesh.points[block.nodes], t, factors)
 
 
 class LineLoad(Traction):
@@ -74,7 +74,7 @@ class LineLoad(Traction):
     traction : (3,) float, N/m.
     """
 
-    cells: ClassVar[tuple[str, ...]] = ("line",)
+    what, cells = "a line load", ("line",)
 
 
 class Pressure(FaceLoad):
@@ -94,6 +94,7 @@ class Pressure(FaceLoad):
         The normal is neither, or the pressure no number.
     """
 
+    what = "a pressure"
     nodal = "pressure", 1
 
     def __init__(self, where: Where, pressure: ArrayLike | OfPlace, normal: str = "outward") -> None:
@@ -106,15 +107,14 @@ class Pressure(FaceLoad):
             pressure = pressure if pressure.ndim else number(pressure.item(), "a pressure")
         self.where, self.pressure, self.normal = where, pressure, normal
 
-    def on_faces(self, mesh: Mesh, factors: int = FUNCTION) -> Iterator[tuple[Block, Array]]:
-        """Yield blocks of faces with -∫ N p n dA (m, k, 3) in N of each face."""
-        for block in _faces(mesh, self.where, "a pressure"):
-            assert block.shape is not None
-            p = _on(block, self.pressure, mesh, "a pressure", ())
-            forces = surface_pressure(block.shape, mesh.points[block.nodes], p, factors)
+    def on_faces(self, mesh: Mesh, faces: list[Block], factors: int) -> Iterable[Array]:
+        """Return -∫ N p n dA (m, k, 3) in N of each face."""
+        for block in faces:
+            p = _on(block, self.pressure, mesh, self.what, ())
+            forces = surface_pressure(block.known_shape, mesh.points[block.nodes], p, factors)
             if self.normal == "outward":
                 forces *= outward(mesh, block)[:, None, None]
-            yield block, forces
+            yield forces
 
 
 class Resultant(FaceLoad):
@@ -145,6 +145,8 @@ class Resultant(FaceLoad):
     -100.0
     """
 
+    what = "a resultant"
+
     def __init__(
         self,
         where: Where,
@@ -157,15 +159,8 @@ class Resultant(FaceLoad):
         self.moment = vectors(moment, "a resultant moment", "(3,) in N m")
         self.about = None if about is None else vectors(about, "the point of a resultant", "(3,) in m")
 
-    def on_faces(self, mesh: Mesh, factors: int = FUNCTION) -> Iterator[tuple[Block, Array]]:
-        """Yield blocks of faces with ∫ N t dA (m, k, 3) in N of each face.
-
-        Raises
-        ------
-        ModelError
-            There are no faces, or the mesh is a part of a larger one.
-        """
-        faces = _faces(mesh, self.where, "a resultant")
+    def on_faces(self, mesh: Mesh, faces: list[Block], factors: int) -> Iterable[Array]:
+        """Return ∫ N t dA (m, k, 3) in N of each face; ModelError where the mesh is a part of another."""
         if not mesh.whole:
             raise ModelError("a resultant needs all faces of its part in one mesh; give a traction instead")
         X, dA = (np.concatenate(values) for values in zip(*_points_of(mesh, faces, factors), strict=True))
@@ -178,9 +173,7 @@ class Resultant(FaceLoad):
         def traction(x: Array) -> Array:
             return np.asarray(self.force / dA.sum() + np.cross(turn, x - center))
 
-        for block in faces:
-            assert block.shape is not None
-            yield block, surface_load(block.shape, mesh.points[block.nodes], traction, factors)
+        return [surface_load(b.known_shape, mesh.points[b.nodes], traction, factors) for b in faces]
 
 
 class ConditionLoads(Load):
@@ -207,7 +200,11 @@ class ConditionLoads(Load):
         """Return the nodal forces (n, 3) in N."""
         total = np.zeros_like(mesh.points)
         for block, at in with_rows(mesh.conditions):
-            _check_loadable(block, bool(self.force[at].any()), bool(self.pressure[at].any()))
+            on_face = block.shape is not None and block.shape.cell in SURFACES
+            if block.shape is None and (self.force[at].any() or self.pressure[at].any()):
+                raise ModelError(f"a load is given on conditions of the unknown type {block.name}")
+            if not on_face and self.pressure[at].any():
+                raise ModelError(f"a pressure acts on faces; {block.name} is not one")
             if block.shape is None or not len(block):
                 continue
             X = mesh.points[block.nodes]
@@ -215,7 +212,7 @@ class ConditionLoads(Load):
             if force.any():
                 add_nodal(total, block.nodes, surface_load(block.shape, X, force))
             pressure = self.pressure[at, None] + self.nodal_pressure[block.nodes]
-            if pressure.any() and block.shape.cell in SURFACES:
+            if on_face and pressure.any():
                 add_nodal(total, block.nodes, surface_pressure(block.shape, X, pressure))
         return total
 
@@ -229,21 +226,12 @@ class ConditionLoads(Load):
         )
 
 
-def _check_loadable(block: Block, force: bool, pressure: bool) -> None:
-    """Raise ModelError for a load stated on conditions that cannot carry it."""
-    if block.shape is None and (force or pressure):
-        raise ModelError(f"a load is given on conditions of the unknown type {block.name}")
-    if block.shape is not None and pressure and block.shape.cell not in SURFACES:
-        raise ModelError(f"a pressure acts on faces; {block.name} is not one")
-
-
 def _points_of(mesh: Mesh, faces: Sequence[Block], factors: int) -> Iterator[tuple[Array, Array]]:
     """Yield for blocks of faces the points (k, 3) of their rules and the areas (k,) that these stand for."""
     for block in faces:
-        assert block.shape is not None
-        rule, X = face_rule(block.shape, factors), mesh.points[block.nodes]
-        dA = np.linalg.norm(area_vectors(block.shape, X, rule), axis=-1)
-        yield (tabulate(block.shape, rule)[0] @ X).reshape(-1, 3), dA.ravel()
+        rule, X = face_rule(block.known_shape, factors), mesh.points[block.nodes]
+        dA = np.linalg.norm(area_vectors(block.known_shape, X, rule), axis=-1)
+        yield (tabulate(block.known_shape, rule)[0] @ X).reshape(-1, 3), dA.ravel()
 
 
 def _on(block: Block, value: Any, mesh: Mesh, what: str, width: tuple[int, ...]) -> Any:
