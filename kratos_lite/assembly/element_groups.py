@@ -19,7 +19,7 @@ from kratos_lite.elements.exact_rules import (
     geometries,
     interpolations,
 )
-from kratos_lite.elements.formulations import NON_LOCKING, element_of
+from kratos_lite.elements.formulations import element_of
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.materials import LinearMaterial
@@ -64,6 +64,15 @@ class ElementGroup:
     def is_proven(self) -> bool:
         """Whether class and rule are those of the library, which leave no hourglass modes in a mesh."""
         return self.rule is self.element.rule and is_builtin(self.element)
+
+    @property
+    def has_dilatations(self) -> bool:
+        """Whether the dilatations of the elements are known.
+
+        Those of the library's B-bar elements are their projected ones, those of enhanced elements their
+        means: the modes take up the others.
+        """
+        return not self.element.custom and self.strain_tables() is not None
 
     def tables(self, rule: Rule | None = None) -> tuple[Rows, Array, Array, Array]:
         """Return nodes, N (g, k), dN (g, k, 3) and weights (g,) of a rule, or the own one, for kernels."""
@@ -141,20 +150,18 @@ def add_nodal(total: Array, nodes: Numbers, values: Array) -> None:
 def element_groups_of(
     mesh: Mesh,
     materials: Sequence[LinearMaterial],
-    material_of: Ints | None = None,
-    rules: Mapping[int, Rule | int] | None = None,
-    rule_of: Ints | None = None,
-    prestress: Array | None = None,
-    formulation: str | None = None,
-    unnamed: str = NON_LOCKING,
+    material_of: Ints,
+    rules: Mapping[int, Rule | int],
+    rule_of: Ints,
+    prestress: Array | None,
+    formulation: str | None,
+    unnamed: str,
 ) -> list[ElementGroup]:
     """Return the elements of a mesh grouped by type, rule and material.
 
     `material_of` and `rule_of` (m,) are numbers, -1 for no material and for the element's own rule.
     """
-    m, groups = mesh.n_elements, []
-    material_of = np.zeros(m, dtype=np.int64) if material_of is None else material_of
-    rule_of = np.full(m, -1) if rule_of is None else rule_of
+    groups = []
     for block, at in with_rows(mesh.blocks):
         if not len(block):
             continue
@@ -162,7 +169,7 @@ def element_groups_of(
         for material, rule, cells in _alike(mesh, block, material_of[at], rule_of[at]):
             element = element_of(block.name, formulation, materials[material].C, unnamed)
             rows = at.start + cells
-            other = rules[rule] if rules and rule >= 0 else None
+            other = rules.get(rule)
             proven = other is None and is_builtin(element)
             chosen = element.rule if proven else _fitting(element, element.rule if other is None else other)
             nodes = block.nodes if len(cells) == len(block) else block.nodes[cells]

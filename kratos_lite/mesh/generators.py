@@ -61,26 +61,13 @@ def counts_of(cells: Sequence[int]) -> Counts:
     return i, j, k
 
 
-def _check_size(counts: Sequence[int], shape: type[Shape]) -> None:
-    """Raise InputError for more cells than int32 numbers."""
-    i, j, k = counts
-    cells = i * j * k * len(SPLITS[shape.cell])
-    if cells * len(shape.nodes) >= MOST_NUMBERS:
-        what, most = f"a mesh of {i:.6g} × {j:.6g} × {k:.6g} bricks", MOST_NUMBERS // len(shape.nodes)
-        raise InputError(f"{what} has more than the {most} cells possible; take fewer")
-
-
-def _full_name(element: str) -> str:
-    """Return the name that a number of nodes means."""
-    nodes = element.upper().removeprefix("3D")
-    return f"{UNNAMED}{nodes[:-1]}N" if nodes[-1:] == "N" and nodes[:-1].isdigit() else element
-
-
 def kind_of(element: str) -> tuple[str, type[Shape]]:
     """Return the name of the block of such elements, and their shape; InputError if there are none."""
     if not isinstance(element, str):
         raise InputError(f"element must be a name such as KinematicLinear3D8N; got {element!r}")
-    element = _full_name(element)
+    nodes = element.upper().removeprefix("3D")
+    if nodes[-1:] == "N" and nodes[:-1].isdigit():
+        element = UNNAMED + nodes
     cls = ELEMENTS[element]
     if cls.shape.cell not in SPLITS:
         raise InputError(f"{element} has cell {cls.shape.cell!r}; boxes are made of {', '.join(SPLITS)}")
@@ -96,15 +83,10 @@ def unit_cells(
     """
     high = cells if high is None else high
     i, j, k = (b - a for a, b in zip(low, high, strict=True))
-    _check_size((i, j, k), shape)
+    if i * j * k * len(SPLITS[shape.cell]) * len(shape.nodes) >= MOST_NUMBERS:
+        what, most = f"a mesh of {i:.6g} × {j:.6g} × {k:.6g} bricks", MOST_NUMBERS // len(shape.nodes)
+        raise InputError(f"{what} has more than the {most} cells possible; take fewer")
     return cut_bricks(*_grid(cells, low, high), shape)
-
-
-def _unit_mesh(cells: Sequence[int], element: str) -> tuple[Array, dict[str, Ints]]:
-    """Return points and cells of the unit cube."""
-    name, shape = kind_of(element)
-    points, nodes = unit_cells(counts_of(cells), shape)
-    return points, {name: nodes}
 
 
 def sides_of(unit: Array, sides: dict[str, tuple[int, int]]) -> dict[str, Part]:
@@ -144,8 +126,9 @@ def box(
     (81, 8, 21)
     """
     corner, lengths = corner_and_lengths(size, origin)
-    unit, cells_by_name = _unit_mesh(cells, element)
-    return Mesh(corner + unit * lengths, cells_by_name, parts=sides_of(unit, SIDES))
+    name, shape = kind_of(element)
+    unit, nodes = unit_cells(counts_of(cells), shape)
+    return Mesh(corner + unit * lengths, {name: nodes}, parts=sides_of(unit, SIDES))
 
 
 def corner_and_lengths(size: Sequence[float], origin: Sequence[float]) -> tuple[Array, Array]:
@@ -190,12 +173,12 @@ def annulus(
     sizes = finite([inner, outer, width], "inner, outer and width")
     if sizes.shape != (3,) or not (0 < sizes[0] < sizes[1] and sizes[2] > 0):
         raise InputError(f"an annulus needs 0 < inner < outer and width > 0; got {inner}, {outer}, {width}")
-    if counts_of(cells)[1] < 3:
+    (name, shape), counts = kind_of(element), counts_of(cells)
+    if counts[1] < 3:
         raise InputError(f"an annulus needs at least 3 cells around; got {cells[1]}")
-    unit, cells_by_name = _unit_mesh(cells, element)
-    seam, start = np.flatnonzero(unit[:, 1] == 1), np.flatnonzero(unit[:, 1] == 0)
-    seam = seam[np.lexsort((unit[seam, 0], unit[seam, 2]))]
-    start = start[np.lexsort((unit[start, 0], unit[start, 2]))]
+    unit, nodes = unit_cells(counts, shape)
+    ends = (np.flatnonzero(unit[:, 1] == end) for end in (1, 0))
+    seam, start = (rows[np.lexsort((unit[rows, 0], unit[rows, 2]))] for rows in ends)
     target = np.arange(len(unit))
     target[seam] = start
     kept, renumbered = np.unique(target, return_inverse=True)
@@ -204,4 +187,4 @@ def annulus(
     angle = 2 * np.pi * unit[:, 1]
     points = np.column_stack([r * np.cos(angle), r * np.sin(angle), width * unit[:, 2]])
     parts = sides_of(unit, {"inner": (0, 0), "outer": (0, 1), "z-": (2, 0), "z+": (2, 1)})
-    return Mesh(points, {name: renumbered[nodes] for name, nodes in cells_by_name.items()}, parts=parts)
+    return Mesh(points, {name: renumbered[nodes]}, parts=parts)

@@ -11,14 +11,8 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import numpy as np
 
 from kratos_lite.errors import MeshError
-from kratos_lite.mesh.blocks import NO_ROWS, Block, Part, blocks_of, ids_of, rows_of_ids, select
-from kratos_lite.mesh.selection import (
-    Where,
-    WhereElements,
-    find_elements,
-    find_nodes,
-    find_part,
-)
+from kratos_lite.mesh.blocks import NO_ROWS, Block, Part, blocks_of, distinct, ids_of, rows_of_ids, select
+from kratos_lite.mesh.selection import Where, WhereElements, find_elements, find_nodes, find_part
 from kratos_lite.mesh.topology import Faces, inverted, mirror
 from kratos_lite.tabular import Tabular
 from kratos_lite.typing import Array, ArrayLike, Ints, Mask
@@ -130,13 +124,11 @@ class Mesh(Tabular):
 
     def _check_parts(self) -> None:
         """Raise MeshError for indices of parts that do not exist."""
-        sizes = {"nodes": self.n_nodes, "elements": self.n_elements, "conditions": self.n_conditions}
         for name, part in self.parts.items():
             instance(part, f"part {name!r}", Part, PART, error=MeshError)
-            for what, size in sizes.items():
-                whole_numbers(
-                    getattr(part, what), f"part {name!r}: indices of {what}", size=size, error=MeshError
-                )
+            for what in ("nodes", "elements", "conditions"):
+                size, label = getattr(self, f"n_{what}"), f"part {name!r}: indices of {what}"
+                whole_numbers(getattr(part, what), label, size=size, error=MeshError)
 
     def replace(
         self,
@@ -165,15 +157,9 @@ class Mesh(Tabular):
         >>> mesh.replace(points=mesh.points * [1, 1, 2]).points.max(axis=0)
         array([1., 1., 2.])
         """
-        changes = {
-            "points": points,
-            "blocks": blocks,
-            "conditions": conditions,
-            "parts": parts,
-            "whole": whole,
-        }
-        kept = {name: value for name, value in changes.items() if value is not None}
-        return Mesh(**{**self._arguments(), **kept})
+        changes = dict(points=points, blocks=blocks, conditions=conditions, parts=parts, whole=whole)
+        given = {name: value for name, value in changes.items() if value is not None}
+        return Mesh(**{**self._arguments(), **given})
 
     # ---- nodes and elements ----------------------------------------------------------------
 
@@ -310,14 +296,12 @@ class Mesh(Tabular):
         rows = self.nodes(where)
         if self.whole and not len(rows):
             raise MeshError(f"no node is chosen for part {name!r}")
-        if name in self._parts:
-            if set(self._parts[name].nodes.tolist()) != set(rows.tolist()):
-                raise MeshError(
-                    f"there is a part {name!r} with other nodes already, on which supports and loads may "
-                    "rely; take another name, or make the mesh anew"
-                )
-            return
-        self._parts[name] = Part(nodes=rows)
+        known = self._parts.setdefault(name, Part(nodes=rows))
+        if not np.array_equal(distinct(known.nodes), distinct(rows)):
+            raise MeshError(
+                f"there is a part {name!r} with other nodes already, on which supports and loads may "
+                "rely; take another name, or make the mesh anew"
+            )
 
     def nodes(self, where: Where) -> Ints:
         """Return the indices of nodes, each once and in the order in which they are given.
@@ -480,15 +464,12 @@ class Mesh(Tabular):
         """
         from kratos_lite.elements.surface import FUNCTION, area_vectors, face_rule  # above this floor's start
 
-        return float(
-            sum(
-                np.linalg.norm(
-                    area_vectors(b.shape, self.points[b.nodes], face_rule(b.shape, FUNCTION)), axis=-1
-                ).sum()
-                for b in self.faces(where)
-                if b.shape is not None
-            )
-        )
+        areas = [
+            area_vectors(b.shape, self.points[b.nodes], face_rule(b.shape, FUNCTION))
+            for b in self.faces(where)
+            if b.shape is not None
+        ]
+        return float(sum(np.linalg.norm(area, axis=-1).sum() for area in areas))
 
     def faces(self, where: Where) -> list[Block]:
         """Return the faces of a part: its conditions, or else the boundary faces among its nodes.

@@ -22,6 +22,8 @@ Target: TypeAlias = "Callable[[Block, str], tuple[str, type[Shape]]]"
 """Gives name and shape of the pieces of a block, by their family."""
 Cut: TypeAlias = "tuple[Ints, Sequence[Piece]]"
 """Some cells of a block, and the pieces that each is cut into."""
+Cuts: TypeAlias = "Callable[[Block, slice], Sequence[Cut]]"
+"""Gives the cuts of a block and its rows; other cells stay as they are."""
 
 
 class _Cells:
@@ -71,17 +73,7 @@ class CellRefiner:
         self._sources: list[tuple[Ints, Array]] = []
         self._inside: list[Keys] = [np.zeros(0, dtype=np.uint64)]
 
-    def elements(self, cuts: Callable[[Block, slice], Sequence[Cut]]) -> None:
-        """Take up all elements: cut as `cuts` says of each block and its rows, or as they are."""
-        self._refine(self.mesh.blocks, self._elements, cuts)
-
-    def conditions(self, cuts: Callable[[Block, slice], Sequence[Cut]]) -> None:
-        """Take up all conditions likewise, after the elements."""
-        self._refine(self.mesh.conditions, self._conditions, cuts)
-
-    def _refine(
-        self, blocks: Sequence[Block], into: _Cells, cuts: Callable[[Block, slice], Sequence[Cut]]
-    ) -> None:
+    def _refine(self, blocks: Sequence[Block], into: _Cells, cuts: Cuts) -> None:
         for block, at in with_rows(blocks):
             cut = cuts(block, at)
             kept = np.ones(len(block), dtype=bool)
@@ -145,11 +137,8 @@ class CellRefiner:
         """Let nodes in the middle of edges, faces or cells be those that the cells have there already."""
         keys = keys.reshape(len(cells), len(places))
         for column, xi in enumerate(places):
-            around = list(corners_around(block.known_shape.cell, xi))
-            if (
-                len(around) < 4
-                or np.abs(LINEAR[block.known_shape.cell].N(xi)[around] * len(around) - 1).max() > 1e-9
-            ):
+            around, cell = list(corners_around(block.known_shape.cell, xi)), LINEAR[block.known_shape.cell]
+            if len(around) < 4 or np.abs(cell.N(xi)[around] * len(around) - 1).max() > 1e-9:
                 continue
             own = self.centers.find(keys_of(block.nodes[cells][:, around]))
             known = (own >= 0) & (self.centers.find(keys[:, column]) < 0)
@@ -157,22 +146,16 @@ class CellRefiner:
                 self.centers.add(keys[known, column], own[known])
                 self.centers.sort()
 
-    def refined_mesh(self) -> RefinedMesh:
-        """Return the refined mesh."""
+    def refined_mesh(self, elements: Cuts, conditions: Cuts) -> RefinedMesh:
+        """Return the refined mesh by the cuts of elements and of conditions."""
+        self._refine(self.mesh.blocks, self._elements, elements)
+        self._refine(self.mesh.conditions, self._conditions, conditions)
         blocks, n = self._elements.blocks(), self._n_nodes
         start, nodes, weights = _compressed(self._sources)
         old = self.mesh
         first = int(old.node_ids.max(initial=0)) + 1
-        bare = RefinedMesh(
-            old,
-            old,
-            self._elements.parents(),
-            self._conditions.parents(),
-            start,
-            nodes,
-            weights,
-            np.concatenate(self._inside),
-        )
+        parents, inside = (self._elements.parents(), self._conditions.parents()), np.concatenate(self._inside)
+        bare = RefinedMesh(old, old, *parents, start, nodes, weights, inside)
         mesh = Mesh(
             bare.interpolate(old.points),
             blocks,

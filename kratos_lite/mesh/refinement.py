@@ -12,16 +12,9 @@ import numpy as np
 
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import MeshError
+from kratos_lite.mesh import hanging
 from kratos_lite.mesh.blocks import Block, with_rows
 from kratos_lite.mesh.centers import Centers, Keys, are_among, keys_of, sorted_keys
-from kratos_lite.mesh.hanging import (
-    entity_keys,
-    existing_keys,
-    is_corner,
-    known_centers,
-    split_edges,
-    split_faces,
-)
 from kratos_lite.mesh.mesh import Mesh
 from kratos_lite.mesh.refine_cells import CellRefiner, Cut, name_of
 from kratos_lite.mesh.refined_mesh import RefinedMesh
@@ -50,15 +43,16 @@ def refine(mesh: Mesh, elements: ArrayLike | None = None, keep: ArrayLike | None
     """
     marked = np.zeros(mesh.n_elements, dtype=bool)
     marked[mesh.elements(elements)] = True
-    centers = known_centers(mesh.blocks, mesh.hanging)
+    centers = hanging.known_centers(mesh.blocks, mesh.hanging)
     if mesh.hanging is not None:
         marked = _closed(mesh, centers, marked)
     refiner = CellRefiner(mesh, centers, _target)
     direction = None if keep is None else finite(keep, "keep", (3,), error=MeshError)
-    refiner.elements(lambda block, at: _cuts(mesh, block, np.flatnonzero(marked[at]), direction))
     cut = _cut_entities(mesh, marked)
-    refiner.conditions(lambda block, at: _condition_cuts(mesh, block, cut, direction))
-    return refiner.refined_mesh()
+    return refiner.refined_mesh(
+        lambda block, at: _cuts(mesh, block, np.flatnonzero(marked[at]), direction),
+        lambda block, at: _condition_cuts(mesh, block, cut, direction),
+    )
 
 
 def _target(block: Block, cell: str) -> tuple[str, type[Shape]]:
@@ -146,10 +140,10 @@ def _closed(mesh: Mesh, centers: Centers, marked: Mask) -> Mask:
 
 def _parts_of_split(mesh: Mesh, centers: Centers) -> tuple[Keys, Ints]:
     """Return the keys of the halves and quarters of split edges and faces, and whose these are."""
-    corner = is_corner(mesh.blocks, mesh.n_nodes)
+    corner = hanging.is_corner(mesh.blocks, mesh.n_nodes)
     parts, owners = [np.zeros(0, dtype=np.uint64)], [np.zeros(0, dtype=np.int64)]
-    edges = split_edges(mesh.blocks, centers, corner)
-    faces = split_faces(mesh.blocks, centers, corner, existing_keys(mesh.blocks))
+    edges = hanging.split_edges(mesh.blocks, centers, corner)
+    faces = hanging.split_faces(mesh.blocks, centers, corner, hanging.existing_keys(mesh.blocks))
     for split in (*edges, *faces):
         inside = split.children()
         parts += [keys_of(child) for child in inside]
@@ -162,7 +156,7 @@ def _keys_by_element(mesh: Mesh) -> tuple[Keys, Ints]:
     keys, element = [], []
     for block, at in with_rows(mesh.blocks):
         if block.shape is not None and len(block):
-            of_block = entity_keys(block)
+            of_block = hanging.entity_keys(block)
             keys.append(of_block.ravel())
             element.append(np.repeat(np.arange(at.start, at.stop), of_block.shape[1]))
     return np.concatenate(keys), np.concatenate(element)
@@ -171,7 +165,7 @@ def _keys_by_element(mesh: Mesh) -> tuple[Keys, Ints]:
 def _cut_entities(mesh: Mesh, marked: Mask) -> Keys:
     """Return the keys of the edges and faces of the elements that are cut."""
     keys = [
-        entity_keys(block.take(marked[at]))
+        hanging.entity_keys(block.take(marked[at]))
         for block, at in with_rows(mesh.blocks)
         if block.shape is not None and marked[at].any()
     ]
@@ -202,10 +196,7 @@ def raised(mesh: Mesh, element_of: Callable[[str], str] | None = None) -> Refine
             raise MeshError(f"{names[block.name]} cannot take the place of {block.name}")
         return [(np.arange(len(block)), [unchanged(shape.cell)])]
 
-    refiner = CellRefiner(mesh, known_centers(mesh.blocks, None), target)
-    refiner.elements(whole)
-    refiner.conditions(whole)
-    return refiner.refined_mesh()
+    return CellRefiner(mesh, hanging.known_centers(mesh.blocks, None), target).refined_mesh(whole, whole)
 
 
 def quadratic(name: str) -> str:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -71,7 +70,7 @@ class MassProperties:
     ) -> None:
         J, E = _tensors(inertia, euler)
         values = {
-            "mass": (_check_positive(finite(mass, "the mass of a body"), "mass", "kg"), 0),
+            "mass": (_positive(mass, "mass", "kg"), 0),
             "inertia": (J, 2),
             "volume": (_volume(volume), 0),
             "center": (finite(center, "the center of a body", ("...", 3)), 1),
@@ -179,11 +178,10 @@ class MassProperties:
         >>> MassProperties.box((0.4, 0.6, 1.0), 1000.0).inertia.diagonal().round(9).tolist()
         [27.2, 23.2, 10.4]
         """
-        sides = finite(sides, "the sides of a box", ("...", 3))
-        rho = _check_positive(finite(density, "a density"), "density", "kg/m³")
-        volume = _check_positive(sides, "side", "m").prod(axis=-1)
-        mass = np.asarray(rho * volume)
-        return cls(mass, volume=volume, euler=(mass[..., None] * sides**2 / 12)[..., None] * np.eye(3))
+        lengths = _positive(sides, "side", "m", ("...", 3))
+        volume = lengths.prod(axis=-1)
+        mass = np.asarray(_positive(density, "density", "kg/m³") * volume)
+        return cls(mass, volume=volume, euler=(mass[..., None] * lengths**2 / 12)[..., None] * np.eye(3))
 
     @classmethod
     def ball(cls, radius: ArrayLike, density: ArrayLike) -> MassProperties:
@@ -198,9 +196,9 @@ class MassProperties:
         -------
         The mass properties (...).
         """
-        r = _check_positive(finite(radius, "a radius"), "radius", "m")
+        r = _positive(radius, "radius", "m")
         volume = 4 * np.pi / 3 * r**3
-        mass = np.asarray(_check_positive(finite(density, "a density"), "density", "kg/m³") * volume)
+        mass = np.asarray(_positive(density, "density", "kg/m³") * volume)
         return cls(mass, volume=volume, euler=(mass * r**2 / 5)[..., None, None] * np.eye(3))
 
     @classmethod
@@ -264,7 +262,12 @@ def _moments(X: Array, groups: Sequence[ElementGroup]) -> tuple[float, float, Ar
         for chunk in group.chunks():
             element = group.at(X, chunk)
             dV = element._volumes(group.rule)
-            _check_volumes(dV.sum(axis=1), group, chunk)
+            volumes = dV.sum(axis=1)
+            for bad in np.flatnonzero(~(volumes > 0))[:1]:
+                raise MeshError(
+                    f"the element of index {group.rows[chunk][bad]} ({group.element.__name__}) has volume "
+                    f"{volumes[bad]:.3g} m³; it must be > 0; mesh.reoriented() fixes inverted elements"
+                )
             x, w = element.gauss_points().reshape(-1, 3), dV.ravel()
             wx = w[:, None] * x
             mass, volume = mass + rho * float(w.sum()), volume + float(w.sum())
@@ -273,46 +276,32 @@ def _moments(X: Array, groups: Sequence[ElementGroup]) -> tuple[float, float, Ar
     return mass, volume, first, second
 
 
-def _check_volumes(volumes: Array, group: ElementGroup, chunk: slice) -> None:
-    bad = np.flatnonzero(~(volumes > 0))
-    if len(bad):
-        raise MeshError(
-            f"the element of index {group.rows[chunk][bad[0]]} ({group.element.__name__}) has volume "
-            f"{volumes[bad[0]]:.3g} m³; it must be > 0; mesh.reoriented() fixes inverted elements"
-        )
-
-
 # ---- values from the caller ------------------------------------------------------------------------
+
+
+def _positive(value: ArrayLike, what: str, unit: str, shape: tuple[int | str, ...] | None = None) -> Array:
+    array = finite(value, f"the {what} of a body", shape)
+    if (array <= 0).any():
+        raise ModelError(f"the {what} of a body must be > 0 {unit}; got {array.min():g}")
+    return array
 
 
 def _volume(value: ArrayLike) -> Array:
     """Return volumes; nan stands for one that is not known."""
-    try:
-        unknown = np.asarray(np.isnan(value))
-    except (TypeError, ValueError):
-        unknown = np.asarray(False)
-    known = finite(np.where(unknown, 1.0, value) if unknown.any() else value, "the volume of a body")
-    return np.where(unknown, np.nan, _check_positive(known, "volume", "m³"))
-
-
-def _check_positive(value: Array, what: str, unit: str) -> Array:
-    if (value <= 0).any():
-        raise ModelError(f"the {what} of a body must be > 0 {unit}; got {value.min():g}")
-    return value
+    known = _positive(np.nan_to_num(value, nan=1.0, posinf=np.inf), "volume", "m³")
+    return np.where(np.isnan(np.asarray(value, dtype=float)), np.nan, known)
 
 
 def _tensors(inertia: ArrayLike | None, euler: ArrayLike | None) -> tuple[Array, Array]:
     """Return inertia and Euler tensor, one from the other where only one is given, both checked."""
-    if inertia is None and euler is None:
-        raise InputError("a body needs its inertia=… or its Euler tensor euler=…, (3, 3) in kg m²")
-    tensor = partial(finite, shape=("...", 3, 3))
-    E = _symmetric(tensor(euler, what="the Euler tensor"), "Euler tensor") if euler is not None else None
-    J = _symmetric(tensor(inertia, what="the inertia"), "inertia") if inertia is not None else None
-    if E is None:
-        assert J is not None
-        E = np.trace(J, axis1=-2, axis2=-1)[..., None, None] / 2 * np.eye(3) - J
-    elif J is None:
+    E = None if euler is None else _symmetric(euler, "Euler tensor")
+    J = None if inertia is None else _symmetric(inertia, "inertia")
+    if J is None:
+        if E is None:
+            raise InputError("a body needs its inertia=… or its Euler tensor euler=…, (3, 3) in kg m²")
         J = _from_euler(E)
+    elif E is None:
+        E = np.trace(J, axis1=-2, axis2=-1)[..., None, None] / 2 * np.eye(3) - J
     elif J.shape != E.shape or _differ(J, _from_euler(E)):
         raise InputError(
             "the inertia and the Euler tensor contradict each other: J must be tr(E0) 1 - E0; "
@@ -342,11 +331,13 @@ def _differ(A: Array, B: Array) -> bool:
     return bool((np.abs(A - B) > SYMMETRIC * size).any())
 
 
-def _symmetric(A: Array, what: str) -> Array:
-    if _differ(A, np.swapaxes(A, -1, -2)):
-        error = np.abs(A - np.swapaxes(A, -1, -2)).max()
+def _symmetric(value: ArrayLike, what: str) -> Array:
+    A = finite(value, f"the {what} of a body", ("...", 3, 3))
+    T = np.swapaxes(A, -1, -2)
+    if _differ(A, T):
+        error = np.abs(A - T).max()
         raise ModelError(f"the {what} of a body must be symmetric; entries differ by {error:.3g} kg m²")
-    return (A + np.swapaxes(A, -1, -2)) / 2
+    return (A + T) / 2
 
 
 def _smallest(A: Array) -> tuple[Array, Mask]:

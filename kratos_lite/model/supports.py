@@ -224,21 +224,14 @@ class Supports:
         constant: ArrayLike,
     ) -> None:
         """Add constraints; see `Structure.constrain`."""
-        named = isinstance(dependents, tuple) and any(isinstance(part, str) for part in dependents)
-        if isinstance(independents, Mapping) or named:
-            if not isinstance(independents, Mapping):
-                raise InputError(
-                    f"independents must map (node index, axis letter) to a weight; got {independents!r}"
-                )
+        if isinstance(independents, Mapping):
             weights = finite(list(independents.values()), "weights of a constraint")[None]
             dependents, independents = [self.dof(dependents)], np.array([list(map(self.dof, independents))])
         c = self._dofs(dependents, "dependents")
         each = self._dofs(independents, "independents")
         each = each[:, None] if each.ndim == 1 else each
-        w, offsets = (
-            finite(weights, "weights of a constraint"),
-            finite(constant, "the constant of a constraint"),
-        )
+        w = finite(weights, "weights of a constraint")
+        offsets = finite(constant, "the constant of a constraint")
         try:
             each = np.broadcast_to(each, (*c.shape, each.shape[-1]))
             w, offsets = np.broadcast_to(w, each.shape), np.broadcast_to(offsets, c.shape)
@@ -348,11 +341,9 @@ class Supports:
 
 def hanging_constraints(mesh: Mesh) -> Constraints:
     """Return the constraints that keep the displacement continuous at the hanging nodes of a mesh."""
-    hanging, every = mesh.hanging, Constraints.none()
-    if hanging is None:
-        return every
-    for axis in range(3):
-        dofs = 3 * hanging.nodes + axis, hanging.start, 3 * hanging.independents + axis
-        count = len(hanging)
-        every += Constraints(*dofs, hanging.weights, np.zeros(count), np.zeros(count, dtype=bool))
+    every, h = Constraints.none(), mesh.hanging
+    if h is not None:
+        rest = h.weights, np.zeros(len(h)), np.zeros(len(h), dtype=bool)
+        for axis in range(3):
+            every += Constraints(3 * h.nodes + axis, h.start, 3 * h.independents + axis, *rest)
     return every

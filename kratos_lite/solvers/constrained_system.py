@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.matrix_free import MatrixFree
 from kratos_lite.assembly.sparsity_pattern import Pattern, PatternCache
@@ -58,26 +59,21 @@ class ConstrainedSystem:
         self.plan = self._planned(solver)
 
     def _planned(self, solver: str) -> Plan:
-        return choose(solver, self._facts())
-
-    def _facts(self) -> Facts:
-        return Facts(
+        facts = Facts(
             len(self.constraint_map.free),
             3 * len(self.nodes),
             bulk_over_shear=lambda: largest_bulk_over_shear(self.groups),
             bandwidth=self._bandwidth,
-            has_product=self._has_product,
+            has_product=lambda: all(map(MatrixFree.takes, self.groups)),
             contrast=lambda: stiffness_contrast(self.groups),
             is_stretched=self._is_stretched,
             is_plate=self._is_plate,
         )
+        return choose(solver, facts)
 
     def _bandwidth(self) -> float:
         width = nodal_width(self.pattern, self.pattern.rows(), cuthill_mckee(self.pattern)[1])
         return width * len(self.constraint_map.free) / len(self.nodes)
-
-    def _has_product(self) -> bool:
-        return all(map(MatrixFree.takes, self.groups))
 
     def _is_stretched(self) -> bool:
         from kratos_lite.solvers.coarse_level import is_stretched  # a quick start for small models
@@ -99,17 +95,18 @@ class ConstrainedSystem:
         """The stiffness matrix (3a, 3a) in N/m: a BlockMatrix, or a full array for the method ``dense``."""
         if self.plan.method == "dense":
             return assemble_dense(self.points, self.groups)
+        if self.plan.method == "displacement-pressure":
+            from kratos_lite.solvers.dilatation import assemble  # a quick start for small models
+
+            return assemble(self.points, self.groups, self.pattern, self.progress)
         if not self.plan.matrix_free:
-            return self._assembled(self.plan.method == "displacement-pressure")
+            return self._assembled()
         if any(len(group.element.shape.nodes) > group.element.shape.corners for group in self.groups):
             self.skipped.append(NO_MATRIX)
         return MatrixFree(self.points, self.groups, self._assembled)
 
-    def _assembled(self, split: bool = False) -> Any:
-        assemble: Callable[..., Any] = assemble_stiffness
-        if split:
-            from kratos_lite.solvers.dilatation import assemble  # a quick start for small models
-        return assemble(self.points, self.groups, self.pattern, self.progress)
+    def _assembled(self) -> BlockMatrix:
+        return assemble_stiffness(self.points, self.groups, self.pattern, self.progress)
 
     @cached_property
     def norm(self) -> float:
@@ -161,13 +158,11 @@ class ConstrainedSystem:
 
 def largest_bulk_over_shear(groups: Sequence[ElementGroup]) -> tuple[float, float]:
     """Return the largest ratio of moduli of elements with known dilatations, and of the others."""
-    from kratos_lite.solvers.dilatation import has_dilatations  # a quick start for small models
-
-    largest = {True: 0.0, False: 0.0}
+    largest = [0.0, 0.0]
     for group in groups:
-        known = has_dilatations(group)
-        largest[known] = max(largest[known], bulk_over_shear(group.material.C))
-    return largest[True], largest[False]
+        i = 0 if group.has_dilatations else 1
+        largest[i] = max(largest[i], bulk_over_shear(group.material.C))
+    return largest[0], largest[1]
 
 
 def stiffness_contrast(groups: Sequence[ElementGroup]) -> float:

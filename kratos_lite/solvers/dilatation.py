@@ -99,16 +99,7 @@ def assemble(
 
 def is_split(group: ElementGroup) -> bool:
     """Return whether the dilatations of a group are known and its material is nearly incompressible."""
-    return has_dilatations(group) and bulk_over_shear(group.material.C) > NEAR_HALF
-
-
-def has_dilatations(group: ElementGroup) -> bool:
-    """Return whether the dilatations of a group are known.
-
-    Those of the library's B-bar elements are their projected ones, those of enhanced elements their means:
-    the modes take up the others.
-    """
-    return not group.element.custom and group.strain_tables() is not None
+    return group.has_dilatations and bulk_over_shear(group.material.C) > NEAR_HALF
 
 
 @dataclass(eq=False)

@@ -130,19 +130,6 @@ BACKENDS: tuple[Callable[[Csr, bool], Callable[[Array], Array]], ...] = (pardiso
 # ---- bands: one sparsity pattern, factorized in every step of a small body by LAPACK ----------
 
 
-class BandFactors:
-    """The factors of a band, of which `apply` solves for one right side, or several, in its own order."""
-
-    def __init__(self, apply: Callable[[Array], Array], dofs: Ints) -> None:
-        self.apply, self._dofs = apply, dofs
-
-    def solve(self, b: Array) -> Array:
-        """Return x of A x = b, both (3n,) or (3n, k)."""
-        x = np.empty(b.shape)
-        x[self._dofs] = self.apply(b[self._dofs])
-        return x
-
-
 class Factorizer:
     """Factorizes matrices (3n, 3n) of one sparsity pattern; rows are exchanged unless they are symmetric."""
 
@@ -170,15 +157,21 @@ class Factorizer:
         self._from = kept[np.argsort(to[kept])]
         self._to = to[self._from]
 
-    def factorize(self, A: BlockMatrix) -> BandFactors | Factorization:
-        """Return the factors of a matrix with the pattern; their `solve` gives x of A x = b."""
+    def factorize(self, A: BlockMatrix) -> Callable[[Array], Array]:
+        """Return what gives x of A x = b, both (3n,) or (3n, k), for a matrix with the pattern."""
         if self.plan.method == "sparse":
-            return factorize(A.scipy().tocsr(), symmetric=self.symmetric)
+            return factorize(A.scipy().tocsr(), symmetric=self.symmetric).solve
         band = np.zeros(len(self._dofs) * self._height)
         band[self._to] = A.data.ravel().take(self._from)
         columns = band.reshape(-1, self._height).T
         apply = (_cholesky if self.symmetric else _lu)(columns, self.width, self._dofs)
-        return BandFactors(apply, self._dofs)
+
+        def solve(b: Array) -> Array:
+            x = np.empty(b.shape)
+            x[self._dofs] = apply(b[self._dofs])
+            return x
+
+        return solve
 
 
 def _cholesky(band: Array, width: int, dofs: Ints) -> Callable[[Array], Array]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
@@ -53,14 +53,14 @@ class Monitor:
 
 
 def conjugate_gradients(
-    A: Any,
+    times: Callable[[Array], Array],
     b: Array,
     precondition: Callable[[Array], Array],
     tolerance: float,
     norm_A: float,
     each: GoOn | None = None,
 ) -> tuple[Array, int, bool]:
-    """Solve A x = b with symmetric positive definite A; return x, iterations and success.
+    """Solve A x = b with symmetric positive definite A, given by its product; return x, iterations, success.
 
     It stops when |r| ≤ tolerance |b|, or when |r| reaches what round-off allows,
     2 eps (|A| |x| + |b|); and gives up when `STALLED` iterations bring no new smallest residual, or when
@@ -75,7 +75,7 @@ def conjugate_gradients(
     z = precondition(r)
     p, rz = z.copy(), float(r @ z)
     for iteration in range(1, MAX_ITERATIONS + 1):
-        Ap = A @ p
+        Ap = times(p)
         curvature = float(p @ Ap)
         if not (curvature > 0 and rz > 0):
             return x, iteration, False

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from kratos_lite.assembly import mass_and_convection
-from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.mass_and_convection import inertia_matrices
 from kratos_lite.assembly.sparsity_pattern import Pattern
@@ -22,15 +21,6 @@ from kratos_lite.typing import Array, Csr
 
 TOLERANCE = 1e-14
 """Relative residual of accelerations."""
-
-
-class _Product(NamedTuple):
-    """A matrix by what it makes of a vector."""
-
-    times: Callable[[Array], Array]
-
-    def __matmul__(self, x: Array) -> Array:
-        return self.times(x)
 
 
 class Mass:
@@ -90,18 +80,14 @@ class Mass:
         T = constraint_map.T
         D = diagonal[constraint_map.free] if T is None else T.multiply(T).T @ diagonal
         b = constraint_map.reduce(f - self.times(c))
-        A = _Product(lambda q: constraint_map.reduce(self.times(constraint_map.transform(q))))
-        q, _, converged = conjugate_gradients(A, b, lambda r: r / D, TOLERANCE, 0.0)
+
+        def times(q: Array) -> Array:
+            return constraint_map.reduce(self.times(constraint_map.transform(q)))
+
+        q, _, converged = conjugate_gradients(times, b, lambda r: r / D, TOLERANCE, 0.0)
         if not converged:
             raise SolveError("accelerations cannot be found: the mass is not positive within rounding")
         return constraint_map.expand(q, c)
-
-    def add_to(self, A: BlockMatrix) -> None:
-        """Add the mass matrix to a matrix of blocks on the same pattern."""
-        if self.lumped:
-            A.add_scalar(self.nodal, self.pattern.diagonal)
-        else:
-            A.add_scalar(self.scalar.data)
 
     @cached_property
     def data(self) -> Array:

@@ -170,7 +170,7 @@ class Pyamg:
     ) -> tuple[Array, int, bool]:
         """Return x, iterations and success."""
         with one_thread():
-            return conjugate_gradients(self._A, b, self.precondition, tolerance, norm, each)
+            return conjugate_gradients(self._A.times, b, self.precondition, tolerance, norm, each)
 
 
 FORWARD = ("block_gauss_seidel", {"sweep": "forward"})

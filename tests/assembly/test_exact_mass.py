@@ -14,8 +14,6 @@ from kratos_lite.assembly import element_groups
 from kratos_lite.assembly.gauss_point_fields import body_force
 from kratos_lite.assembly.mass_and_convection import inertia_matrices, lumped_mass
 from kratos_lite.elements.exact_rules import AFFINE, CURVED, STRAIGHT, exact_rule, geometries
-from kratos_lite.elements.kinematic_linear_3d10n import KinematicLinear3D10N
-from kratos_lite.elements.kinematic_linear_3d27n import KinematicLinear3D27N
 from kratos_lite.elements.surface import surface_pressure
 from kratos_lite.quadrature import hexahedron, rule_for, tetrahedron
 from kratos_lite.shapes.faces import Quadrilateral4, Quadrilateral8, Quadrilateral9, Triangle3, Triangle6
@@ -163,17 +161,17 @@ def test_a_mesh_of_cells_of_all_geometries_is_the_same_compiled_and_in_numpy(kin
 def test_a_stated_mass_rule_is_used_as_it_is():
     with kl.ELEMENTS.temporary():
 
-        class Coarse(KinematicLinear3D27N):
+        class Coarse(kl.KinematicLinear3D27N):
             mass_rule = hexahedron(degree=1)
 
-        class Fine(KinematicLinear3D10N):
+        class Fine(kl.KinematicLinear3D10N):
             mass_rule = tetrahedron(degree=9)
 
     X = cell("KinematicLinear3D27N", "curved")
     N = Coarse.shape.N(np.zeros(3))
     close(Coarse(X).scalar_mass(), 8 * np.outer(N, N) * Coarse(X).detJ(np.zeros(3)))
     X = cell("KinematicLinear3D10N", "curved")
-    close(Fine(X).scalar_mass(), KinematicLinear3D10N(X).scalar_mass())
+    close(Fine(X).scalar_mass(), kl.KinematicLinear3D10N(X).scalar_mass())
 
 
 @pytest.mark.parametrize("shape", FACES)

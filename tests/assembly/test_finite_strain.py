@@ -14,16 +14,12 @@ from kratos_lite.assembly import element_groups, finite_strain
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.stiffness import assemble_stiffness
 from kratos_lite.bodies.rotations import exp
-from kratos_lite.elements import ELEMENTS
-from kratos_lite.errors import MaterialError
-from kratos_lite.materials.isotropic3d import Isotropic3D
-from kratos_lite.materials.orthotropic3d import Orthotropic3D
 from kratos_lite.testing.patches import patch
 
 NAMES = [f"KinematicLinear3D{n}N" for n in (4, 5, 6, 8, 10, 13, 15, 20, 27)]
-WOOD = Orthotropic3D(11e3, 0.9e3, 0.5e3, 0.4, 0.3, 0.4, 0.7e3, 0.05e3, 0.7e3, 450.0)
-SOIL = Isotropic3D(2e3, 0.3, 700.0)
-UNIT = Isotropic3D(1.0, 0.3, 1.0)
+WOOD = kl.Orthotropic3D(11e3, 0.9e3, 0.5e3, 0.4, 0.3, 0.4, 0.7e3, 0.05e3, 0.7e3, 450.0)
+SOIL = kl.Isotropic3D(2e3, 0.3, 700.0)
+UNIT = kl.Isotropic3D(1.0, 0.3, 1.0)
 STEPS = [(False, 0.0), (True, 0.0), (True, 0.3)]
 elements = pytest.mark.parametrize("name", NAMES)
 
@@ -116,7 +112,7 @@ def traction_forces(mesh, P):
 
 @elements
 def test_homogeneous_deformation_is_carried_by_surface_tractions(name, way):
-    element = ELEMENTS[name]
+    element = kl.ELEMENTS[name]
     points, nodes = patch(element.shape, (2, 2, 2), move=0.08)
     nodes = nodes.astype(np.int32)
     mesh = kl.Mesh(points, {name: nodes})
@@ -220,7 +216,7 @@ def test_highest_frequencies_of_the_reference_cells():
     """Largest eigenvalues of K of single cells with E = ρ = 1, ν = 0.3: those of Solfec, but the pyramid."""
     largest = {4: 1.005427, 5: 2.448228, 6: 2.237320, 8: 2.5}
     for k, value in largest.items():
-        element = ELEMENTS[f"KinematicLinear3D{k}N"]
+        element = kl.ELEMENTS[f"KinematicLinear3D{k}N"]
         assert np.linalg.eigvalsh(element(element.nodes).stiffness(UNIT.C))[-1] == pytest.approx(
             value, rel=1e-6
         )
@@ -231,8 +227,8 @@ def test_highest_frequencies_of_the_reference_cells():
 
 
 def test_frequency_needs_a_density():
-    model = kl.Model(kl.box(), Isotropic3D(1.0, 0.3))
-    with pytest.raises(MaterialError, match="density > 0"):
+    model = kl.Model(kl.box(), kl.Isotropic3D(1.0, 0.3))
+    with pytest.raises(kl.MaterialError, match="density > 0"):
         finite_strain.highest_frequency(model.mesh.points, model.element_groups())
 
 

@@ -12,7 +12,6 @@ import kratos_lite as kl
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.matrix_free import MatrixFree, factors
-from kratos_lite.elements import ELEMENTS
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.native import kernels
 from kratos_lite.quadrature import Rule
@@ -89,7 +88,7 @@ def test_groups_of_several_kinds_and_a_last_group_that_is_not_full():
 
 @pytest.mark.parametrize("kind", ["8N", "20N", "27N"])
 def test_factors_give_the_gradients(kind):
-    element = ELEMENTS[f"KinematicLinear3D{kind}"]
+    element = kl.ELEMENTS[f"KinematicLinear3D{kind}"]
     order, values, slopes, places = factors(element.shape, element.rule)
     n, dN = len(values), tabulate(element.shape, element.rule)[1][order]
     for field in np.random.default_rng(1).standard_normal((3, len(element.shape.nodes))):
@@ -100,11 +99,11 @@ def test_factors_give_the_gradients(kind):
 
 
 def test_shapes_and_rules_without_factors():
-    hexahedron, wedge = ELEMENTS["KinematicLinear3D8N"], ELEMENTS["KinematicLinear3D15N"]
+    hexahedron, wedge = kl.ELEMENTS["KinematicLinear3D8N"], kl.ELEMENTS["KinematicLinear3D15N"]
     assert factors(wedge.shape, wedge.rule) is None
     flat = Rule(hexahedron.rule.points * [1.0, 1.0, 0.9], hexahedron.rule.weights, 1, "flat")
     assert factors(hexahedron.shape, flat) is None
-    quadratic = ELEMENTS["KinematicLinear3D27N"]
+    quadratic = kl.ELEMENTS["KinematicLinear3D27N"]
     assert factors(quadratic.shape, hexahedron.rule) is None  # slopes of degree 2 from two points
 
 
@@ -168,7 +167,7 @@ def test_others_have_a_matrix(name):
 
 
 def test_a_stiffness_that_kernels_do_not_know_has_a_matrix():
-    with ELEMENTS.temporary():
+    with kl.ELEMENTS.temporary():
 
         class Own(kl.KinematicLinear3D27N):
             def B(self, xi):

@@ -15,7 +15,6 @@ from kratos_lite.assembly import element_groups, sparsity_pattern
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import assemble_dense, assemble_stiffness
-from kratos_lite.elements import ELEMENTS
 from kratos_lite.native import kernels
 
 STEEL = kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0)
@@ -23,7 +22,7 @@ WOOD = kl.Orthotropic3D(11e9, 0.9e9, 0.5e9, 0.4, 0.3, 0.4, 0.7e9, 0.05e9, 0.6e9,
 ROOT = np.random.default_rng(3).standard_normal((6, 6))
 CRYSTAL = SimpleNamespace(C=ROOT @ ROOT.T + np.eye(6))
 """A material without any symmetry."""
-NAMES = sorted(ELEMENTS)
+NAMES = sorted(kl.ELEMENTS)
 MODULE = kernels("stiffness")
 
 
@@ -106,7 +105,7 @@ def test_several_shapes_rules_and_materials(path):
     tetrahedra = bricks.nodes[5:9][:, [0, 1, 3, 4]]
     wedges = bricks.nodes[9:][:, [0, 1, 3, 4, 5, 7]]
     reduced = kl.quadrature.hexahedron(degree=1)
-    four, six = (ELEMENTS[f"KinematicLinear3D{k}N"] for k in (4, 6))
+    four, six = (kl.ELEMENTS[f"KinematicLinear3D{k}N"] for k in (4, 6))
     table = (
         (bricks.element, bricks.rule, STEEL, bricks.nodes[:3]),
         (bricks.element, reduced, WOOD, bricks.nodes[3:5]),

@@ -5,7 +5,7 @@ import pytest
 from computing import EITHER, compiled, same_on_all_threads
 
 import kratos_lite as kl
-from kratos_lite.mesh import Block, Faces, components, equal_sets, topology
+from kratos_lite.mesh import Faces, components, equal_sets, topology
 from kratos_lite.native import kernels
 
 
@@ -53,7 +53,7 @@ def test_equal_sets_are_paired_with_the_next_one_across_groups(way):
 def test_faces_of_mixed_cells(way):
     """A brick with a wedge on its side and a pyramid on top of it."""
     cells = {8: range(8), 6: (1, 8, 2, 5, 9, 6), 5: (4, 5, 6, 7, 10)}
-    blocks = [Block(f"KinematicLinear3D{n}N", [nodes]) for n, nodes in cells.items()]
+    blocks = [kl.Block(f"KinematicLinear3D{n}N", [nodes]) for n, nodes in cells.items()]
     faces = Faces(blocks)
     pairs = {
         tuple(sorted(faces.element[[a, b]].tolist())) for a, b in zip(faces.one, faces.other, strict=True)
@@ -72,7 +72,7 @@ def test_both_ways_find_the_same_faces(element, monkeypatch):
     rng = np.random.default_rng(7)
     renumbered = rng.permutation(mesh.n_nodes).astype(np.int32)
     block = mesh.blocks[0]
-    kept = Block(block.name, renumbered[block.nodes], block.ids, block.properties, block.shape)
+    kept = kl.Block(block.name, renumbered[block.nodes], block.ids, block.properties, block.shape)
     first = Faces([kept])
     monkeypatch.setattr(topology, "kernels", lambda name: None)
     second = Faces([kept])

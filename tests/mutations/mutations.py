@@ -472,8 +472,8 @@ MUTATIONS = [
     ),
     Mutation(
         "model/mass_properties.py",
-        "mass[..., None] * sides**2 / 12",
-        "mass[..., None] * sides**2 / 6",
+        "mass[..., None] * lengths**2 / 12",
+        "mass[..., None] * lengths**2 / 6",
         "tests/model/test_mass_properties.py",
     ),
     Mutation(

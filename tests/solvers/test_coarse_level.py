@@ -12,7 +12,6 @@ import kratos_lite as kl
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.gauss_point_fields import totals
 from kratos_lite.assembly.stiffness import assemble_dense
-from kratos_lite.elements import ELEMENTS
 from kratos_lite.mesh.refinement import refine
 from kratos_lite.model.refined import refined
 from kratos_lite.shapes.hexahedra import Hexahedron8
@@ -69,7 +68,7 @@ def test_long_cells_beside_others(cells, nodes):
 def test_linear_elements_take_part_as_they_are():
     points, (quadratic,) = scene("20N", (2, 1, 1))
     first = ElementGroup(quadratic.element, quadratic.rule, STEEL, quadratic.nodes[:1], np.array([0]))
-    brick = ELEMENTS["KinematicLinear3D8N"]
+    brick = kl.ELEMENTS["KinematicLinear3D8N"]
     rule = kl.quadrature.hexahedron(degree=1)  # a choice of its own, to be kept
     second = ElementGroup(brick, rule, STEEL, quadratic.nodes[1:, :8], np.array([1]))
     level = p_coarse_level(points, [first, second])
@@ -90,7 +89,7 @@ def test_linear_meshes_and_shapes_without_corners_have_no_level():
     for kind in LINEAR_OF.values():
         assert p_coarse_level(*scene(kind)) is None
     points, (group,) = scene("8N")
-    with kl.shapes.SHAPES.temporary(), ELEMENTS.temporary():
+    with kl.shapes.SHAPES.temporary(), kl.ELEMENTS.temporary():
 
         class Shifted(Hexahedron8):
             nodes = 0.5 * Hexahedron8.nodes

@@ -9,7 +9,6 @@ from systems import system_of
 
 import kratos_lite as kl
 from kratos_lite.assembly.stiffness import assemble_dense
-from kratos_lite.elements import ELEMENTS
 from kratos_lite.solvers import dilatation, displacement_pressure, plan
 from kratos_lite.solvers.dilatation import SplitMatrix
 
@@ -275,7 +274,7 @@ def test_inverse_within_lines_across_flat_cells(element, height, longest, sizes,
 
 
 def test_an_element_of_a_user_with_a_strain_of_its_own_has_no_pressures():
-    with ELEMENTS.temporary():
+    with kl.ELEMENTS.temporary():
 
         class Own8N(kl.EnhancedStrain3D8N):
             def B(self, xi, C):

@@ -10,8 +10,6 @@ from systems import stiffness_of, system_of
 
 import kratos_lite as kl
 from kratos_lite.assembly.matrix_free import MatrixFree
-from kratos_lite.elements import ELEMENTS
-from kratos_lite.mesh.blocks import Block
 from kratos_lite.native import kernels
 from kratos_lite.solvers import multigrid
 from kratos_lite.solvers.coarse_level import p_coarse_level
@@ -55,7 +53,9 @@ def mesh_of(points, *cells):
     for kind, nodes in cells:
         name = f"KinematicLinear3D{kind}"
         ids = np.arange(first, first + len(nodes))
-        blocks.append(Block(name, np.asarray(nodes, np.int32), ids, np.zeros_like(ids), ELEMENTS[name].shape))
+        blocks.append(
+            kl.Block(name, np.asarray(nodes, np.int32), ids, np.zeros_like(ids), kl.ELEMENTS[name].shape)
+        )
         first += len(nodes)
     return kl.Mesh(points, blocks)
 
@@ -240,9 +240,9 @@ def test_an_element_of_a_user_with_seven_nodes(path):
 
 
 def test_an_element_class_with_a_local_system_of_its_own(path):
-    with ELEMENTS.temporary():
+    with kl.ELEMENTS.temporary():
 
-        class KinematicLinear3D8NDoubled(ELEMENTS["KinematicLinear3D8N"]):
+        class KinematicLinear3D8NDoubled(kl.ELEMENTS["KinematicLinear3D8N"]):
             def local_system(self, C, u):
                 K, r = super().local_system(C, u)
                 return 2 * K, 2 * r

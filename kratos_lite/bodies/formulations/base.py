@@ -111,11 +111,11 @@ class Formulation(ABC):
     def _factorized(self, K: BlockMatrix, c: float, symmetric: bool = True, iterate: bool = False) -> Solve:
         """Return what solves (M + c K) x = b, made ready by a factorization or by multigrid."""
         A = BlockMatrix(c * K.data, K.indices, K.indptr)
-        self.mass.add_to(A)
+        A.add_scalar(self.mass.data)
         if iterate:
             return self._iterated(A)
         factorizer = self._factorizer if symmetric else self._factorizer_unsymmetric
-        return factorizer.factorize(A).solve
+        return factorizer.factorize(A)
 
     def _iterated(self, A: BlockMatrix) -> Solve:
         """Return what solves A x = b by conjugate gradients with multigrid."""
