@@ -167,7 +167,7 @@ class EquationsOfMotion:
         system, load = self.system, self.system.scatter(self.terms.centrifugal.ravel())
         cure = "let it turn about a principal axis through its center of mass"
         self.free_motions.check([load], moving=True, cure=cure)
-        held = system.constraint_map.holding(self.free_motions.held[system.nodes])
+        held = system.constraint_map.holding(self.free_motions.constrained[system.nodes])
         equations = LinearSolver(self.K, held, system.points, Plan("direct"))
         u0 = equations.solve(system.gather(load), 1e-12, system.progress, np.zeros_like(held.c)).x
         return self.terms.stiffening(u0.reshape(-1, 3))

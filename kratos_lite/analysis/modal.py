@@ -14,7 +14,7 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.errors import InputError
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constraints import ConstraintMap, rigid_modes
-from kratos_lite.solvers.eigen import Operator, Pencil, Problem, dense_modes, is_small, neutral_motions
+from kratos_lite.solvers.eigen import Operator, Pencil, Problem, dense_modes, is_small, unresisted_modes
 from kratos_lite.solvers.linear_solver import LinearSolver
 from kratos_lite.solvers.plan import DENSE_MODES, stepped
 from kratos_lite.typing import Array, Complexes, Progress
@@ -62,7 +62,7 @@ def _by_iteration(
 def _preconditioner(e: EquationsOfMotion, solver: LinearSolver) -> Callable[[Array], Array]:
     """Return about K⁻¹ of free degrees of freedom (q,), rigid motions that are free being held."""
     constraints = e.system.constraint_map
-    held = constraints.holding(e.free_motions.held[e.system.nodes])
+    held = constraints.holding(e.free_motions.constrained[e.system.nodes])
     kept = np.searchsorted(constraints.free, held.free)
     firm = replace(solver, constraint_map=held)
 
@@ -101,8 +101,8 @@ def complex_modes(
         def start(number: int) -> Array:
             return _by_iteration(e, solver, number + len(_free_motions(e)), progress)[1].T
 
-        neutral = neutral_motions(M, C, K, _rigid_motions(e))
-        pencil = Pencil(M, C, K, neutral, start, _preconditioner(e, solver))
+        rigid = unresisted_modes(M, C, K, _rigid_motions(e))
+        pencil = Pencil(M, C, K, rigid, start, _preconditioner(e, solver))
         values, shapes = pencil.modes(whole_number(count, "count"))
     return values, expanded(e, shapes)
 

@@ -153,7 +153,7 @@ class StaticAnalysis:
             nodes = components[state.component] & state.used
             groups = select(state.groups, nodes & ~self._dirichlet.at_rest)
             n_at_rest = sum(map(len, select(state.groups, nodes))) - sum(map(len, groups))
-            how = state.free.held, self.solver, self.tolerance, self.progress, self.backend, self.petsc
+            how = state.free.constrained, self.solver, self.tolerance, self.progress, self.backend, self.petsc
             system = system_of(self.model, groups, *how)  # which may be refused; the one before stays then
             self.release()
             self._equations = known = Equations(system, components, n_at_rest)

@@ -45,15 +45,12 @@ def _compiled(group: ElementGroup) -> Any:
     return compiled("lagrange")
 
 
-def _placed(points: Array, group: ElementGroup) -> tuple[Any, ...]:
-    """Return points, nodes, dN and weights of a group, as kernels take them."""
-    nodes, _, dN, weights = group.tables()
-    return as_double(points), nodes, dN, weights
-
-
-def _displaced(q: Array, dq: Array | None, damping: float) -> tuple[Any, ...]:
-    """Return displacements, increment and damping, as kernels take them."""
-    return as_double(q), None if dq is None else as_double(dq), damping
+def _arguments(
+    points: Array, group: ElementGroup, q: Array, dq: Array | None, damping: float
+) -> tuple[Any, ...]:
+    """Return points, nodes, dN, weights, q, dq, damping, C and prestress, as kernels take them."""
+    (nodes, _, dN, weights), change = group.tables(), None if dq is None else as_double(dq)
+    return as_double(points), nodes, dN, weights, as_double(q), change, damping, *group.kernel_arguments()
 
 
 def internal_load(
@@ -63,8 +60,7 @@ def internal_load(
     total = np.zeros_like(points)
     for group in groups:
         if module := _compiled(group):
-            step = _displaced(q, dq, damping)
-            total += module.internal_load(*_placed(points, group), *step, *group.kernel_arguments())
+            total += module.internal_load(*_arguments(points, group, q, dq, damping))
             continue
         for chunk in group.chunks():
             element, at = _moved(points, group, chunk, q, dq, damping)
@@ -98,9 +94,8 @@ def stiffness(
     data = np.zeros((len(pattern.indices), 3, 3))
     for number, group in enumerate(groups):
         if module := _compiled(group):
-            step = _displaced(q, dq, damping)
-            rows = (pattern.indptr, pattern.indices)
-            module.add_stiffness(*_placed(points, group), *step, *group.kernel_arguments(), *rows, data)
+            arguments = _arguments(points, group, q, dq, damping)
+            module.add_stiffness(*arguments, pattern.indptr, pattern.indices, data)
             continue
 
         def tangent(chunk: slice, group: ElementGroup = group) -> Array:
@@ -117,7 +112,8 @@ def strain_energy(points: Array, groups: Sequence[ElementGroup], q: Array) -> fl
     energy = 0.0
     for group in groups:
         if module := _compiled(group):
-            energy += module.totals(*_placed(points, group), as_double(q), *group.kernel_arguments())[0]
+            *at, _, _, C, prestress = _arguments(points, group, q, None, 0.0)
+            energy += module.totals(*at, C, prestress)[0]
             continue
         for chunk in group.chunks():
             element, displaced = group.at(points, chunk), q[group.nodes[chunk]]

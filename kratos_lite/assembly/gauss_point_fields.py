@@ -153,12 +153,10 @@ def totals(points: Array, groups: Sequence[ElementGroup], u: Array) -> tuple[flo
     """Return strain energy in J, largest von Mises stress at a Gauss point in Pa, index of its element."""
     energy, largest, row = 0.0, 0.0, 0
     for group in groups:
-        module = compiled("gauss", group.element)
-        parts = (
-            [module.totals(*displaced(points, group, u))]
-            if module
-            else [_totals(points, group, u, chunk) for chunk in group.chunks()]
-        )
+        if module := compiled("gauss", group.element):
+            parts = [module.totals(*displaced(points, group, u))]
+        else:
+            parts = [_totals(points, group, u, chunk) for chunk in group.chunks()]
         for part, mises, at in parts:
             energy += part
             if mises > largest:

@@ -38,8 +38,11 @@ def inertia_matrices(
     for number, group in enumerate(groups):
         if module := compiled("inertia"):
             _add_compiled(module, data, points, group, pattern, velocity)
-        else:
-            _add_computed(data, points, group, pattern, number, velocity)
+            continue
+        for chunk in group.chunks():
+            element = group.element(points[group.nodes[chunk]])
+            for name, matrices in _computed(element, group.material.density, names, velocity).items():
+                pattern.add(data[name], number, chunk, matrices)
     return data
 
 
@@ -55,35 +58,21 @@ def _add_compiled(
             module.add(points, nodes, *tables, pattern.indptr, pattern.indices, **wanted)
 
 
-def _add_computed(
-    data: dict[str, Array], points: Array, group: ElementGroup, pattern: Pattern, number: int, velocity: Array
-) -> None:
-    """Add the matrices of a group in NumPy, in parts."""
-    for chunk in group.chunks():
-        element = group.element(points[group.nodes[chunk]])
-        for name, matrices in _computed(element, group.material.density, data, velocity).items():
-            pattern.add(data[name], number, chunk, matrices)
-
-
-def _computed(element: KinematicLinear, density: float, names: Any, velocity: Array) -> dict[str, Array]:
+def _computed(element: KinematicLinear, density: float, names: str, velocity: Array) -> dict[str, Array]:
     """Return the matrices (m, k, k) of elements by name."""
     matrices = {"M": element.scalar_mass(density)} if "M" in names else {}
     if "G" in names or "H" in names:
         geometry, X = geometries(element.shape, element.X), element.X
         G, H = np.zeros((2, *X.shape[:2], X.shape[1]))
         for cells, rule in element.mass_rules(geometry, 2, flow=True):
-            G[cells], H[cells] = _convective(type(element)(X[cells], rule), density, velocity)
+            some = type(element)(X[cells], rule)
+            dV, D = some._gauss
+            c = some.gauss_points() @ velocity[:, :3].T + velocity[:, 3]
+            along, weights = (c[..., None, :] @ D)[..., 0, :], (density * dV)[..., None, :]
+            G[cells] = (some._N(rule).T * weights) @ along
+            H[cells] = (np.swapaxes(along, -1, -2) * weights) @ along
         matrices |= {name: matrix for name, matrix in (("G", G), ("H", H)) if name in names}
     return matrices
-
-
-def _convective(element: KinematicLinear, density: float, velocity: Array) -> tuple[Array, Array]:
-    """Return G and H (m, k, k) by the rule of elements."""
-    dV, D = element._gauss
-    c = element.gauss_points() @ velocity[:, :3].T + velocity[:, 3]
-    along = (c[..., None, :] @ D)[..., 0, :]
-    weights = (density * dV)[..., None, :]
-    return (element._N(element.rule).T * weights) @ along, (np.swapaxes(along, -1, -2) * weights) @ along
 
 
 # ---- lumped mass -----------------------------------------------------------------------------------

@@ -22,10 +22,9 @@ class Pattern:
         self.n_nodes = n_nodes
         self.connectivity = [np.ascontiguousarray(nodes, dtype=np.int32) for nodes in connectivity]
         module = kernels("stiffness")
-        make = module.pattern if module else _pattern
         self.indptr: Rows
         self.indices: Rows
-        self.indptr, self.indices = make(n_nodes, self.connectivity)
+        self.indptr, self.indices = (module.pattern if module else _pattern)(n_nodes, self.connectivity)
 
     def rows(self) -> Ints:
         """Return the row of each block, (nnz,)."""

@@ -11,7 +11,7 @@ from kratos_lite.mesh.mesh import Mesh
 from kratos_lite.typing import Array, Ints
 
 SHORT = 1e-10
-"""Share of the line that a crossing is known to; points are located no closer."""
+"""Fraction of the line that a crossing is known to; points are located no closer."""
 
 
 def crossings(mesh: Mesh, a: Array, b: Array) -> Array:

@@ -14,14 +14,14 @@ from kratos_lite.mesh.centers import Centers, Keys, corners_around, keys_of, sur
 from kratos_lite.mesh.hanging import hanging_nodes
 from kratos_lite.mesh.mesh import Mesh
 from kratos_lite.mesh.refined_mesh import RefinedMesh
-from kratos_lite.mesh.subdivision import Piece
+from kratos_lite.mesh.subdivision import Child
 from kratos_lite.shapes import LINEAR, Shape
 from kratos_lite.typing import Array, Ints
 
 Target: TypeAlias = "Callable[[Block, str], tuple[str, type[Shape]]]"
-"""Gives name and shape of the pieces of a block, by their family."""
-Cut: TypeAlias = "tuple[Ints, Sequence[Piece]]"
-"""Some cells of a block, and the pieces that each is cut into."""
+"""Gives name and shape of the children of a block, by their family."""
+Cut: TypeAlias = "tuple[Ints, Sequence[Child]]"
+"""Some cells of a block, and the children that each is cut into."""
 Cuts: TypeAlias = "Callable[[Block, slice], Sequence[Cut]]"
 """Gives the cuts of a block and its rows; other cells stay as they are."""
 
@@ -81,18 +81,18 @@ class CellRefiner:
                 kept[cells] = False
             if kept.any():
                 into.add(block.take(kept), at.start + np.flatnonzero(kept))
-            for cells, pieces in cut:
-                self._cut(block, cells, at.start, pieces, into)
+            for cells, children in cut:
+                self._cut(block, cells, at.start, children, into)
 
-    def _cut(self, block: Block, cells: Ints, first: int, pieces: Sequence[Piece], into: _Cells) -> None:
-        """Take up the pieces of some cells of a block, whose first cell has the row `first`."""
-        corners = self._corners(block, cells, pieces)
-        for family in dict.fromkeys(piece.cell for piece in pieces):
+    def _cut(self, block: Block, cells: Ints, first: int, children: Sequence[Child], into: _Cells) -> None:
+        """Take up the children of some cells of a block, whose first cell has the row `first`."""
+        corners = self._corners(block, cells, children)
+        for family in dict.fromkeys(child.cell for child in children):
             name, shape = self.target(block, family)
-            chosen = [i for i, piece in enumerate(pieces) if piece.cell == family]
+            chosen = [i for i, child in enumerate(children) if child.cell == family]
             nodes = np.stack([corners[i] for i in chosen], axis=1)
             if around := surroundings(shape):
-                places = np.stack([pieces[i].places(shape)[shape.corners :] for i in chosen])
+                places = np.stack([children[i].places(shape)[shape.corners :] for i in chosen])
                 keys = np.stack([keys_of(nodes[:, :, list(among)]) for among in around], axis=2)
                 middles = self._nodes(block, cells, keys, places.reshape(-1, places.shape[2]))
                 nodes = np.concatenate([nodes, middles], axis=2)
@@ -100,13 +100,13 @@ class CellRefiner:
             lines = None if block.lines is None else block.lines[parents]
             flat = nodes.reshape(len(parents), -1)
             made = Block(name, flat, block.ids[parents], block.properties[parents], shape, lines)
-            into.add(made, first + parents, new=len(pieces) > 1)
+            into.add(made, first + parents, new=len(children) > 1)
 
-    def _corners(self, block: Block, cells: Ints, pieces: Sequence[Piece]) -> list[Ints]:
-        """Return the corners (m, c) of each piece of some cells."""
+    def _corners(self, block: Block, cells: Ints, children: Sequence[Child]) -> list[Ints]:
+        """Return the corners (m, c) of each child of some cells."""
         family, old = block.known_shape.cell, block.nodes[cells].astype(np.int64)
         at: dict[tuple[int, ...], Array] = {
-            corners_around(family, xi): xi for piece in pieces for xi in piece.corners
+            corners_around(family, xi): xi for child in children for xi in child.corners
         }
         nodes: dict[tuple[int, ...], Ints] = {around: old[:, around[0]] for around in at if len(around) == 1}
         if inner := [around for around in at if len(around) > 1]:
@@ -114,7 +114,8 @@ class CellRefiner:
             middles = self._nodes(block, cells, keys, np.array([at[around] for around in inner]))
             nodes.update((around, middles[:, i]) for i, around in enumerate(inner))
         return [
-            np.stack([nodes[corners_around(family, xi)] for xi in piece.corners], axis=1) for piece in pieces
+            np.stack([nodes[corners_around(family, xi)] for xi in child.corners], axis=1)
+            for child in children
         ]
 
     def _nodes(self, block: Block, cells: Ints, keys: Keys, places: Array) -> Ints:

@@ -18,7 +18,7 @@ from kratos_lite.mesh.centers import Centers, Keys, are_among, keys_of, sorted_k
 from kratos_lite.mesh.mesh import Mesh
 from kratos_lite.mesh.refine_cells import CellRefiner, Cut, name_of
 from kratos_lite.mesh.refined_mesh import RefinedMesh
-from kratos_lite.mesh.subdivision import across, pieces, shortest_diagonal, unchanged
+from kratos_lite.mesh.subdivision import across, child_cells, shortest_diagonal, unchanged
 from kratos_lite.shapes import Shape
 from kratos_lite.shapes.faces import Line3, Quadrilateral8, Quadrilateral9, Triangle6
 from kratos_lite.shapes.hexahedra import Hexahedron20
@@ -56,7 +56,7 @@ def refine(mesh: Mesh, elements: ArrayLike | None = None, keep: ArrayLike | None
 
 
 def _target(block: Block, cell: str) -> tuple[str, type[Shape]]:
-    """Return name and shape of the pieces of a block: of the same order."""
+    """Return name and shape of the children of a block: of the same order."""
     shape = block.known_shape
     if cell != shape.cell:
         shape = Tetrahedron4 if len(shape.nodes) == shape.corners else Tetrahedron10
@@ -82,7 +82,7 @@ def axes_along(mesh: Mesh, block: Block, direction: Array) -> Ints:
 
 
 def _cuts_across(mesh: Mesh, block: Block, cells: Ints, direction: Array) -> list[Cut]:
-    """Return cells of a block with the pieces that they are cut into, edges along a direction kept."""
+    """Return cells of a block with the children that they are cut into, edges along a direction kept."""
     axes = axes_along(mesh, block.take(cells), direction)
     return [
         (cells[axes == axis], across(block.known_shape.cell, axis))
@@ -92,7 +92,7 @@ def _cuts_across(mesh: Mesh, block: Block, cells: Ints, direction: Array) -> lis
 
 
 def _cuts(mesh: Mesh, block: Block, cells: Ints, direction: Array | None) -> list[Cut]:
-    """Return cells of a block with the pieces that they are cut into."""
+    """Return cells of a block with the children that they are cut into."""
     if not len(cells):
         return []
     if block.shape is None or block.shape.nodes.shape[1] != 3:
@@ -102,9 +102,9 @@ def _cuts(mesh: Mesh, block: Block, cells: Ints, direction: Array | None) -> lis
             raise MeshError(f"block {block.name}: not every element has edges along {direction.tolist()}")
         return _cuts_across(mesh, block, cells, direction)
     if block.shape.cell != "tetrahedron":
-        return [(cells, pieces(block.shape.cell))]
+        return [(cells, child_cells(block.shape.cell))]
     shortest = shortest_diagonal(mesh.points[block.nodes[cells, :4]])
-    along = [(cells[shortest == diagonal], pieces("tetrahedron", diagonal)) for diagonal in range(3)]
+    along = [(cells[shortest == diagonal], child_cells("tetrahedron", diagonal)) for diagonal in range(3)]
     return [cut for cut in along if len(cut[0])]
 
 
@@ -119,7 +119,7 @@ def _condition_cuts(mesh: Mesh, block: Block, cut: Keys, direction: Array | None
         along = axes_along(mesh, block.take(cells), direction)
         cuts = [] if shape.cell == "line" else _cuts_across(mesh, block, cells, direction)
         cells = cells[along < 0]
-    return [*cuts, (cells, pieces(shape.cell))] if len(cells) else cuts
+    return [*cuts, (cells, child_cells(shape.cell))] if len(cells) else cuts
 
 
 # ---- one level between neighbors ---------------------------------------------------------------------

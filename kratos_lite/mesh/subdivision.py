@@ -1,7 +1,7 @@
 """Subdivision: how a reference cell is cut into cells of half its size.
 
 A hexahedron, tetrahedron or wedge into 8 alike, a pyramid into 6 pyramids and 4 tetrahedra, a face into
-4, a line into 2.  All corners of the pieces lie in the middle of edges, faces or cells.  Source of the
+4, a line into 2.  All corners of the children lie in the middle of edges, faces or cells.  Source of the
 tetrahedra: Bey, Computing 55 (1995) 355-378; the octahedron inside is cut along its shortest diagonal.
 """
 
@@ -20,37 +20,37 @@ DIAGONALS = (((0, 1), (2, 3)), ((0, 2), (1, 3)), ((0, 3), (1, 2)))
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
-    """One piece of a cell: its own family, and the places (c, d) of its corners in the cell."""
+class Child:
+    """One child of a cell: its own family, and the places (c, d) of its corners in the cell."""
 
     cell: str
     corners: Array
 
     def places(self, shape: type[Shape]) -> Array:
-        """Return where in the cell the nodes (k, d) of the piece lie if it has this shape."""
+        """Return where in the cell the nodes (k, d) of the child lie if it has this shape."""
         return LINEAR[self.cell].N(shape.nodes) @ self.corners
 
 
 @remembered
-def unchanged(cell: str) -> Piece:
-    """Return a cell as the one piece of itself."""
-    return Piece(cell, LINEAR[cell].nodes)
+def unchanged(cell: str) -> Child:
+    """Return a cell as the one child of itself."""
+    return Child(cell, LINEAR[cell].nodes)
 
 
 @remembered
-def pieces(cell: str, diagonal: int = 0) -> tuple[Piece, ...]:
-    """Return the pieces of a cell; a tetrahedron is cut along one of its `DIAGONALS`."""
+def child_cells(cell: str, diagonal: int = 0) -> tuple[Child, ...]:
+    """Return the children of a cell; a tetrahedron is cut along one of its `DIAGONALS`."""
     X = LINEAR[cell].nodes
     if cell == "pyramid":
         return _of_pyramid(X)
-    scaled = [Piece(cell, (X + x) / 2) for x in X]
+    scaled = [Child(cell, (X + x) / 2) for x in X]
     if cell == "triangle":
-        return (*scaled, Piece(cell, _turned(X)))
+        return (*scaled, Child(cell, _turned(X)))
     if cell == "wedge":
         flat = _turned(X[:3, :2])
         for t in (-1.0, 0.0):
             low, high = (np.column_stack([flat, np.full(3, end)]) for end in (t, t + 1))
-            scaled.append(Piece(cell, np.vstack([low, high])))
+            scaled.append(Child(cell, np.vstack([low, high])))
     if cell == "tetrahedron":
         scaled += _of_octahedron(X, diagonal)
     return tuple(scaled)
@@ -61,7 +61,7 @@ def _turned(X: Array) -> Array:
     return (X[[0, 1, 2]] + X[[1, 2, 0]]) / 2
 
 
-def _of_octahedron(X: Array, diagonal: int) -> list[Piece]:
+def _of_octahedron(X: Array, diagonal: int) -> list[Child]:
     """Return the four tetrahedra around a diagonal of the octahedron between the middles of the edges."""
     (a, b), (c, d) = DIAGONALS[diagonal]
     ends = (X[a] + X[b]) / 2, (X[c] + X[d]) / 2
@@ -71,33 +71,33 @@ def _of_octahedron(X: Array, diagonal: int) -> list[Piece]:
         corners = np.array([*ends, ring[i], ring[(i + 1) % 4]])
         if np.linalg.det(corners[1:] - corners[0]) < 0:
             corners = corners[[1, 0, 2, 3]]
-        cells.append(Piece("tetrahedron", corners))
+        cells.append(Child("tetrahedron", corners))
     return cells
 
 
-def _of_pyramid(X: Array) -> tuple[Piece, ...]:
+def _of_pyramid(X: Array) -> tuple[Child, ...]:
     """Return a pyramid in each corner, one upside down between them, and tetrahedra at the sides."""
     base, apex = X[:4], X[4]
     rising, center = (base + apex) / 2, base.mean(axis=0)
-    cells = [Piece("pyramid", (X + x) / 2) for x in X]
-    cells.append(Piece("pyramid", np.vstack([rising[::-1], center])))
+    cells = [Child("pyramid", (X + x) / 2) for x in X]
+    cells.append(Child("pyramid", np.vstack([rising[::-1], center])))
     for i in range(4):
         j = (i + 1) % 4
-        cells.append(Piece("tetrahedron", np.array([(base[i] + base[j]) / 2, center, rising[i], rising[j]])))
+        cells.append(Child("tetrahedron", np.array([(base[i] + base[j]) / 2, center, rising[i], rising[j]])))
     return tuple(cells)
 
 
 @remembered
-def across(cell: str, axis: int) -> tuple[Piece, ...]:
-    """Return the pieces of a cell that is cut across all its axes but one: 4, or 2 of a face, 1 of a line."""
-    whole = pieces(cell)
+def across(cell: str, axis: int) -> tuple[Child, ...]:
+    """Return the children of a cell cut across all its axes but one: 4, or 2 of a face, 1 of a line."""
+    whole = child_cells(cell)
     X = LINEAR[cell].nodes
-    cells: dict[tuple[float, ...], Piece] = {}
-    for piece in whole:
-        corners = piece.corners.copy()
+    cells: dict[tuple[float, ...], Child] = {}
+    for child in whole:
+        corners = child.corners.copy()
         corners[:, axis] = X[:, axis]
         cells.setdefault(
-            tuple(np.delete(corners, axis, axis=1).mean(axis=0).round(9).tolist()), Piece(cell, corners)
+            tuple(np.delete(corners, axis, axis=1).mean(axis=0).round(9).tolist()), Child(cell, corners)
         )
     return tuple(cells.values())
 

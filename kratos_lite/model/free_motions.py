@@ -104,7 +104,7 @@ class FreeMotions:
         return self._pair[0][..., numbers] * (self.component[:, None] == components)[:, None]
 
     @cached_property
-    def held(self) -> Mask:
+    def constrained(self) -> Mask:
         """Components (n, 3), one for each free motion, that hold these firmly.
 
         Gram-Schmidt on the rows of R: each is that along which what remains of the motions goes farthest.

@@ -301,23 +301,23 @@ class Pencil:
     """λ² M + λ C + K, sparse (n, n), and the motions (n, k) that neither C nor K resists.
 
     M is symmetric positive definite; C and K need not be symmetric.  The motions are columns with
-    φ^T M φ = 1, as `neutral_motions` makes them.
+    φ^T M φ = 1, as `unresisted_modes` makes them.
     """
 
     M: Csr
     C: Csr
     K: Csr
-    neutral: Array
+    rigid: Array
     start: Callable[[int], Array]  # makes of a number so many real modes (k, n), and rigid motions
     precondition: Callable[[Array], Array]  # about K⁻¹, of one vector (n,)
 
     def modes(self, count: int) -> tuple[Complexes, Complexes]:
         """Return λ (count,) in 1/s, nearest to 0 first, and shapes (n, count) of length 1."""
-        n, zeros = self.K.shape[0], 2 * self.neutral.shape[1]
+        n, zeros = self.K.shape[0], 2 * self.rigid.shape[1]
         if count > 2 * n:
             raise InputError(f"this model has 1 … {2 * n} complex modes; got {count}")
         values = np.zeros(zeros, dtype=complex)
-        shapes = np.repeat(self.neutral, 2, axis=1).astype(complex)
+        shapes = np.repeat(self.rigid, 2, axis=1).astype(complex)
         whole = True
         if (further := count - zeros) > 0:
             whole = 2 * n <= DENSE_MODES or further > n // 4
@@ -335,10 +335,10 @@ class Pencil:
         check_residuals(terms, shapes, energies)
 
     def _all(self) -> tuple[Complexes, Complexes]:
-        """Return all eigenvalues but those of the neutral motions, from dense matrices."""
+        """Return all eigenvalues but those of the rigid modes, from dense matrices."""
         Q: Array = np.eye(self.K.shape[0])
-        if k := self.neutral.shape[1]:
-            Q = np.linalg.qr(self.M @ self.neutral, mode="complete")[0][:, k:]
+        if k := self.rigid.shape[1]:
+            Q = np.linalg.qr(self.M @ self.rigid, mode="complete")[0][:, k:]
         values, vectors = _all_values(*(Q.T @ (A @ Q) for A in (self.M, self.C, self.K)))
         return values, Q @ vectors
 
@@ -368,8 +368,8 @@ class Pencil:
         raise not_converged(count)
 
     def _independent(self, W: Array, V: Array) -> Array:
-        """Return vectors (k, n) without the neutral ones and V, orthonormal in M."""
-        known = np.vstack([self.neutral.T, V])
+        """Return vectors (k, n) without the rigid ones and V, orthonormal in M."""
+        known = np.vstack([self.rigid.T, V])
         for _ in range(2):
             W = W / np.maximum(_lengths(W), np.finfo(float).tiny)[:, None]
             W = W - (W @ (self.M @ known.T)) @ known
@@ -387,7 +387,7 @@ def _all_values(M: Array, C: Array, K: Array) -> tuple[Complexes, Complexes]:
     return values.astype(complex), np.asarray(np.linalg.solve(L.T, vectors[: len(K)]), dtype=complex)
 
 
-def neutral_motions(M: Any, C: Any, K: Any, candidates: Array) -> Array:
+def unresisted_modes(M: Any, C: Any, K: Any, candidates: Array) -> Array:
     """Return the span (n, k) of those candidates (n, m) that C, K and their transposes take to 0.
 
     φ^T M φ = 1 of each, and 0 of two.

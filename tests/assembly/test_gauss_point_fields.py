@@ -304,7 +304,7 @@ def collapsed(mesh):
         (collapsed, "det J = 0 at a corner node"),
     ],
 )
-def test_both_ways_judge_bad_shapes_alike(spoil, text, numpy_only):
+def test_both_ways_refuse_bad_shapes_alike(spoil, text, numpy_only):
     mesh = spoil(kl.box(cells=(3, 2, 2)))
     found = verdict(mesh, kl.KinematicLinear3D8N)
     assert text in str(found)
@@ -313,7 +313,7 @@ def test_both_ways_judge_bad_shapes_alike(spoil, text, numpy_only):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_both_ways_judge_flat_elements_alike(name, numpy_only):
+def test_both_ways_refuse_flat_elements_alike(name, numpy_only):
     kind, found = kl.ELEMENTS[name], []
     for seed in range(8):
         mesh = kl.box(cells=(2, 2, 1), element=name)

@@ -235,7 +235,7 @@ def test_weights_in_wide_patches_fall_with_the_distance():
     np.testing.assert_allclose(found.weights[entries], far**-4.0, rtol=1e-12)
 
 
-def test_hanging_nodes_take_the_patches_of_their_masters():
+def test_hanging_nodes_take_the_patches_of_their_independents():
     mesh = kl.box(cells=(2, 1, 1))
     none = np.zeros(mesh.n_nodes, dtype=bool)
     independents = lists(np.array([0, 0]), np.array([1, 2]), 1)

@@ -275,6 +275,8 @@ def test_the_error_says_which_point_how_far_and_the_cure():
 def test_wrong_points_are_refused(points, words):
     with pytest.raises(kl.InputError, match=words):
         kl.box().locate(points)
+    with pytest.raises(kl.InputError, match=r"nodal values must have shape \(8, …\); got \(7, 3\)"):
+        kl.box().locate([[0.5, 0.5, 0.5]]).interpolate(np.zeros((7, 3)))
 
 
 # ---- values ----------------------------------------------------------------------------------------
@@ -308,8 +310,3 @@ def test_weights_interpolate_and_their_transpose_keeps_force_and_moment(name):
     moments = (np.cross(at, force).sum(axis=0) for at, force in ((mesh.points, nodal), (X, f)))
     np.testing.assert_allclose(*moments, rtol=0, atol=1e-11)
     np.testing.assert_allclose(W @ v, found.interpolate(v), rtol=0, atol=1e-14)
-
-
-def test_values_of_a_wrong_shape_are_refused():
-    with pytest.raises(kl.InputError, match=r"nodal values must have shape \(8, …\); got \(7, 3\)"):
-        kl.box().locate([[0.5, 0.5, 0.5]]).interpolate(np.zeros((7, 3)))

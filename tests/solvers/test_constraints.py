@@ -72,22 +72,6 @@ def test_a_chain_of_thousands():
     np.testing.assert_array_equal(found.constants, n - np.arange(n))
 
 
-@pytest.mark.parametrize(
-    ("given", "text"),
-    [
-        ([(3, {4: 1.0}, 0.0), (4, {5: 1.0}, 0.0), (5, {4: 2.0}, 0.0)], r"constraints of [45] form a cycle"),
-        ([(3, {3: 1.0}, 0.0)], "constraints of 3 form a cycle"),
-        ([(3, {4: 1.0}, 0.0), (3, {5: 1.0}, 0.0)], "3 depends on others by two constraints"),
-        ([(0, {4: 1.0}, 0.0)], "0 is both fixed and dependent"),
-    ],
-)
-def test_constraints_that_cannot_hold(given, text):
-    fixed = FREE.copy()
-    fixed[0] = True
-    with pytest.raises(kl.ModelError, match=text):
-        eliminate(rows(*given), fixed, ZERO, str)
-
-
 def tied_blocks(kind):
     """Return two blocks whose facing sides are one by ties, the lower one held."""
     lower = kl.box((1.0, 1.2, 0.5), (3, 3, 2), kind)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.mesh import Block
-from kratos_lite.mesh.subdivision import Piece, pieces, unchanged
+from kratos_lite.mesh.subdivision import Child, child_cells, unchanged
 from kratos_lite.shapes import LINEAR, Shape
 from kratos_lite.typing import Array, Mask
 from kratos_lite.view.facets import grid, rim
@@ -57,7 +57,7 @@ def lattice_of_cell(shape: type[Shape]) -> dict[str, Any]:
     A tetrahedron is its four points and, for each of them, whether the face opposite lies on the cell's own
     faces or inside.
     """
-    parts: tuple[Piece, ...] = (unchanged(shape.cell),) if shape.degree == 1 else pieces(shape.cell)
+    parts: tuple[Child, ...] = (unchanged(shape.cell),) if shape.degree == 1 else child_cells(shape.cell)
     corners = [part.corners[list(four)] for part in parts for four in TETRAHEDRA[part.cell]]
     places, rows = np.unique(np.concatenate(corners).round(12), axis=0, return_inverse=True)
     on = _on_faces(shape, places)
