@@ -16,6 +16,7 @@ from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
+from scipy.sparse import bsr_array, coo_array, diags_array
 
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
@@ -60,8 +61,6 @@ class SplitMatrix:
 
     def scipy(self) -> Csr:
         """Return K as a scipy.sparse.csr_array."""
-        from scipy.sparse import diags_array
-
         D = self.D.tocsr()
         return (self.A.scipy().tocsr() + D.T @ diags_array(self.bulk) @ D).tocsr()
 
@@ -187,8 +186,6 @@ def _softened(group: ElementGroup, bulk: float) -> ElementGroup:
 
 def _assembled(n_nodes: int, parts: Sequence[_SplitGroup]) -> Bsr:
     """Return D (p, 3n) of the dilatations of each group, a row of blocks for each element if they allow."""
-    from scipy.sparse import bsr_array
-
     sizes = {part.D.shape[1] for part in parts}
     R = sizes.pop() if len(sizes) == 1 else 1
     blocks, columns, counts = [], [], []
@@ -219,8 +216,6 @@ class PressureMeans:
 
 def pressure_means(points: Array, parts: Sequence[_SplitGroup], modulus: Array) -> PressureMeans:
     """Return the means of pressures; of polynomials up to the first degree around halves of long edges."""
-    from scipy.sparse import coo_array
-
     n, first, entries = len(points), 0, []
     for part in parts:
         along = _long_axes(points, part.group)

@@ -21,6 +21,8 @@ Olshanskii, SIAM J. Sci. Comput. 28 (2006) 2095-2113 (augmented Lagrangian).
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse import bsr_array, csr_array, diags_array
+from scipy.sparse.csgraph import connected_components
 
 from kratos_lite.assembly.block_matrix import BlockMatrix, block_rows
 from kratos_lite.solvers.coarse_level import PCoarseLevel
@@ -81,8 +83,6 @@ def _arrays(A: Bsr) -> tuple[Rows, Rows, Array]:
 
 def _pressure_operator(K: SplitMatrix, inverse: Bsr, free: Mask) -> tuple[Bsr, Array]:
     """Return S in single precision, scaled to a diagonal of 1, and the scale."""
-    from scipy.sparse import diags_array
-
     is_loose = np.asarray(free.reshape(-1, 3).any(axis=1))
     around_free = is_loose[K.means.ends].any(axis=1)  # around constrained nodes checkerboards have means, too
     means = K.means.matrix @ diags_array(1.0 * np.asarray(around_free))
@@ -100,8 +100,6 @@ def block_inverse(A: BlockMatrix, free: Mask, points: Array, D: Bsr, factor: Arr
 
     Both are positive definite there; nodes that share a row of R x 3 blocks of D (p, 3n) share a block of A.
     """
-    from scipy.sparse import bsr_array
-
     rows, columns, n = A.rows(), A.indices, len(A.indptr) - 1
     group, place = _groups(A, rows, points)
     within = np.flatnonzero(group[rows] == group[columns])
@@ -131,8 +129,6 @@ def block_inverse(A: BlockMatrix, free: Mask, points: Array, D: Bsr, factor: Arr
 
 def _square(D: Bsr, factor: Array, group: Ints) -> Bsr:
     """Return Dᵀ factor D (3n, 3n) within each group of nodes."""
-    from scipy.sparse import bsr_array
-
     row, R = block_rows(D.indptr), D.blocksize[0]
     data = D.data * np.sqrt(factor).reshape(-1, R, 1)[row]
     if group.max(initial=0) < len(group) - 1:  # what a row has within a group is a row of its own
@@ -156,9 +152,6 @@ def _near(A: BlockMatrix, rows: Ints, points: Array) -> Mask:
 
 def _groups(A: BlockMatrix, rows: Ints, points: Array) -> tuple[Ints, Ints]:
     """Return the group of each node, and its place in the group."""
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import connected_components
-
     n = len(A.indptr) - 1
     size = np.sqrt(np.einsum("nij,nij->n", A.data, A.data))
     root = np.zeros(n)

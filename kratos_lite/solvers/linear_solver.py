@@ -169,15 +169,17 @@ class LinearSolver:
     @cached_property
     def _multigrid(self) -> Solver:
         from kratos_lite.solvers.coarse_level import apply_ties, p_coarse_level  # a quick start
-        from kratos_lite.solvers.displacement_pressure import DisplacementPressure
-        from kratos_lite.solvers.multigrid import multigrid
 
         linear, map = p_coarse_level(self.points, self.groups, self.hanging), self.constraint_map
         if linear is not None and self.with_mass is not None:
             linear = linear.with_mass(*self.with_mass)
         if linear is not None and map.T is not None:
             linear = apply_ties(linear, map.T, map.free)
-        make = multigrid if self.plan.method == "amg" else DisplacementPressure
+        make: Any
+        if self.plan.method == "amg":
+            from kratos_lite.solvers.multigrid import multigrid as make
+        else:
+            from kratos_lite.solvers.displacement_pressure import DisplacementPressure as make
         return make(self._blocks, map.is_free, self.points, linear)
 
     @cached_property

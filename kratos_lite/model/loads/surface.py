@@ -160,7 +160,13 @@ class Resultant(FaceLoad):
         self.about = None if about is None else vectors(about, "the point of a resultant", "(3,) in m")
 
     def on_faces(self, mesh: Mesh, faces: list[Block], factors: int) -> Iterable[Array]:
-        """Return ∫ N t dA (m, k, 3) in N of each face; ModelError where the mesh is a part of another."""
+        """Return ∫ N t dA (m, k, 3) in N of each face.
+
+        Raises
+        ------
+        ModelError
+            The mesh is a part of a larger one.
+        """
         if not mesh.whole:
             raise ModelError("a resultant needs all faces of its part in one mesh; give a traction instead")
         X, dA = (np.concatenate(values) for values in zip(*_points_of(mesh, faces, factors), strict=True))
