@@ -8,7 +8,7 @@ multigrid, Supercomputing 2000 (aggregates within ranks).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -51,16 +51,8 @@ class Rows:
         return np.unique(self.columns[(self.columns < first) | (self.columns >= first + own)])
 
 
-@dataclass(eq=False)
-class Coarser:
-    """The next level: its matrix, the way to it, and its rigid modes.
-
-    Attributes
-    ----------
-    ghosts : copies of coarse nodes of other ranks.
-    A, P : own rows of the matrix (blocks 6x6) and of the prolongator, with columns by place.
-    modes : (m, 6, 6).
-    """
+class Coarser(NamedTuple):
+    """The next level: its ghosts, own rows of its matrix and of the prolongator, and modes (m, 6, 6)."""
 
     ghosts: Ghosts
     A: Rows
@@ -134,16 +126,11 @@ def _galerkin(kernel: Any, ranks: Alone, P: Rows, offsets: Ints) -> Rows:
     rows = numbers[np.repeat(np.arange(len(numbers)), np.diff(indptr))]
     columns, data = numbers[indices], data.reshape(len(indices), 36)
     owner = np.searchsorted(offsets, rows, side="right") - 1
-    to = [
-        np.flatnonzero(owner == rank) if rank != ranks.rank else np.zeros(0, int)
-        for rank in range(ranks.size)
-    ]
-    keys = ranks.exchange([np.stack([rows[some], columns[some]], axis=1) for some in to])
-    came = ranks.exchange([data[some] for some in to])
-    mine = owner == ranks.rank
-    rows = np.concatenate([rows[mine], *(each[:, 0] for each in keys)])
-    columns = np.concatenate([columns[mine], *(each[:, 1] for each in keys)])
-    return _summed(rows - first, columns, np.concatenate([data[mine], *came]), last - first)
+    to = [owner == rank for rank in range(ranks.size)]
+    rows, columns, data = (
+        np.concatenate(ranks.exchange([values[some] for some in to])) for values in (rows, columns, data)
+    )
+    return _summed(rows - first, columns, data, last - first)
 
 
 def _summed(rows: Ints, columns: Ints, data: Array, count: int) -> Rows:

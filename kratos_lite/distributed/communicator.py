@@ -44,13 +44,7 @@ class Alone:
         """Return the sum over ranks of a number or of each entry of an array, the same on all ranks."""
         return value
 
-    def max(self, value: Any) -> Any:
-        """Return the largest over ranks, entry by entry."""
-        return value
-
-    def min(self, value: Any) -> Any:
-        """Return the smallest over ranks, entry by entry."""
-        return value
+    max = min = sum
 
     def any(self, value: bool) -> bool:
         """Return whether it is true on any rank."""
@@ -64,13 +58,11 @@ class Alone:
         """Return the value of each rank, on all ranks; for small values."""
         return [value]
 
-    def exchange(self, arrays: Sequence[Any]) -> list[Any]:
-        """Send array i to rank i, and return what each rank has sent here.
+    collect = gather
+    """Return the values of all ranks on rank 0, nothing on the others."""
 
-        Parameters
-        ----------
-        arrays : one for each rank, with as many entries as there is to send; all of one type and shape.
-        """
+    def exchange(self, arrays: Sequence[Any]) -> list[Any]:
+        """Send array i to rank i, and return what each rank has sent here."""
         return list(arrays)
 
     @contextmanager
@@ -118,27 +110,33 @@ class Ranks(Alone):
         return self._reduce(value, self._MPI.SUM)
 
     def max(self, value: Any) -> Any:
-        """Return the largest over ranks."""
+        """Return the largest over ranks, entry by entry."""
         return self._reduce(value, self._MPI.MAX)
 
     def min(self, value: Any) -> Any:
-        """Return the smallest over ranks."""
+        """Return the smallest over ranks, entry by entry."""
         return self._reduce(value, self._MPI.MIN)
 
     def _reduce(self, value: Any, operation: Any) -> Any:
         given = np.ascontiguousarray(value)
         found = np.empty_like(given)
         self.comm.Allreduce(given, found, operation)
-        return found.reshape(value.shape) if isinstance(value, np.ndarray) else found.ravel()[0].item()
+        return found.reshape(value.shape) if isinstance(value, np.ndarray) else found.item()
 
     def gather(self, value: Any) -> list[Any]:
         """Return the value of each rank."""
-        found: list[Any] = self.comm.allgather(value)
-        return found
+        return list(self.comm.allgather(value))
+
+    def collect(self, value: Any) -> list[Any]:
+        """Return the values of all ranks on rank 0, nothing on the others."""
+        return self.comm.gather(value) or []
 
     def exchange(self, arrays: Sequence[Any]) -> list[Any]:
         """Send array i to rank i, and return what each rank has sent here."""
-        received: list[Any] = self.comm.alltoall(list(arrays))
+        sent = list(arrays)
+        own, sent[self.rank] = sent[self.rank], None
+        received: list[Any] = self.comm.alltoall(sent)
+        received[self.rank] = own
         return received
 
     # ---- errors ------------------------------------------------------------------------------------
@@ -160,24 +158,26 @@ class Ranks(Alone):
         text = str(error) if isinstance(error, KratosLiteError) else f"{type(error).__name__}: {error}"
         LOG.debug("%s", "".join(traceback.format_exception(error)))
         # a signal comes from mpirun, which says so, or ends this rank since another has said its error
-        if sys.__stderr__ is not None and not isinstance(error, KeyboardInterrupt):
-            sys.__stderr__.write(f"error: rank {self.rank}: {text}\n")
-            sys.__stderr__.flush()
+        if not isinstance(error, KeyboardInterrupt):
+            _say(f"rank {self.rank}: {text}")
         self.comm.Abort(2)
 
     # ---- work --------------------------------------------------------------------------------------
 
     def run(self, task: Callable[..., T], *arguments: Any, each: Callable[[int], Any] | None = None) -> T:
         """Call task(ranks, *arguments) on all ranks, and return what it returns here, on rank 0."""
+
+        def given(rank: int) -> tuple[Any, ...]:
+            return arguments if each is None else (*arguments, each(rank))
+
         for rank in range(1, self.size):
             try:
-                given = arguments if each is None else (*arguments, each(rank))
-                self.comm.send(self._message(task, given), dest=rank)
+                self.comm.send(self._message(task, given(rank)), dest=rank)
             except BaseException as error:
                 if rank > 1:  # those before wait for the others
                     self.abort(error)
                 raise
-        return self._do(lambda: (task, arguments if each is None else (*arguments, each(0))))
+        return self._do(lambda: (task, given(0)))
 
     def _message(self, task: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:
         try:
@@ -332,16 +332,18 @@ def _mpi() -> Any:
     return MPI
 
 
+def _say(text: str) -> None:
+    if sys.__stderr__ is not None:
+        sys.__stderr__.write(f"error: {text}\n")
+        sys.__stderr__.flush()
+
+
 @contextmanager
 def _limited() -> Iterator[None]:
     """End this process, and so all ranks, where the others do not come: one may have ended early."""
 
     def end() -> None:
-        if sys.__stderr__ is not None:
-            sys.__stderr__.write(
-                f"error: after {LIMIT:g} s not all ranks have begun; one may have ended early\n"
-            )
-            sys.__stderr__.flush()
+        _say(f"after {LIMIT:g} s not all ranks have begun; one may have ended early")
         os._exit(2)
 
     timer = Timer(LIMIT, end)
@@ -360,6 +362,6 @@ def _packed(error: BaseException | None) -> bytes | None:
     try:
         packed = pickle.dumps(error)
         pickle.loads(packed)
+        return packed
     except Exception:
-        packed = pickle.dumps(KratosLiteError(f"{type(error).__name__}: {error}"))
-    return packed
+        return pickle.dumps(KratosLiteError(f"{type(error).__name__}: {error}"))

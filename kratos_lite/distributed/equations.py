@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from kratos_lite.distributed.communicator import Alone, Ranks
 from kratos_lite.distributed.cut import Part
@@ -12,8 +12,19 @@ from kratos_lite.distributed.krylov import Krylov, options_of
 from kratos_lite.distributed.petsc import LIVE, petsc, plain_errors
 from kratos_lite.distributed.petsc_matrix import add_rigid_modes, communicator, eliminated, petsc_matrix
 from kratos_lite.distributed.stiffness import SharedStiffness
+from kratos_lite.errors import SolveError
 from kratos_lite.native import kernels
+from kratos_lite.solvers.linear_solver import Solution
+from kratos_lite.solvers.plan import Plan
 from kratos_lite.typing import Array, Progress
+
+CURE = (
+    "look for thin elements, nearly free parts or plain elements with ν near 0.5 "
+    "(formulation='non_locking' takes others), or ask for solver='direct'"
+)
+"""What helps where an iteration fails."""
+CURE_OF_FACTORS = "look for nearly free parts or a large stiffness contrast, or take more memory"
+"""What helps where a factorization fails."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +49,29 @@ class Method:
         """Whether our multigrid preconditions, in a third of the time of PETSc's: without constraints."""
         is_free = not self.constrained and "pc_type" not in self.options
         return self.name == "amg" and is_free and kernels("multigrid") is not None
+
+
+class Outcome(NamedTuple):
+    """How equations were solved: by what, in how many iterations, how well, or why not.
+
+    Attributes
+    ----------
+    unused : options of the user that PETSc has not asked for.
+    """
+
+    name: str
+    iterations: int
+    error: float
+    failure: str
+    unused: list[str]
+
+    def solution(self, x: Array, plan: Plan) -> tuple[Solution, list[str]]:
+        """Return the solution x and what is to be said of it; SolveError if it was not found."""
+        if self.failure:
+            raise SolveError(f"{self.failure}; {CURE if plan.iterates else CURE_OF_FACTORS}")
+        words = " ".join(f"-{option}" for option in self.unused)
+        told = [f"PETSc has not used these options: {words}; they may be misspelt"] if words else []
+        return Solution(x, self.name, plan.reason, self.iterations, self.error), told
 
 
 class Equations:
@@ -65,10 +99,20 @@ class Equations:
         self.norm = K.norm()
         options = options_of(method.name, method.options, not own)
         with plain_errors():
-            self._A = product_of(K) if own else self._matrix(K, part)
+            self._A = self._product(K) if own else self._matrix(K, part)
             self._solver = Krylov(self._A, options, method.options, method.most)
             if own:
-                set_multigrid(self._solver.ksp, K)
+                preconditioner = self._solver.ksp.getPC()
+                preconditioner.setType("python")
+                preconditioner.setPythonContext(_Cycle(K))
+
+    def _product(self, K: SharedStiffness) -> Any:
+        """Return a matrix of PETSc that multiplies by K."""
+        PETSc, sizes = petsc(), ((K.own, None), (K.own, None))
+        A = PETSc.Mat().createPython(sizes, _Product(K), comm=communicator(K.ranks))
+        A.setUp()
+        A.setOption(PETSc.Mat.Option.SPD, True)
+        return A
 
     def _matrix(self, K: SharedStiffness, part: Part) -> Any:
         """Return T^T K T as a matrix of PETSc; that of K goes."""
@@ -79,9 +123,7 @@ class Equations:
         add_rigid_modes(A, K)
         return A
 
-    def solve(
-        self, forces: Array, tolerance: float, start: Array | None = None
-    ) -> tuple[Array, str, int, float, str]:
+    def solve(self, forces: Array, tolerance: float, start: Array | None = None) -> tuple[Array, Outcome]:
         """Solve for the free degrees of freedom of own nodes."""
         with plain_errors():
             b, x = self._A.createVecLeft(), self._A.createVecLeft()
@@ -93,11 +135,7 @@ class Equations:
             found = x.getArray().reshape(-1, 3).copy()
             b.destroy()
             x.destroy()
-        return found, self._solver.name, count, error, failure
-
-    def unused_options(self) -> list[str]:
-        """Return the options of the user that PETSc has not asked for."""
-        return self._solver.unused()
+        return found, Outcome(self._solver.name, count, error, failure, self._solver.unused())
 
     def destroy(self) -> None:
         """Release matrix and solver; all ranks call it at the same time, as PETSc asks for."""
@@ -113,23 +151,6 @@ class Equations:
                 held.incRef()
 
 
-def product_of(K: SharedStiffness) -> Any:
-    """Return a matrix of PETSc that multiplies by K."""
-    PETSc = petsc()
-    sizes = ((K.own, None), (K.own, None))
-    matrix = PETSc.Mat().createPython(sizes, _Product(K), comm=communicator(K.ranks))
-    matrix.setUp()
-    matrix.setOption(PETSc.Mat.Option.SPD, True)
-    return matrix
-
-
-def set_multigrid(ksp: Any, K: SharedStiffness) -> None:
-    """Let the own multigrid of K precondition a solver of PETSc; it is made when the solver is set up."""
-    preconditioner = ksp.getPC()
-    preconditioner.setType("python")
-    preconditioner.setPythonContext(_Cycle(K))
-
-
 class _Product:
     """K x, as PETSc calls it."""
 
@@ -141,7 +162,7 @@ class _Product:
 
 
 class _Cycle:
-    """One V-cycle, as PETSc calls it."""
+    """One V-cycle of the own multigrid, as PETSc calls it; it is made when the solver is set up."""
 
     def __init__(self, K: SharedStiffness) -> None:
         self.K = K

@@ -8,15 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from kratos_lite.distributed.petsc import (
-    PREFIX,
-    clear_options,
-    has_mumps,
-    petsc,
-    plain_errors,
-    set_options,
-    unused,
-)
+from kratos_lite.distributed.petsc import PREFIX, has_mumps, petsc, plain_errors, unused
 from kratos_lite.solvers.iteration import MAX_ITERATIONS, Monitor
 from kratos_lite.solvers.plan import Facts, Plan, over_ranks
 from kratos_lite.typing import Progress
@@ -116,7 +108,9 @@ class Krylov:
         self._A, self._is_ready, self.most = A, False, most
         self._monitor: Monitor | None = None
         with plain_errors():
-            set_options(self.prefix, self.options)
+            self._options = petsc().Options(self.prefix)  # they hold for this solver alone
+            for name, value in self.options.items():
+                self._options[name] = value
             self.ksp = petsc().KSP().create(A.comm)
             self.ksp.setOptionsPrefix(self.prefix)
             self.ksp.setOperators(A)
@@ -135,13 +129,12 @@ class Krylov:
         """Prepare what does not depend on the right side, once."""
         if self._is_ready:
             return
-        if progress:
-            progress("set up", 0.0)
+        told = progress or (lambda phase, fraction: None)
+        told("set up", 0.0)
         with plain_errors():
             self.ksp.setUp()
             self.ksp.setUpOnBlocks()
-        if progress:
-            progress("set up", 1.0)
+        told("set up", 1.0)
         self._is_ready = True
 
     def solve(
@@ -220,5 +213,6 @@ class Krylov:
 
     def destroy(self) -> None:
         """Let go of all; all ranks call it."""
-        clear_options(self.prefix, self.options)
+        for name in self.options:
+            self._options.delValue(name)
         self.ksp.destroy()

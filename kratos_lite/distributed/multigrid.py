@@ -122,11 +122,6 @@ class Multigrid:
             last.factorize(A)
         self._kernel.finish()
 
-    @property
-    def sizes(self) -> list[int]:
-        """Unknowns of each level, of all ranks."""
-        return [level.unknowns for level in self.levels]
-
     def precondition(self, r: Array) -> Array:
         """Return one V-cycle on the residual of own nodes (n · b,)."""
         return np.asarray(self._kernel.cycle(np.ascontiguousarray(r)))

@@ -49,9 +49,8 @@ class Partition:
         for block in mesh.blocks:
             self._check_once(block.ids)
         order = np.argsort(mesh.node_ids, kind="stable")
-        places = _Directory(ranks, mesh.node_ids[order], mesh.points[order])
         self.owner = np.empty(mesh.n_nodes, dtype=np.int64)
-        self.owner[order] = places.owner
+        self.owner[order] = _owners(ranks, mesh.node_ids[order], mesh.points[order])
         self.own: Mask = self.owner == ranks.rank
         rows = np.flatnonzero(self.own)
         self.offsets = np.concatenate([[0], np.cumsum(ranks.gather(len(rows)))])
@@ -129,33 +128,27 @@ class Partition:
     ) -> Part:
         """Return the equations with the elements of other parts at own nodes, which these send."""
         mine = self._groups_of_all(groups)
-        about = np.column_stack([self.number, equation, held])
-        tables, places = [], []
-        known, found = [about], [points]
+        about = np.column_stack([self.number, equation, held, points])  # numbers are whole up to 2^53
+        tables = []
         for group in mine:
             nodes = group.nodes
             to = [np.asarray((self.owner[nodes] == r).any(axis=1)) for r in range(self.ranks.size)]
             to[self.ranks.rank][:] = False
-            came = self.ranks.exchange([about[nodes[chosen]] for chosen in to])
-            where = self.ranks.exchange([points[nodes[chosen]] for chosen in to])
-            tables.append(np.concatenate(came))
-            places.append(np.concatenate(where))
-            known.append(tables[-1].reshape(-1, 5))
-            found.append(places[-1].reshape(-1, 3))
-        every, at = np.concatenate(known), np.concatenate(found)
+            tables.append(np.concatenate(self.ranks.exchange([about[nodes[chosen]] for chosen in to])))
+        every = np.concatenate([about, *(table.reshape(-1, 8) for table in tables)])
         numbers, first = np.unique(every[:, 0], return_index=True)
         row = np.full(len(numbers), -1)
         row[np.searchsorted(numbers, self.number)] = np.arange(len(points))
         new = np.flatnonzero(row < 0)
         row[new] = len(points) + np.arange(len(new))
-        pick = np.concatenate([np.arange(len(points)), first[new]])
+        every = every[np.concatenate([np.arange(len(points)), first[new]])]
         whole = []
         for group, table in zip(mine, tables, strict=True):
             halo = row[np.searchsorted(numbers, table[..., 0])].astype(np.int32)
             nodes = np.concatenate([group.nodes, halo])
             whole.append(replace(group, nodes=nodes, rows=np.arange(len(nodes))))
-        fixed = every[pick, 2:].astype(bool)
-        return Part(at[pick], whole, own, every[pick, 1], ~fixed, fixed, NO_DEPENDENTS)
+        fixed, places = every[:, 2:5].astype(bool), np.ascontiguousarray(every[:, 5:])
+        return Part(places, whole, own, every[:, 1].astype(np.int64), ~fixed, fixed, NO_DEPENDENTS)
 
     def _groups_of_all(self, groups: list[ElementGroup]) -> list[ElementGroup]:
         """Return the groups that any rank has, in the same order on all, empty where this one has none."""
@@ -165,30 +158,26 @@ class Partition:
         return [here[kind] if kind in here else pickle.loads(kind) for kind in every]
 
 
-class _Directory:
-    """Who owns nodes: each id is looked after by one rank, which the others ask."""
-
-    def __init__(self, ranks: Alone, ids: Ints, points: Array) -> None:
-        to = ids % ranks.size
-        order = np.argsort(to, kind="stable")
-        cuts = np.searchsorted(to[order], np.arange(1, ranks.size))
-        asked = ranks.exchange(np.split(ids[order], cuts))
-        places = np.concatenate(ranks.exchange(np.split(points[order], cuts)))
-        known = np.concatenate(asked)
-        of_rank = np.repeat(np.arange(ranks.size), [len(some) for some in asked])
-        by_id = np.lexsort((of_rank, known))
-        starts = np.flatnonzero(np.diff(known[by_id], prepend=-1))
-        first = by_id[np.repeat(starts, np.diff(np.append(starts, len(known))))]
-        owner, first_of = np.empty_like(of_rank), np.empty_like(of_rank)
-        owner[by_id], first_of[by_id] = of_rank[first], first
-        with ranks.agree_on_errors():
-            apart = np.flatnonzero((places != places[first_of]).any(axis=1))
-            if len(apart):
-                at, other = apart[0], first_of[apart[0]]
-                raise MeshError(
-                    f"node {known[at]} lies at {places[other].tolist()} m in part {of_rank[other]} and at "
-                    f"{places[at].tolist()} m in part {of_rank[at]}; make the parts anew"
-                )
-        replies = ranks.exchange(np.split(owner, np.cumsum([len(some) for some in asked])[:-1]))
-        self.owner = np.empty(len(ids), dtype=np.int64)
-        self.owner[order] = np.concatenate(replies)
+def _owners(ranks: Alone, ids: Ints, points: Array) -> Ints:
+    """Return who owns nodes, with ascending ids: one rank looks after each id, and the others ask it."""
+    to = ids % ranks.size
+    order = np.argsort(to, kind="stable")
+    cuts = np.searchsorted(to[order], np.arange(1, ranks.size))
+    asked = ranks.exchange(np.split(ids[order], cuts))
+    places = np.concatenate(ranks.exchange(np.split(points[order], cuts)))
+    known = np.concatenate(asked)
+    of_rank = np.repeat(np.arange(ranks.size), [len(some) for some in asked])
+    _, first, inverse = np.unique(known, return_index=True, return_inverse=True)  # first, so of the lowest
+    first_of = first[inverse]
+    with ranks.agree_on_errors():
+        apart = np.flatnonzero((places != places[first_of]).any(axis=1))
+        if len(apart):
+            at, other = apart[0], first_of[apart[0]]
+            raise MeshError(
+                f"node {known[at]} lies at {places[other].tolist()} m in part {of_rank[other]} and at "
+                f"{places[at].tolist()} m in part {of_rank[at]}; make the parts anew"
+            )
+    ends = np.cumsum([len(some) for some in asked])[:-1]
+    owner = np.empty(len(ids), dtype=np.int64)
+    owner[order] = np.concatenate(ranks.exchange(np.split(of_rank[first_of], ends)))
+    return owner

@@ -14,8 +14,6 @@ from functools import lru_cache
 from typing import Any
 from weakref import WeakSet
 
-import numpy as np
-
 from kratos_lite.errors import InputError, SolveError
 
 PREFIX = "kratos_lite_"
@@ -26,7 +24,9 @@ INSTALL = (
     "install it with `apt-get install python3-petsc4py python3-mpi4py` on Debian, with "
     "`conda install -c conda-forge petsc4py mpi4py`, or with `pip install petsc petsc4py`"
 )
+OTHER_NUMPY = "it was made for another NumPy: install 'numpy<2' in this environment"
 NAME = re.compile(r"-[A-Za-z_]\w*")
+NUMBER = re.compile(r"-(\d+\.?\d*|\.\d+)(e[-+]?\d+)?", re.IGNORECASE)
 MEANINGS = {
     55: "PETSc found too little memory; take more ranks or nodes, or an iteration (solver='amg')",
     56: "PETSc cannot do this with these types: {}; change the PETSc options",
@@ -54,9 +54,8 @@ def petsc() -> Any:
         petsc4py.init(["kratos-lite", "-no_signal_handler"])  # not the options of our own command line
         from petsc4py import PETSc
     except (ImportError, ValueError, RuntimeError) as error:
-        raise InputError(
-            f"backend='petsc' needs petsc4py, which does not load ({error}); {_cure(error)}"
-        ) from None
+        cure = INSTALL if "numpy" not in str(error) else OTHER_NUMPY
+        raise InputError(f"backend='petsc' needs petsc4py, which does not load ({error}); {cure}") from None
     if PETSc.ScalarType().dtype.kind != "f":
         raise InputError("petsc4py is one for complex numbers; install one for real numbers")
     atexit.register(_keep_all)
@@ -76,30 +75,9 @@ def _keep_all() -> None:
         one.keep()
 
 
-@lru_cache(maxsize=1)
 def has_mumps() -> bool:
     """Return whether PETSc was made with MUMPS, which factorizes over ranks."""
-    PETSc = petsc()
-    one, pc = np.ones(1), PETSc.PC().create(PETSc.COMM_SELF)
-    pointers = np.array([0, 1], dtype=PETSc.IntType), np.array([0], dtype=PETSc.IntType)
-    A = PETSc.Mat().createAIJ((1, 1), csr=(*pointers, one), comm=PETSc.COMM_SELF)
-    try:
-        pc.setOperators(A)
-        pc.setType("lu")
-        pc.setFactorSolverType("mumps")
-        pc.setUp()
-    except PETSc.Error:
-        return False
-    finally:
-        pc.destroy()
-        A.destroy()
-    return True
-
-
-def _cure(error: BaseException) -> str:
-    if "numpy" in str(error):
-        return "it was made for another NumPy: install 'numpy<2' in this environment"
-    return INSTALL
+    return bool(petsc().Sys.hasExternalPackage("mumps"))
 
 
 def parsed(options: str | None) -> dict[str, str | None]:
@@ -118,7 +96,7 @@ def parsed(options: str | None) -> dict[str, str | None]:
         if NAME.fullmatch(word):
             name = word[1:]
             found[name] = None
-        elif name and found[name] is None and not (word.startswith("-") and not _is_number(word)):
+        elif name and found[name] is None and (not word.startswith("-") or NUMBER.fullmatch(word)):
             found[name] = word
         else:
             raise InputError(
@@ -126,28 +104,6 @@ def parsed(options: str | None) -> dict[str, str | None]:
                 "expected such as '-ksp_type cg -ksp_view'"
             )
     return found
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
-
-
-def set_options(prefix: str, options: Mapping[str, str | None]) -> None:
-    """Give options to PETSc for the objects of a prefix."""
-    known = petsc().Options(prefix)
-    for name, value in options.items():
-        known[name] = value
-
-
-def clear_options(prefix: str, options: Mapping[str, str | None]) -> None:
-    """Take options back, so that they hold for one solution only."""
-    known = petsc().Options(prefix)
-    for name in options:
-        known.delValue(name)
 
 
 def unused(prefix: str, options: Mapping[str, str | None]) -> list[str]:
@@ -170,17 +126,12 @@ def plain_errors() -> Iterator[None]:
     try:
         yield
     except PETSc.Error as error:
-        raise (InputError if error.ierr in OF_OPTIONS else SolveError)(meaning(error)) from None
+        raise (InputError if error.ierr in OF_OPTIONS else SolveError)(_meaning(error)) from None
 
 
-def meaning(error: Any) -> str:
-    """Return what an error of PETSc says, in one sentence."""
-    said = _said(error)
-    return MEANINGS.get(error.ierr, "PETSc stopped with error {code}: {}").format(said, code=error.ierr)
-
-
-def _said(error: Any) -> str:
-    """Return the words of PETSc, the last line that is not a place in its source."""
+def _meaning(error: Any) -> str:
+    """Return what an error of PETSc says, with its last line that is not a place in its source."""
     lines = [line.split("] ", 1)[-1].strip() for line in str(error).splitlines()[1:]]
     words = [line for line in lines if line and not re.search(r"\(\) (line \d+ in|at) ", line)]
-    return words[-1].rstrip(".") if words else "no details"
+    said = words[-1].rstrip(".") if words else "no details"
+    return MEANINGS.get(error.ierr, "PETSc stopped with error {code}: {}").format(said, code=error.ierr)

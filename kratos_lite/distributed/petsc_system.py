@@ -17,12 +17,11 @@ from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.gauss_point_fields import internal_load
 from kratos_lite.distributed.communicator import Alone
 from kratos_lite.distributed.cut import Cut, Part
-from kratos_lite.distributed.equations import Equations, Method
+from kratos_lite.distributed.equations import Equations, Method, Outcome
 from kratos_lite.distributed.krylov import plan_of
 from kratos_lite.distributed.partition import Partition
 from kratos_lite.distributed.petsc import parsed
 from kratos_lite.elements.formulations import bulk_over_shear
-from kratos_lite.errors import SolveError
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.constraints import ConstraintMap
 from kratos_lite.solvers.iteration import MAX_ITERATIONS
@@ -32,13 +31,6 @@ from kratos_lite.typing import Array, Ints, Mask, Progress
 
 PATIENCE = 5 * MAX_ITERATIONS
 """Iterations where nothing else is left, as ν near 0.5 needs many."""
-CURE = (
-    "look for thin elements, nearly free parts or plain elements with ν near 0.5 "
-    "(formulation='non_locking' takes others), or ask for solver='direct'"
-)
-"""What helps where an iteration fails."""
-CURE_OF_FACTORS = "look for nearly free parts or a large stiffness contrast, or take more memory"
-"""What helps where a factorization fails."""
 KEYS = count()
 KEPT: dict[int, Equations] = {}
 """The equations of this rank, by the number of their system."""
@@ -161,30 +153,27 @@ class PetscSolver:
 
     def _solved(self, b: Array, start: Array | None, tolerance: float) -> tuple[Array, Solution]:
         """Solve for b (3a,); a small system whose iteration fails is factorized, unless options are given."""
-        x, name, iterations, error, failure, unused = self._solve(b, start, tolerance)
-        reason = self._plan.reason
-        if failure and self._plan.iterates and not self._options and self._unknowns <= MUMPS_FALLBACK:
+        x, outcome = self._solve(b, start, tolerance)
+        failure, small = outcome.failure, self._unknowns <= MUMPS_FALLBACK
+        if failure and self._plan.iterates and not self._options and small:
             self.destroy()
-            self._plan, reason = Plan("direct", failure), failure
-            x, name, iterations, error, failure, unused = self._solve(b, None, tolerance)
-        if failure:
-            raise SolveError(f"{failure}; {CURE if self._plan.iterates else CURE_OF_FACTORS}")
-        self._system.warnings = unused_words(unused)
-        return x, Solution(x, name, reason, iterations, error)
+            self._plan = Plan("direct", failure)
+            x, outcome = self._solve(b, None, tolerance)
+        solution, self._system.warnings = outcome.solution(x, self._plan)
+        return x, solution
 
-    def _solve(self, b: Array, start: Array | None, tolerance: float) -> Any:
+    def _solve(self, b: Array, start: Array | None, tolerance: float) -> tuple[Array, Outcome]:
         self._assemble()
-        own, forces = self._cut.own, b.reshape(-1, 3)
-        near = None if start is None else start.reshape(-1, 3)
+        own, near = self._cut.own, b if start is None else start
 
         def of_rank(rank: int) -> tuple[Array, Array | None]:
-            return forces[own[rank]], None if near is None else near[own[rank]]
+            forces, first = (vector.reshape(-1, 3)[own[rank]] for vector in (b, near))
+            return forces, None if start is None else first
 
-        parts, *report = self._run(_solve, self._key, tolerance, each=of_rank)
-        x = np.zeros_like(forces)
-        for nodes, values in zip(own, parts, strict=True):
-            x[nodes] = values
-        return x.ravel(), *report
+        parts, outcome = self._run(_solve, self._key, tolerance, each=of_rank)
+        x = np.zeros((len(b) // 3, 3))
+        x[np.concatenate(own)] = np.concatenate(parts)
+        return x.ravel(), outcome
 
     def destroy(self) -> None:
         """Let all ranks release matrix and solver."""
@@ -238,26 +227,16 @@ class PartSystem:
         partition = self._partition
         load = forces - partition.add(internal_load(self._points, self._elastic, prescribed))
         b = np.where(self._held, 0.0, load)[self._rows]
-        x, name, iterations, error, failure = self._equations.solve(b, self._tolerance)
-        if failure:
-            raise SolveError(f"{failure}; {CURE if self.plan.iterates else CURE_OF_FACTORS}")
-        self.warnings = unused_words(self._equations.unused_options())
+        x, outcome = self._equations.solve(b, self._tolerance)
         u = prescribed.copy()
         u[self._rows] += x
         u = np.asarray(partition.fetch(u))
-        return u, Solution(u, name, self.plan.reason, iterations, error)
+        solution, self.warnings = outcome.solution(u, self.plan)
+        return u, solution
 
     def destroy(self) -> None:
         """Release matrix and solver."""
         self._equations.destroy()
-
-
-def unused_words(options: Sequence[str]) -> list[str]:
-    """Return a warning of options that PETSc has not asked for."""
-    if not options:
-        return []
-    words = " ".join(f"-{option}" for option in options)
-    return [f"PETSc has not used these options: {words}; they may be misspelt"]
 
 
 class Postponed:
@@ -288,16 +267,9 @@ def _make(ranks: Alone, key: int, method: Method, given: tuple[Part, Progress | 
 
 
 def _solve(ranks: Alone, key: int, tolerance: float, given: tuple[Array, Array | None]) -> tuple[Any, ...]:
-    x, *report = KEPT[key].solve(given[0], tolerance, given[1])
-    return collected(ranks, x), *report, KEPT[key].unused_options()
+    x, outcome = KEPT[key].solve(given[0], tolerance, given[1])
+    return ranks.collect(x), outcome
 
 
 def _destroy(ranks: Alone, key: int) -> None:
     KEPT.pop(key).destroy()
-
-
-def collected(ranks: Alone, values: Array) -> list[Array]:
-    """Return the values of all ranks on rank 0, an empty list on the others."""
-    nowhere = values[:0]
-    received = ranks.exchange([values] + [nowhere] * (ranks.size - 1))
-    return received if ranks.rank == 0 else []

@@ -50,11 +50,6 @@ class OneProcess:
         self._multigrid = multigrid(K, free.ravel(), points, p_coarse_level(points, groups))
         self._all, self._own = 3 * len(points), own
 
-    @property
-    def sizes(self) -> list[int]:
-        """Unknowns of each level."""
-        return self._multigrid.levels
-
     def precondition(self, r: Array) -> Array:
         """Return one V-cycle on the residual of own unknowns."""
         whole = np.zeros(self._all)

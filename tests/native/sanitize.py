@@ -44,7 +44,7 @@ TESTS = [
 
 def main(kind: str = "memory", *arguments: str) -> int:
     """Build, run, and return the exit code of pytest."""
-    flags, libraries, options = KINDS[kind]
+    flags, libraries, variables = KINDS[kind]
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / ROOT.name
         shutil.copytree(
@@ -53,17 +53,9 @@ def main(kind: str = "memory", *arguments: str) -> int:
         native = copy / "kratos_lite" / "native"
         build(sorted(native.glob("*.cpp")), native, *FLAGS, *flags)
         preload = " ".join(map(library, libraries))
-        environment = {**os.environ, **options, "PYTHONPATH": str(copy), "LD_PRELOAD": preload}
-        command = [
-            sys.executable,
-            "-m",
-            "pytest",
-            "-q",
-            "--capture=sys",
-            "-p",
-            "no:cacheprovider",
-            *(arguments or TESTS),
-        ]
+        environment = {**os.environ, **variables, "PYTHONPATH": str(copy), "LD_PRELOAD": preload}
+        options = ["-q", "--capture=sys", "-p", "no:cacheprovider"]
+        command = [sys.executable, "-m", "pytest", *options, *(arguments or TESTS)]
         return subprocess.run(command, cwd=copy, env=environment, check=False).returncode
 
 

@@ -6,10 +6,11 @@ import sys
 
 import numpy as np
 import pytest
+from computing import compiled
 
 from kratos_lite.native import kernels
 
-pytestmark = pytest.mark.skipif(kernels("sparse") is None, reason="the compiled kernels were not built")
+pytestmark = compiled
 
 
 def diagonal(n=4):

@@ -136,19 +136,8 @@ int main() {
 def test_rows_are_united_in_memory_that_grows_with_them(tmp_path):
     source = tmp_path / "count.cpp"
     source.write_text(COUNT)
-    command = [
-        "g++",
-        "-std=c++17",
-        "-O1",
-        f"-I{NATIVE}",
-        "-pthread",
-        str(source),
-        "-o",
-        str(tmp_path / "count"),
-    ]
-    subprocess.run(command, check=True)
+    flags = ["-std=c++17", "-O1", "-pthread", f"-I{NATIVE}"]
+    subprocess.run(["g++", *flags, source, "-o", tmp_path / "count"], check=True)
     done = subprocess.run([tmp_path / "count"], capture_output=True, text=True, check=True)
     less, more = map(int, done.stdout.split())
-    assert (
-        more < 6 * less
-    )  # of four times as many rows; 16 times, where each piece of work clears all columns
+    assert more < 6 * less  # of four times as many rows; 16 times, where each task clears all columns
