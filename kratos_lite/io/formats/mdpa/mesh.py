@@ -58,7 +58,9 @@ def _read_nodes(source: Source, frames: list[Frame]) -> Mesh:
     for row, text, is_same in repeated_nodes(ids, points, lines):
         keep[row] = False
         (source.note_in_line if is_same else source.problem_in_line)(text, int(lines[row]))
-    return Mesh(points[keep], node_ids=ids[keep], source=source.name)
+    if not keep.all():
+        points, ids = points[keep], ids[keep]
+    return Mesh(points, node_ids=ids, source=source.name)
 
 
 def read_blocks(source: Source, frames: list[Frame], mesh: Mesh) -> list[Block]:
