@@ -14,6 +14,8 @@ from kratos_lite.analysis.integrators import Bossak as Bossak
 from kratos_lite.analysis.integrators import CentralDifference as CentralDifference
 from kratos_lite.analysis.integrators import GeneralizedAlpha as GeneralizedAlpha
 from kratos_lite.analysis.integrators import Newmark as Newmark
+from kratos_lite.analysis.material_point import MaterialPath as MaterialPath
+from kratos_lite.analysis.material_point import material_point as material_point
 from kratos_lite.analysis.matrices import LocalSystem as LocalSystem
 from kratos_lite.analysis.matrices import Matrices as Matrices
 from kratos_lite.analysis.modal import critical_rate as critical_rate
@@ -28,6 +30,7 @@ from kratos_lite.analysis.quantities import MeanDisplacement as MeanDisplacement
 from kratos_lite.analysis.quantities import Quantity as Quantity
 from kratos_lite.analysis.quantities import ReactionOf as ReactionOf
 from kratos_lite.analysis.quantities import StressAt as StressAt
+from kratos_lite.analysis.quasi_static import QuasiStaticAnalysis as QuasiStaticAnalysis
 from kratos_lite.analysis.result import Result as Result
 from kratos_lite.analysis.state import State as State
 from kratos_lite.analysis.stepping import integrate as integrate
@@ -90,8 +93,17 @@ from kratos_lite.io.writers.series import SeriesWriter as SeriesWriter
 from kratos_lite.io.writers.state import read_state as read_state
 from kratos_lite.materials import MATERIALS as MATERIALS
 from kratos_lite.materials import LinearMaterial as LinearMaterial
+from kratos_lite.materials import Material as Material
+from kratos_lite.materials.drucker_prager3d import DruckerPrager3D as DruckerPrager3D
+from kratos_lite.materials.generalized_maxwell3d import GeneralizedMaxwell3D as GeneralizedMaxwell3D
 from kratos_lite.materials.isotropic3d import Isotropic3D as Isotropic3D
+from kratos_lite.materials.isotropic_damage3d import IsotropicDamage3D as IsotropicDamage3D
+from kratos_lite.materials.j2_plasticity3d import J2Plasticity3D as J2Plasticity3D
+from kratos_lite.materials.mooney_rivlin3d import MooneyRivlin3D as MooneyRivlin3D
+from kratos_lite.materials.neo_hookean3d import NeoHookean3D as NeoHookean3D
+from kratos_lite.materials.ogden3d import Ogden3D as Ogden3D
 from kratos_lite.materials.orthotropic3d import Orthotropic3D as Orthotropic3D
+from kratos_lite.materials.saint_venant_kirchhoff3d import SaintVenantKirchhoff3D as SaintVenantKirchhoff3D
 from kratos_lite.mesh import Block as Block
 from kratos_lite.mesh import Mesh as Mesh
 from kratos_lite.mesh import Part as Part

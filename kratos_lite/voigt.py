@@ -16,6 +16,12 @@ PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
 """Tensor indices of the six components."""
 HALF_SHEAR = np.array([1, 1, 1, 0.5, 0.5, 0.5])
 """Factors from engineering strains to the components of the tensor."""
+SHEAR_TWICE = 1 / HALF_SHEAR
+"""Factors from the components of a tensor to engineering strains; how often each counts in a product."""
+UNIT = np.array([1.0, 1, 1, 0, 0, 0])
+"""The unit tensor."""
+DEVIATOR = np.diag(HALF_SHEAR) - np.outer(UNIT, UNIT) / 3
+"""Engineering strains to the components of the deviator (6, 6)."""
 
 
 def tensor(stress: ArrayLike) -> Array:
@@ -29,6 +35,20 @@ def vector(stress: ArrayLike) -> Array:
     t = np.asarray(stress, dtype=float)
     i, j = np.array(PAIRS).T
     return t[..., i, j]
+
+
+def determinant(a: Array) -> Array:
+    """Return the determinant (...) of a symmetric tensor (..., 6)."""
+    xx, yy, zz, xy, yz, zx = np.moveaxis(a, -1, 0)
+    return np.asarray(xx * (yy * zz - yz**2) - xy * (xy * zz - yz * zx) + zx * (xy * yz - yy * zx))
+
+
+def inverse(a: Array) -> Array:
+    """Return the inverse (..., 6) of a symmetric tensor (..., 6)."""
+    xx, yy, zz, xy, yz, zx = np.moveaxis(a, -1, 0)
+    normal = yy * zz - yz**2, zz * xx - zx**2, xx * yy - xy**2
+    shear = yz * zx - xy * zz, zx * xy - yz * xx, xy * yz - zx * yy
+    return np.stack([*normal, *shear], axis=-1) / determinant(a)[..., None]
 
 
 def acoustic_tensor(C: Array, direction: Array) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.elements.surface import area_vectors, face_rule, surface_mass
 from kratos_lite.errors import ModelError
-from kratos_lite.materials import LinearMaterial
+from kratos_lite.materials import Material
 from kratos_lite.mesh import Mesh
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.typing import Array, Ints, Mask
@@ -77,7 +77,7 @@ def dashpots(mesh: Mesh, direction: Array, system: ConstrainedSystem, moving: Ma
     return BlockMatrix(data, pattern.indices, pattern.indptr)
 
 
-def impedance(material: LinearMaterial, direction: Array) -> Array:
+def impedance(material: Material, direction: Array) -> Array:
     """Return √(ρ Γ) (3, 3) in N s/m³, Γ the acoustic tensor of plane waves along a unit direction."""
     squares, ways = np.linalg.eigh(acoustic_tensor(material.C, direction))
     return np.asarray((ways * np.sqrt(material.density * squares)) @ ways.T)

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from kratos_lite.analysis.matrices import LocalSystem, Matrices
     from kratos_lite.analysis.quantities import Quantity
+    from kratos_lite.analysis.quasi_static import QuasiStaticAnalysis
     from kratos_lite.analysis.transient import TransientAnalysis
 
 
@@ -112,6 +113,11 @@ class Model(Structure):
 
                 check_own(backend, petsc, "a motion of the material")
                 return solve_steady(self, solver, tolerance, shown)
+            if self.is_nonlinear:
+                from kratos_lite.analysis.quasi_static import solve_nonlinear  # as above
+
+                check_own(backend, petsc, "a law that is not linear")
+                return solve_nonlinear(self, tolerance, shown)
             analysis = StaticAnalysis(self, solver, tolerance, shown, backend=backend, petsc=petsc)
             try:
                 return analysis.solve()
@@ -238,6 +244,22 @@ class Model(Structure):
         from kratos_lite.analysis.transient import TransientAnalysis
 
         return TransientAnalysis(self, **options)
+
+    def quasi_static(self, **options: Any) -> QuasiStaticAnalysis:
+        """Return the quasi-static analysis of the model: its loads grow in a pseudo-time.
+
+        Parameters
+        ----------
+        options : those of `QuasiStaticAnalysis`, with the same errors.
+
+        Returns
+        -------
+        QuasiStaticAnalysis
+            ``kl.integrate(model.quasi_static(), dt=0.1, steps=10)`` takes its steps.
+        """
+        from kratos_lite.analysis.quasi_static import QuasiStaticAnalysis
+
+        return QuasiStaticAnalysis(self, **options)
 
     def modes(
         self, count: int = 6, *, lumped: bool = False, progress: Progress | None = None

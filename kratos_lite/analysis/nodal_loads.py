@@ -41,8 +41,15 @@ def stress_load(model: Structure, groups: Sequence[ElementGroup], u: Array) -> A
 class AppliedLoads:
     """The nodal forces of the loads of a structure at a time; what does not change is made once."""
 
-    def __init__(self, model: Structure, system: ConstrainedSystem, groups: list[ElementGroup]) -> None:
+    def __init__(
+        self,
+        model: Structure,
+        system: ConstrainedSystem,
+        groups: list[ElementGroup],
+        initial: bool = True,
+    ) -> None:
         self.model, self.system, self._groups = model, system, groups
+        self._initial = initial  # whether the initial stress is a load, as where stresses are C ε alone
 
     def __call__(self, time: float) -> Array:
         """Return the nodal forces (3a,) in N at a time in s."""
@@ -61,7 +68,7 @@ class AppliedLoads:
     @cached_property
     def _constant(self) -> Array:
         total = np.zeros(3 * len(self.system.nodes))
-        initial = initial_loads(self.model, self._groups)
+        initial = initial_loads(self.model, self._groups) if self._initial else None
         if initial is not None:
             total -= self.system.gather(initial)
         for load in self.model.loads:

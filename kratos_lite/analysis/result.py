@@ -248,6 +248,7 @@ class Result(ElementFields, Tabular):
         >>> 0.05 < result.error().relative < 0.3
         True
         """
+        self._check_linear()
         if of is None:
             return self._error
         analysis = self._analysis
@@ -264,6 +265,14 @@ class Result(ElementFields, Tabular):
         quantity = instance(of, "of", Quantity, "kl.DisplacementAt((1, 0, 0), 'z')")
         fixed = analysis.model.supports.fixed
         return error_of(self, quantity, analysis.adjoint, fixed, self._strained, self._recovery)
+
+    def _check_linear(self) -> None:
+        """Raise InputError where a law is not linear, as the estimate is one of linear elasticity."""
+        if laws := sorted({type(g.material).__name__ for g in self.groups if not g.is_linear}):
+            raise InputError(
+                f"the estimate of the error is one of linear elasticity, and {', '.join(laws)} is not linear "
+                "here; compare with a finer mesh: kl.compare(coarse, fine)"
+            )
 
     @cached_property
     def _error(self) -> ErrorEstimate:

@@ -10,6 +10,7 @@ from math import ceil, inf
 import numpy as np
 
 from kratos_lite.analysis.integrators import body_integrator
+from kratos_lite.analysis.quasi_static import QuasiStaticAnalysis
 from kratos_lite.analysis.state import State, state_of_body
 from kratos_lite.analysis.transient import TransientAnalysis
 from kratos_lite.bodies.batched import batch
@@ -26,7 +27,7 @@ MOST_SUBSTEPS = 1_000_000  # parts of one step; more would take the time of a wh
 
 
 def integrate(
-    subject: Body | Sequence[Body] | TransientAnalysis,
+    subject: Body | Sequence[Body] | TransientAnalysis | QuasiStaticAnalysis,
     dt: float,
     steps: int | None = None,
     *,
@@ -43,7 +44,8 @@ def integrate(
     Parameters
     ----------
     subject : one body; one object that holds a batch of bodies; a sequence of rigid or
-        pseudo-rigid bodies, advanced together on arrays; or a model in time, `Model.transient()`.
+        pseudo-rigid bodies, advanced together on arrays; or a model in time, `Model.transient()` or
+        `Model.quasi_static()`.
     dt : step in s, > 0.
     steps : number of steps; if not given, until the loop is left or `until` returns true.
     every : output interval in steps; the state after the last step is always yielded.
@@ -81,7 +83,9 @@ def integrate(
     if until is not None and not takes(until, 1):
         raise InputError(f"until must be a function of a state; got {short(until)}")
     function_or_none(progress, "progress must be a function of a phase and a fraction")
-    stepper = subject if isinstance(subject, TransientAnalysis) else BodyStepper(subject)
+    stepper = (
+        subject if isinstance(subject, (TransientAnalysis, QuasiStaticAnalysis)) else BodyStepper(subject)
+    )
     parts = 1 if substeps == "auto" else whole_number(substeps, "substeps", ", or 'auto'")
     if substeps == "auto":
         critical = stepper.critical_step()
@@ -97,7 +101,7 @@ def integrate(
 
 
 def _states(
-    stepper: BodyStepper | TransientAnalysis,
+    stepper: BodyStepper | TransientAnalysis | QuasiStaticAnalysis,
     h: float,
     count: int | None,
     every: int,
@@ -125,7 +129,7 @@ def _states(
                 return
 
 
-def _divergence(stepper: BodyStepper | TransientAnalysis, h: float) -> SolveError:
+def _divergence(stepper: BodyStepper | TransientAnalysis | QuasiStaticAnalysis, h: float) -> SolveError:
     with np.errstate(over="ignore", invalid="ignore"):
         state = stepper.state()
     return SolveError(

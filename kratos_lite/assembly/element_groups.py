@@ -19,10 +19,10 @@ from kratos_lite.elements.exact_rules import (
     geometries,
     interpolations,
 )
-from kratos_lite.elements.formulations import element_of
+from kratos_lite.elements.formulations import NON_LOCKING, element_of, formulations_of
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import InputError, MeshError, ModelError
-from kratos_lite.materials import LinearMaterial
+from kratos_lite.materials import Material
 from kratos_lite.mesh import Block, Mesh, with_rows
 from kratos_lite.native import kernels
 from kratos_lite.quadrature import Rule, by_order, rule_for
@@ -47,18 +47,39 @@ def as_double(values: Any) -> Array:
 
 
 @dataclass(eq=False)
+class PointStates:
+    """What a nonlinear law has at the Gauss points (m, g) of a group, at the end of a step."""
+
+    stress: Array  # (m, g, 6) Pa; the second Piola–Kirchhoff stress of finite strains
+    variables: dict[str, Array]  # internal variables (m, g, size)
+    modes: Array | None = None  # (m, 21), amplitudes of enhanced strains
+
+    def take(self, chosen: Any) -> PointStates:
+        """Return those of some elements, a mask (m,) or a slice."""
+        variables = {name: values[chosen] for name, values in self.variables.items()}
+        modes = None if self.modes is None else self.modes[chosen]
+        return PointStates(self.stress[chosen], variables, modes)
+
+
+@dataclass(eq=False)
 class ElementGroup:
     """Elements that share class, rule and material."""
 
     element: type[KinematicLinear]
     rule: Rule
-    material: LinearMaterial
+    material: Material
     nodes: Rows  # (m, k) int, indices of the points
     rows: Ints  # (m,) int, indices of the elements in the mesh
     prestress: Array | None = None  # (m, 6) float in Pa, or None
+    states: PointStates | None = None  # of a result, where the law is not linear
 
     def __len__(self) -> int:
         return len(self.rows)
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether stresses and forces are linear in the displacements."""
+        return self.material.is_linear and not self.element.finite
 
     @property
     def is_proven(self) -> bool:
@@ -98,7 +119,10 @@ class ElementGroup:
         if chosen.all():
             return self
         stress = None if self.prestress is None else self.prestress[chosen]
-        return replace(self, nodes=self.nodes[chosen], rows=self.rows[chosen], prestress=stress)
+        states = self.states and self.states.take(chosen)
+        return replace(
+            self, nodes=self.nodes[chosen], rows=self.rows[chosen], prestress=stress, states=states
+        )
 
     def chunks(self, memory: int = CHUNK_BYTES, within: slice | None = None) -> Iterator[slice]:
         """Cut the group, or a slice of it, into slices whose matrices take about `memory` bytes each."""
@@ -149,7 +173,7 @@ def add_nodal(total: Array, nodes: Numbers, values: Array) -> None:
 
 def element_groups_of(
     mesh: Mesh,
-    materials: Sequence[LinearMaterial],
+    materials: Sequence[Material],
     material_of: Ints,
     rules: Mapping[int, Rule | int],
     rule_of: Ints,
@@ -167,7 +191,7 @@ def element_groups_of(
             continue
         element_class(mesh, block)
         for material, rule, cells in _alike(mesh, block, material_of[at], rule_of[at]):
-            element = element_of(block.name, formulation, materials[material].C, unnamed)
+            element = _element_for(mesh, block, materials[material], formulation, unnamed)
             rows = at.start + cells
             other = rules.get(rule)
             proven = other is None and is_builtin(element)
@@ -178,6 +202,31 @@ def element_groups_of(
     if mesh.whole and not groups:
         raise ModelError("the model has no elements; nothing can be solved")
     return groups
+
+
+def _element_for(
+    mesh: Mesh, block: Block, material: Material, formulation: str | None, unnamed: str
+) -> type[KinematicLinear]:
+    """Return the element class of a block with a material; plastic flow and large strains choose theirs."""
+    finite = material.strain_measure == "finite"
+    if finite or not material.is_linear:
+        word = "total_lagrangian" if finite else "b_bar"
+        if word == "b_bar" and word not in formulations_of(element_class(mesh, block).shape):
+            word = "standard"
+        formulation = word if formulation == NON_LOCKING else formulation
+        unnamed = word if unnamed == NON_LOCKING else unnamed
+    element = element_of(block.name, formulation, material.C, unnamed)
+    if finite and not element.finite:
+        raise ModelError(
+            f"{mesh.place(block, 0)}: {type(material).__name__} is a law of finite strains, and "
+            f"{element.__name__} has small ones; take Model(…, formulation='total_lagrangian')"
+        )
+    if not material.is_linear and "local_system" in element.custom:
+        raise ModelError(
+            f"{mesh.place(block, 0)}: {element.__name__} has a local system of its own, which is linear; "
+            f"{type(material).__name__} needs an element with a B"
+        )
+    return element
 
 
 def group_of_element(mesh: Mesh, groups: Sequence[ElementGroup], id: int) -> ElementGroup:

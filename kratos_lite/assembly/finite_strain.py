@@ -58,7 +58,7 @@ def internal_load(
 ) -> Array:
     """Return ∫ P grad N dV as nodal forces (n, 3) in N."""
     total = np.zeros_like(points)
-    for group in groups:
+    for group in filter(len, groups):
         if module := _compiled(group):
             total += module.internal_load(*_arguments(points, group, q, dq, damping))
             continue
@@ -93,6 +93,8 @@ def stiffness(
     """
     data = np.zeros((len(pattern.indices), 3, 3))
     for number, group in enumerate(groups):
+        if not len(group):
+            continue
         if module := _compiled(group):
             arguments = _arguments(points, group, q, dq, damping)
             module.add_stiffness(*arguments, pattern.indptr, pattern.indices, data)

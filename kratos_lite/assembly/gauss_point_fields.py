@@ -13,7 +13,8 @@ import numpy as np
 
 from kratos_lite import voigt
 from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, as_double, by_mass_rule, compiled
-from kratos_lite.elements import KinematicLinear, custom
+from kratos_lite.elements import KinematicLinear, custom, tables
+from kratos_lite.elements import total_lagrangian as lagrange
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.typing import Array, Ints, Mask, Rows
 
@@ -87,6 +88,8 @@ def body_force_by_function(
 
 def at_gauss(points: Array, group: ElementGroup, u: Array, *, stress: bool = True) -> Array:
     """Return stresses in Pa with prestress, or strains, (m, g, 6) of displacements u (n, 3) in m."""
+    if not group.is_linear:
+        return strain_and_stress(points, group, u)[stress]
     if module := compiled("gauss", group.element):
         return module.stress(*displaced(points, group, u, stress))
     parts = [value_at(group.at(points, chunk), group, u, chunk, stress) for chunk in group.chunks()]
@@ -153,7 +156,9 @@ def totals(points: Array, groups: Sequence[ElementGroup], u: Array) -> tuple[flo
     """Return strain energy in J, largest von Mises stress at a Gauss point in Pa, index of its element."""
     energy, largest, row = 0.0, 0.0, 0
     for group in groups:
-        if module := compiled("gauss", group.element):
+        if not group.is_linear:
+            parts = [totals_of(points, group, u)]
+        elif module := compiled("gauss", group.element):
             parts = [module.totals(*displaced(points, group, u))]
         else:
             parts = [_totals(points, group, u, chunk) for chunk in group.chunks()]
@@ -174,3 +179,35 @@ def _totals(points: Array, group: ElementGroup, u: Array, chunk: slice) -> tuple
         energy = float((custom.system(element, C, displacements)[1] * displacements).sum()) / 2
     mises = voigt.von_mises(elastic + group.initial_stress(chunk)).max(axis=1)
     return energy, float(mises.max()), chunk.start + int(mises.argmax())
+
+
+# ---- laws and strains that are not linear -----------------------------------------------------------------
+
+
+def strain_and_stress(points: Array, group: ElementGroup, u: Array) -> tuple[Array, Array]:
+    """Return strains and Cauchy stresses (m, g, 6) of a group with states, at the u (n, 3) of its result."""
+    strains, stresses = np.zeros((2, len(group), len(group.rule), 6))
+    for chunk in group.chunks():
+        element, q, C = group.at(points, chunk), u[group.nodes[chunk]], group.material.C
+        large = element.finite
+        strain = lagrange.green_strain(element, q) if large else element.strain(q, C)
+        if group.states is not None:
+            stress = group.states.stress[chunk]
+        else:
+            stress = strain @ C.T + group.initial_stress(chunk)
+        strains[chunk], stresses[chunk] = strain, stress
+        if large:
+            F = np.eye(3) + lagrange.displacement_gradient(element, q)
+            J = tables.determinant(F)[..., None, None]
+            stresses[chunk] = voigt.vector(F @ voigt.tensor(stress) @ np.swapaxes(F, -1, -2) / J)
+    return strains, stresses
+
+
+def totals_of(points: Array, group: ElementGroup, u: Array) -> tuple[float, float, int]:
+    """Return stored energy in J, largest von Mises stress in Pa and its element of a group with states."""
+    strain, stress = strain_and_stress(points, group, u)
+    law, states = group.material, group.states
+    given = (strain @ law.C.T, {}) if states is None else (states.stress, states.variables)
+    mises = voigt.von_mises(stress).max(axis=1)
+    energy = float((law.energy(strain, *given) * volumes(points, group)).sum())
+    return energy, float(mises.max()), int(mises.argmax())

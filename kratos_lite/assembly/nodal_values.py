@@ -8,7 +8,7 @@ import numpy as np
 
 from kratos_lite import voigt
 from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, as_double, compiled
-from kratos_lite.assembly.gauss_point_fields import at_gauss, displaced, value_at
+from kratos_lite.assembly.gauss_point_fields import at_gauss, displaced, value_at, volumes
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.tables import cofactors, determinant
 from kratos_lite.mesh.locate import Located
@@ -56,6 +56,11 @@ def averages(
 def _averages(points: Array, group: ElementGroup, u: Array, stress: bool) -> tuple[Array, Array]:
     """Return the sums of the nodal values (n, 6) of a group and the means of its elements (m, 6)."""
     to_nodes = as_double(extrapolation(group.element, group.rule))
+    if not group.is_linear:
+        value, volume = at_gauss(points, group, u, stress=stress), volumes(points, group)
+        nodal = np.zeros((len(points), 6))
+        add_nodal(nodal, group.nodes, to_nodes @ value)
+        return nodal, np.einsum("mg,mgc->mc", volume / volume.sum(axis=1, keepdims=True), value)
     if module := compiled("gauss", group.element):
         nodal, mean = module.averages(*displaced(points, group, u, stress), to_nodes)
         return nodal, mean
@@ -83,6 +88,12 @@ def at_located(groups: Sequence[ElementGroup], located: Located, u: Array, *, st
             continue
         cells = number[rows[at]]
         X, displaced = (values[group.nodes[cells]] for values in (located.mesh.points, u))
+        if not group.is_linear:
+            chosen = group.take(np.isin(np.arange(len(group)), cells))
+            places = np.searchsorted(np.flatnonzero(np.isin(np.arange(len(group)), cells)), cells)
+            raw = extrapolated(located.mesh.points, chosen, u, stress=stress)[places]
+            out[at] = np.einsum("ck,ckj->cj", group.element.N(xi[at]), raw)
+            continue
         value = _strain(group, X, xi[at], displaced)
         if stress:
             value = value @ group.material.C.T

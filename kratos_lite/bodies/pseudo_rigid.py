@@ -18,7 +18,7 @@ from kratos_lite.bodies.rotations import axial, hat
 from kratos_lite.bodies.validation import Material, mass_properties_of
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh
-from kratos_lite.model.checks import checked_material
+from kratos_lite.model.checks import checked_linear_material
 from kratos_lite.model.mass_properties import MassProperties
 from kratos_lite.typing import Array, Ints
 from kratos_lite.voigt import PAIRS, tensor
@@ -70,7 +70,7 @@ class PseudoRigidBody(AffineBody, Deformable):
             if len(material) != 1:
                 raise InputError("a pseudo-rigid body is of one material; FiniteElementBody takes several")
             (material,) = material.values()
-        material = checked_material(material)
+        material = checked_linear_material(material)
         self.mass_is_given = mass_properties is not None
         if mass_properties is None:
             if mesh is None:

@@ -13,7 +13,7 @@ from kratos_lite.elements.formulations import NON_LOCKING
 from kratos_lite.errors import InputError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Mesh
-from kratos_lite.model.checks import checked_material
+from kratos_lite.model.checks import checked_linear_material
 from kratos_lite.model.mass_properties import MassProperties
 from kratos_lite.model.spurious_modes import check_rules, check_spurious_modes
 from kratos_lite.model.structure import Structure
@@ -25,7 +25,9 @@ Material: TypeAlias = "LinearMaterial | Mapping[Any, LinearMaterial]"
 
 def elements_of(mesh: Mesh, material: Material, unnamed: str = NON_LOCKING) -> list[ElementGroup]:
     """Return the elements of a mesh with their material; MeshError or ModelError if they are broken."""
-    structure = Structure(mesh, material if isinstance(material, Mapping) else checked_material(material))
+    for law in material.values() if isinstance(material, Mapping) else [material]:
+        checked_linear_material(law)
+    structure = Structure(mesh, material)
     structure.check_geometry()
     groups = structure.element_groups(unnamed)
     check_rules(mesh, groups)

@@ -13,7 +13,7 @@ from kratos_lite.errors import InputError, nearest
 
 if TYPE_CHECKING:
     from kratos_lite.analysis.integrators import ModelIntegrator
-    from kratos_lite.materials import LinearMaterial
+    from kratos_lite.materials import Material
 
 LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254, "ft": 0.3048}
 """Units of length in m."""
@@ -129,7 +129,7 @@ def integrator(text: str) -> ModelIntegrator:
     return kind(*constants)
 
 
-def material(text: str) -> tuple[str | None, LinearMaterial]:
+def material(text: str) -> tuple[str | None, Material]:
     """Return part (or None) and material of ``[PART:][LAW:]constant=value,…``.
 
     >>> material("steel:E=210e9,nu=0.3")

@@ -13,3 +13,7 @@ _FILES = [file.removesuffix("n.py").split("_3d") for file in os.listdir(__path__
 for _family, _nodes in sorted(_FILES, key=lambda words: (words[0], int(words[1]))):
     _name = f"{_family.title().replace('_', '')}3D{_nodes}N"
     ELEMENTS.expect(_name, f"{__name__}.{_family}_3d{_nodes}n", same_names(_name))
+for _count in (4, 5, 6, 8, 10, 13, 15, 20, 27):
+    _name = f"TotalLagrangianElement3D{_count}N"
+    _alias = _name.replace("Total", "Updated")
+    ELEMENTS.expect(_name, f"{__name__}.total_lagrangian_elements", [_alias])

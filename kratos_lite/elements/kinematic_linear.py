@@ -33,8 +33,6 @@ ELEMENTS: Registry[type[KinematicLinear]] = Registry("element")
 SAME_ELEMENT = (
     "SmallDisplacementElement",
     "TotalLagrangian",
-    "TotalLagrangianElement",
-    "UpdatedLagrangianElement",
     "Element",
 )
 """Prefixes of element names in files that are solved as KinematicLinear."""
@@ -66,9 +64,10 @@ class KinematicLinear(CellMass):
     Notes
     -----
     A subclass states `shape` and `rule`; it may state a `mass_rule` in place of exact rules for the mass, its
-    `formulation`, a word, and how many `spurious_modes` (modes without energy beside the rigid ones) one
-    element alone has.  It may override `B`, from which all else follows, or `local_system`; nothing else.
-    These take one element, X (n, 3), unless the class that defines them states ``batched = True``.
+    `formulation`, a word, whether it is total Lagrangian (`finite`), and how many `spurious_modes` (modes
+    without energy beside the rigid ones) one element alone has.  It may override `B`, from which all else
+    follows, or `local_system`; nothing else.  These take one element, X (n, 3), unless the class that defines
+    them states ``batched = True``.
     Voigt rows are xx yy zz xy yz zx with engineering shear; dof = 3·node + axis.
 
     Examples
@@ -83,6 +82,7 @@ class KinematicLinear(CellMass):
     aliases: ClassVar[tuple[str, ...]] = ()
     formulation: ClassVar[str] = "standard"
     spurious_modes: ClassVar[int] = 0
+    finite: ClassVar[bool] = False
     batched: ClassVar[bool] = False
     custom: ClassVar[frozenset[str]] = frozenset()
 

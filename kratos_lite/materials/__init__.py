@@ -5,10 +5,12 @@ The file ``isotropic3d.py`` holds the class ``Isotropic3D``.
 
 import os
 
-from kratos_lite.materials.base import MATERIALS, LinearMaterial
+from kratos_lite.materials.base import LinearMaterial
+from kratos_lite.materials.material import MATERIALS, Material
 
-__all__ = ["MATERIALS", "LinearMaterial"]
+__all__ = ["MATERIALS", "LinearMaterial", "Material"]
 
 for _file in sorted(os.listdir(__path__[0])):
     if _file.endswith("3d.py"):
-        MATERIALS.expect(f"{_file[:-5].title()}3D", f"{__name__}.{_file[:-3]}")
+        _name = _file[:-5].title().replace("_", "")
+        MATERIALS.expect(f"{_name}3D", f"{__name__}.{_file[:-3]}")

@@ -3,37 +3,30 @@
 from __future__ import annotations
 
 from functools import cached_property
-from sys import float_info
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from kratos_lite.errors import InputError, MaterialError
-from kratos_lite.registry import Registry
-from kratos_lite.tabular import names_of
+from kratos_lite.materials.material import MATERIALS, GaussState, Material, Response
 from kratos_lite.typing import Array
 from kratos_lite.validation import finite
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-MAX_FLOAT = float_info.max
-
-MATERIALS: Registry[type[LinearMaterial]] = Registry("material")
-"""Every material by its class name and by the names of Kratos."""
+__all__ = ["MATERIALS", "LinearMaterial"]
 
 
-class LinearMaterial:
+class LinearMaterial(Material, family=True):
     """A linear elastic material: stress = C strain in Voigt order xx yy zz xy yz zx.
 
     A subclass is a frozen dataclass of its constants that defines `compliance` (or overrides
-    `elasticity`); it registers itself under its class name and its `aliases`.
+    `elasticity`).
 
     Attributes
     ----------
-    density : kg/m³, ≥ 0.
-    aliases : further names, such as those of Kratos' constitutive laws.
-    variables : field name → name of the variable in `.mdpa` and JSON files.
+    density, aliases, variables : as of `Material`.
 
     Raises
     ------
@@ -42,37 +35,16 @@ class LinearMaterial:
         positive definite.
     """
 
-    density: float
-    aliases: ClassVar[tuple[str, ...]] = ()
-    variables: ClassVar[dict[str, str]] = {"density": "DENSITY"}
+    is_linear: ClassVar[bool] = True
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
+        for name in ("stress", "response"):
+            if getattr(cls, name) is not getattr(LinearMaterial, name):
+                raise MaterialError(
+                    f"{cls.__name__} overrides {name}, but a LinearMaterial has stress = C strain; override "
+                    "compliance() or elasticity(), which gives C, or write a kl.Material with a response"
+                )
         super().__init_subclass__(**kwargs)
-        if cls.stress is not LinearMaterial.stress:
-            raise MaterialError(
-                f"{cls.__name__} overrides stress, which is C strain, as materials are linear; override "
-                "compliance() or elasticity(), which gives C"
-            )
-        MATERIALS.add(cls.__name__, cls, cls.__dict__.get("aliases", ()))
-
-    def __post_init__(self) -> None:
-        for name in names_of(type(self)):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
-                raise MaterialError(f"{self._name(name)} must be a number; got {value!r}")
-            size: Any = abs(value)
-            if not size <= MAX_FLOAT:
-                raise MaterialError(f"{self._name(name)} must be finite; got {value}")
-        if self.density < 0:
-            raise MaterialError(
-                f"{self._name('density')} {self.density:g} must be ≥ 0 kg/m³; reverse gravity instead"
-            )
-        self.check()
-
-    @classmethod
-    def _name(cls, field: str) -> str:
-        variable = cls.variables.get(field)
-        return f"{field} ({variable})" if variable else field
 
     def check(self) -> None:
         """Check that C is symmetric and positive definite; subclasses check their own bounds here.
@@ -150,27 +122,6 @@ class LinearMaterial:
             raise InputError(f"a strain has six components xx yy zz xy yz zx; got shape {e.shape}")
         return e @ self.C.T
 
-    @classmethod
-    def from_variables(cls, values: dict[str, Any]) -> LinearMaterial:
-        """Make the material from the variables of a file, such as YOUNG_MODULUS.
-
-        Parameters
-        ----------
-        values : variables by name; the density may be missing and is 0 then.
-
-        Returns
-        -------
-        LinearMaterial
-
-        Raises
-        ------
-        MaterialError
-            If a variable is missing or outside its bounds.
-        """
-        constants = {field: values[name] for field, name in cls.variables.items() if name in values}
-        needed = {name for name in names_of(cls) if name != "density"}
-        absent = sorted(needed - constants.keys())
-        missing = [f"{field} ({cls.variables.get(field, field)})" for field in absent]
-        if missing:
-            raise MaterialError(f"{cls.__name__} needs {', '.join(missing)}")
-        return cls(**constants)
+    def response(self, strain: Array, state: GaussState, dt: float) -> Response:
+        """Return C strain, C and no internal variables; a class that overrides this is refused."""
+        return strain @ self.C.T, self.C, {}

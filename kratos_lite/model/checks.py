@@ -14,7 +14,7 @@ from kratos_lite.assembly.gauss_point_fields import clearly_positive, volumes
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.tables import gradients_at_nodes, tabulate
 from kratos_lite.errors import MAX_PROBLEMS, MeshError, ModelError, Problems, SolveError
-from kratos_lite.materials import LinearMaterial
+from kratos_lite.materials import LinearMaterial, Material
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.model.loads import Load
 from kratos_lite.model.loads.body import Gravity
@@ -38,9 +38,14 @@ LOADS_ON_SUPPORTS = "all loads act on fixed components, so nothing moves"
 """The warning of loads that only supports carry."""
 
 
-def checked_material(material: object) -> LinearMaterial:
+def checked_linear_material(material: object) -> LinearMaterial:
+    """Return a linear material, which bodies need; InputError if it is none."""
+    return instance(checked_material(material), "a linear material", LinearMaterial, "kl.Isotropic3D(…)")
+
+
+def checked_material(material: object) -> Material:
     """Return a material; InputError if it is not a material."""
-    return instance(material, "a material", LinearMaterial, "kl.Isotropic3D(E=210e9, nu=0.3)")
+    return instance(material, "a material", Material, "kl.Isotropic3D(E=210e9, nu=0.3)")
 
 
 def check_geometry(mesh: Mesh, formulation: str | None = None) -> list[str]:
@@ -144,7 +149,7 @@ def check_nodes(mesh: Mesh) -> Iterator[str]:
         yield f"{len(unused)} nodes belong to no element and carry no equations: {shown}"
 
 
-def check_wave_speeds(materials: Iterable[LinearMaterial]) -> list[str]:
+def check_wave_speeds(materials: Iterable[Material]) -> list[str]:
     """Warn where the speed of waves sqrt(E/ρ) says that E and ρ can hardly both be in SI units."""
     speeds = {
         str(material): float(np.sqrt(young_moduli(material)[1]) / np.sqrt(material.density))
@@ -159,7 +164,7 @@ def check_wave_speeds(materials: Iterable[LinearMaterial]) -> list[str]:
     ]
 
 
-def unusual_constants(materials: Iterable[LinearMaterial]) -> Iterator[str]:
+def unusual_constants(materials: Iterable[Material]) -> Iterator[str]:
     """Note constants far from those of all engineering materials, so that units may be wrong."""
     for material in materials:
         (low, high), density = young_moduli(material), material.density
@@ -181,7 +186,7 @@ def unusual_constants(materials: Iterable[LinearMaterial]) -> Iterator[str]:
             )
 
 
-def young_moduli(material: LinearMaterial) -> tuple[float, float]:
+def young_moduli(material: Material) -> tuple[float, float]:
     """Return the smallest and the largest of Young's moduli along the axes, in Pa."""
     flexible = np.linalg.inv(material.C).diagonal()[:3]
     return 1 / float(flexible.max()), 1 / float(flexible.min())

@@ -18,7 +18,7 @@ from kratos_lite.elements.formulations import (
     is_unnamed,
 )
 from kratos_lite.errors import InputError, MeshError, ModelError, nearest
-from kratos_lite.materials import LinearMaterial
+from kratos_lite.materials import Material
 from kratos_lite.mesh import Mesh, Where, WhereElements, distinct
 from kratos_lite.model import checks
 from kratos_lite.model.free_motions import FreeMotions, free_motions
@@ -71,11 +71,11 @@ class Structure(Tabular):
     def __init__(
         self,
         mesh: Mesh,
-        material: LinearMaterial | Mapping[Any, LinearMaterial] | None = None,
+        material: Material | Mapping[Any, Material] | None = None,
         formulation: str | None = None,
     ) -> None:
         self._mesh = instance(mesh, "a mesh", Mesh, "kl.box()")
-        self._materials: list[LinearMaterial] = []
+        self._materials: list[Material] = []
         self._material_of = np.full(mesh.n_elements, -1)
         self._rules: dict[int, Rule | int] = {}
         self._rule_of = np.full(mesh.n_elements, -1)
@@ -127,7 +127,7 @@ class Structure(Tabular):
         self._formulation = word
         self._changes += 1
 
-    def assign(self, material: LinearMaterial, where: WhereElements = None) -> None:
+    def assign(self, material: Material, where: WhereElements = None) -> None:
         """Give elements a material.
 
         Parameters
@@ -147,6 +147,16 @@ class Structure(Tabular):
         self._materials.append(material)
         self._material_of[elements] = len(self._materials) - 1
         self._changes += 1
+
+    @property
+    def is_nonlinear(self) -> bool:
+        """Whether a law is not linear, or an element has large displacements."""
+        laws = self._used_materials()
+        if not all(law.is_linear and law.strain_measure == "small" for law in laws):
+            return True
+        if self.formulation is not None:
+            return self.formulation == "total_lagrangian"
+        return any(len(b) and b.name in ELEMENTS and ELEMENTS[b.name].finite for b in self.mesh.blocks)
 
     @property
     def has_own_rules(self) -> bool:
@@ -563,7 +573,7 @@ class Structure(Tabular):
         """Return what readers of files noted, and constants of materials that no engineering material has."""
         return [*self.notes, *dict.fromkeys(checks.unusual_constants(self._used_materials()))]
 
-    def _used_materials(self) -> list[LinearMaterial]:
+    def _used_materials(self) -> list[Material]:
         used = distinct(self._material_of)
         return [self._materials[i] for i in used[used >= 0]]
 

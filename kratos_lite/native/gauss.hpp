@@ -44,6 +44,8 @@ struct Addition {
     bool orthogonal = true;             // whether the rule has sum w p p' = 0 of different monomials
 };
 
+struct LawValues;  // of a law; see constitutive.hpp
+
 // Some elements [first, last), their tables, and what a kernel reads and writes.
 struct Elements {
     const double* points;     // (n, 3)
@@ -62,6 +64,7 @@ struct Elements {
     const double* to_nodes;   // (k, g) extrapolation, or combination of the nodes `base`
     const int32_t* base;      // (g) nodes of an element, or null
     double near;              // share of the largest coordinate that a node may be away
+    const LawValues* given;       // what a law has given at Gauss points, or null
     double* space;            // of `vectors()` vectors
     double* out;              // result of the kernel, a row for each element from `origin`
     double* second;           // second result, rows of all elements, or null

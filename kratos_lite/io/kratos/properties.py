@@ -14,7 +14,7 @@ from kratos_lite.io.formats.document import Document, Properties
 from kratos_lite.io.kratos.context import RunContext
 from kratos_lite.io.names import PRESTRESS
 from kratos_lite.io.settings import Settings, is_number, shown
-from kratos_lite.materials import MATERIALS, LinearMaterial
+from kratos_lite.materials import MATERIALS, Material
 from kratos_lite.mesh import with_rows
 from kratos_lite.model.loads.body import BodyForce, Gravity
 from kratos_lite.typing import Array
@@ -112,7 +112,7 @@ def names_material(values: dict[str, Any]) -> bool:
     return "CONSTITUTIVE_LAW" in values or bool(ELASTIC & values.keys())
 
 
-def material_from(values: dict[str, Any]) -> LinearMaterial:
+def material_from(values: dict[str, Any]) -> Material:
     """Return the material of a Properties block.
 
     >>> material_from({"YOUNG_MODULUS": 210e9, "POISSON_RATIO": 0.3})

@@ -12,7 +12,7 @@ from kratos_lite.analysis.model import Model
 from kratos_lite.errors import InputError
 from kratos_lite.io.formats.document import Constraint, Data, Document, Note, Properties
 from kratos_lite.io.kratos.properties import USER_LAW
-from kratos_lite.materials import LinearMaterial
+from kratos_lite.materials import Material
 from kratos_lite.mesh import Block, Mesh, Part, with_rows
 from kratos_lite.model.loads import TimeDependentLoad
 from kratos_lite.model.loads.body import Gravity
@@ -79,7 +79,7 @@ def _properties(model: Model, gravity: Array) -> tuple[Ints, dict[int, Propertie
     """Return the property id of each element, one per material and prestress, and the Properties."""
     numbers = np.zeros(model.mesh.n_elements, dtype=np.int64)
     properties: dict[int, Properties] = {}
-    known: list[tuple[LinearMaterial, list[float]]] = []
+    known: list[tuple[Material, list[float]]] = []
     for group in model.element_groups():
         if group.rule is not group.element.rule:
             raise InputError("a model with replaced quadrature rules cannot be written to a file of a model")
@@ -94,7 +94,7 @@ def _properties(model: Model, gravity: Array) -> tuple[Ints, dict[int, Propertie
     return numbers, properties
 
 
-def _values(material: LinearMaterial, gravity: Array, prestress: Array) -> dict[str, Any]:
+def _values(material: Material, gravity: Array, prestress: Array) -> dict[str, Any]:
     name = type(material).__name__
     if name not in KRATOS_LAW:
         raise InputError(f"material {name} has no name in Kratos; model files hold {', '.join(KRATOS_LAW)}")

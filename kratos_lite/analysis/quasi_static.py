@@ -1,0 +1,382 @@
+"""Quasi-static analysis: loads that grow in a pseudo-time, any law, large displacements."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kratos_lite.analysis.nodal_loads import AppliedLoads
+from kratos_lite.analysis.prescribed_motion import PrescribedMotion
+from kratos_lite.analysis.report import Report
+from kratos_lite.analysis.result import Result
+from kratos_lite.analysis.state import State, check_state
+from kratos_lite.assembly.block_matrix import BlockMatrix
+from kratos_lite.assembly.constitutive import Constitutive, States
+from kratos_lite.assembly.element_groups import PointStates
+from kratos_lite.errors import InputError, ModelError, SolveError
+from kratos_lite.model.structure import Structure
+from kratos_lite.solvers.constrained_system import ConstrainedSystem
+from kratos_lite.solvers.direct import one_thread
+from kratos_lite.solvers.linear_solver import LinearSolver
+from kratos_lite.solvers.plan import Plan, stepped
+from kratos_lite.typing import Array, Progress
+from kratos_lite.validation import number, whole_number
+
+_log = logging.getLogger("kratos_lite")
+SMALLEST_PART = 1 / 1024
+"""Fraction of a step below which it is not cut further."""
+EASY = 6
+"""Iterations of a part of a step after which the next part is twice as long."""
+GROWN = 1e4
+"""Growth of the residual from which an iteration has diverged."""
+SLACK, SEARCHES = 0.8, 6
+"""Line search: fraction of the work of the residual that a full correction may leave, and most trials."""
+FORCING = 1e-3
+"""Largest relative residual to which corrections are solved where multigrid solves them."""
+
+
+@dataclass(frozen=True)
+class StepReport:
+    """How a step, or a part of one, has converged.
+
+    Attributes
+    ----------
+    time : s, at its end.
+    residuals : relative residual before each correction and at the end.
+    """
+
+    time: float
+    residuals: tuple[float, ...]
+
+    @property
+    def iterations(self) -> int:
+        """Number of corrections."""
+        return len(self.residuals) - 1
+
+    def __str__(self) -> str:
+        last = self.residuals[-1]
+        return f"t = {self.time:g} s: {self.iterations} iterations, relative residual {last:.1e}"
+
+
+class QuasiStaticAnalysis:
+    """A model whose loads grow in a pseudo-time; made by `Model.quasi_static`.
+
+    Each step is found by Newton's method with the consistent tangent.  A step that does not converge is cut
+    into parts, over which loads and prescribed displacements grow linearly.
+
+    Parameters
+    ----------
+    model : elements with any law, supports and loads.
+    tolerance : relative residual at which a step has converged.
+    iterations : most corrections of a step; one that needs more is cut.
+    line_search : whether corrections are shortened that overshoot; thin bodies that bend go better without.
+    progress : called with the phase and the fraction done, 0 … 1.
+
+    Attributes
+    ----------
+    time, step : s, and number of steps taken.
+    reports : a `StepReport` for each step, or part of one.
+    work : work of loads and supports in J.
+
+    Raises
+    ------
+    InputError
+        An argument is wrong.
+    MeshError, ModelError
+        The model is broken, or its supports leave rigid motions free.
+
+    Examples
+    --------
+    >>> import kratos_lite as kl
+    >>> bar = kl.Model(kl.box(), kl.J2Plasticity3D(E=200e9, nu=0.3, yield_stress=200e6, hardening=2e9))
+    >>> for side, axis in (("x-", "x"), ("y-", "y"), ("z-", "z")):
+    ...     bar.fix(side, axis)
+    >>> bar.fix("z+", "z", lambda t: 0.01 * t)
+    >>> analysis = bar.quasi_static()
+    >>> for state in kl.integrate(analysis, dt=0.5, steps=2):
+    ...     print(f"{analysis.result().stress()[0, 0, 2] / 1e6:.2f} MPa")
+    207.92 MPa
+    217.82 MPa
+    """
+
+    def __init__(
+        self,
+        model: Structure,
+        *,
+        tolerance: float = 1e-8,
+        iterations: int = 25,
+        line_search: bool = False,
+        progress: Progress | None = None,
+    ) -> None:
+        self.tolerance = number(tolerance, "the tolerance", least=1e-14)
+        self.iterations = whole_number(iterations, "iterations")
+        self.line_search, self.model, self.progress = line_search, model, progress
+        if model.motion is not None:
+            raise ModelError("a model with a motion has no quasi-static analysis; leave the motion out")
+        self.groups, self.warnings = model.checked()
+        model.free_motions(self.groups).check((), moving=False)
+        mesh, supports = model.mesh, model.supports
+        self.system = ConstrainedSystem(
+            mesh.points, self.groups, supports.constraint_map, patterns=model.patterns, hanging=mesh.hanging
+        )
+        self.applied = AppliedLoads(model, self.system, self.groups, initial=False)
+        self.prescribed = PrescribedMotion(supports, self.system)
+        self.law = Constitutive(self.system.points, self.system.groups, self.system.pattern)
+        self._plan = stepped(len(self.system.constraint_map.free))
+        self._symmetric = all(group.material.symmetric_tangent for group in self.groups)
+        u0 = model.initial_displacement
+        self._u0 = np.zeros(3 * len(self.system.nodes)) if u0 is None else self.system.gather(u0)
+        self._version = model.version
+        self.time, self.step, self.parts, self.work = 0.0, 0, 1, 0.0
+        self.u = np.zeros_like(self._u0)
+        self.states = self.law.start()
+        self.load = np.zeros_like(self.u)
+        self.internal = self._forces(self.u)
+        self.reports: list[StepReport] = []
+
+    def _forces(self, u: Array) -> Array:
+        """Return the internal forces (3a,) of the committed states at displacements (3a,)."""
+        return self.law.evaluate(self._strained(u), self.states, 0.0, tangent=False)[0].ravel()
+
+    def _strained(self, u: Array) -> Array:
+        return (u - self._u0).reshape(-1, 3)
+
+    # ---- steps -----------------------------------------------------------------------------------
+
+    def critical_step(self) -> float:
+        """Return the longest stable step in s: infinite."""
+        return np.inf
+
+    def prepare(self, h: float, parts: int) -> None:
+        """Make ready for steps; `kratos_lite.integrate` does.
+
+        Parameters
+        ----------
+        h : step in s.
+        parts : substeps into which each is divided.
+
+        Raises
+        ------
+        ModelError
+            The model has changed.
+        """
+        if self._version != self.model.version:
+            raise ModelError(
+                "the model has changed since this analysis was made; make a new one and restore the state"
+            )
+        self.parts = parts
+
+    def advance(self, h: float, count: int) -> None:
+        """Take steps; `kratos_lite.integrate` does.
+
+        Parameters
+        ----------
+        h : step in s.
+        count : their number.
+
+        Raises
+        ------
+        SolveError
+            A step does not converge, however much it is cut; the last converged state is kept.
+        """
+        for _ in range(count):
+            begin = self.time
+            for k in range(self.parts):
+                self._advance_to(begin + (k + 1) * h / self.parts)
+            self.time = begin + h
+            self.step += 1
+
+    def _advance_to(self, end: float) -> None:
+        """Come to the loads of a time, in parts where one step does not converge."""
+        start, loads = self.time, (self.load, self.applied(end))
+        fields = self.prescribed.part(self.u), self.prescribed(end)
+        done, part = 0.0, 1.0
+        while done < 1.0:
+            fraction = min(done + part, 1.0)
+            load, field = ((1 - fraction) * a + fraction * b for a, b in (loads, fields))
+            try:
+                with one_thread():
+                    u, states, internal, residuals = self._newton(
+                        load, field, (fraction - done) * (end - start)
+                    )
+            except SolveError as error:
+                part /= 2
+                if part < SMALLEST_PART:
+                    reached = start + done * (end - start)
+                    raise SolveError(
+                        f"the step from t = {start:g} s to {end:g} s converges up to t = {reached:g} s "
+                        f"only, cut to {part:.1e} of its length: {error}; the load may be beyond the limit "
+                        "load, or the law may soften: prescribe displacements in place of loads, or take "
+                        "smaller steps"
+                    ) from None
+                _log.info("a step is cut to %g of its length: %s", part, error)
+                continue
+            self.work += float((internal + self.internal) @ (u - self.u)) / 2
+            self.u, self.states, self.load, self.internal = u, states, load, internal
+            done, self.time = fraction, start + fraction * (end - start)
+            self.reports.append(StepReport(self.time, tuple(residuals)))
+            part = min(part * (2 if len(residuals) <= EASY else 1), 1.0 - done) or part
+
+    def _newton(self, load: Array, field: Array, dt: float) -> tuple[Array, States, Array, list[float]]:
+        """Return displacements, states, internal forces (3a,) and residuals under a load and a field."""
+        reduce, u = self.system.constraint_map.reduce, self.u
+        jump: Array | None = field - self.prescribed.part(u)
+        if not jump.any():  # type: ignore[union-attr]
+            jump = None
+        internal, K, states = self._evaluate(u, dt)
+        residuals: list[float] = []
+        for _ in range(self.iterations + 1):
+            r = reduce(load - internal)
+            scale = max(float(np.linalg.norm(v)) for v in (load, internal))
+            residuals.append(float(np.linalg.norm(r)) / (scale or 1.0))
+            if jump is None and residuals[-1] <= self.tolerance:
+                return u, states, internal, residuals
+            if not residuals[-1] <= GROWN * max(residuals[0], 1.0):
+                raise SolveError("the iteration diverges")
+            du = self._correction(K, load - internal, jump, residuals)
+            if jump is None and self.line_search:
+                du = self._shortened(u, du, r, load, dt)
+            u = u + du
+            internal, K, states = self._evaluate(u, dt)
+            jump = None
+        last = ", ".join(f"{value:.1e}" for value in residuals[-3:])
+        raise SolveError(f"no convergence in {self.iterations} iterations: relative residuals … {last}")
+
+    def _evaluate(self, u: Array, dt: float) -> tuple[Array, BlockMatrix, States]:
+        forces, K, states = self.law.evaluate(self._strained(u), self.states, dt)
+        assert K is not None
+        return forces.ravel(), K, states
+
+    def _correction(self, K: BlockMatrix, forces: Array, jump: Array | None, residuals: list[float]) -> Array:
+        """Return K⁻¹ of forces (3a,) with a jump of what is prescribed.
+
+        Source of the tolerance: Eisenstat & Walker, SIAM J. Sci. Comput. 17 (1996) 16-32.
+        """
+        plan = self._plan if self._symmetric else Plan("direct", "the tangent of a law is not symmetric")
+        solver = LinearSolver(K, self.system.constraint_map, self.system.points, plan, self._symmetric)
+        ratio = residuals[-1] / residuals[-2] if len(residuals) > 1 and residuals[-2] else 1.0
+        tolerance = max(min(FORCING, ratio**2), 0.1 * self.tolerance / max(residuals[-1], self.tolerance))
+        prescribed = np.zeros_like(forces) if jump is None else jump
+        return solver.solve(forces, tolerance, None, prescribed, prescribed).x
+
+    def _shortened(self, u: Array, du: Array, r: Array, load: Array, dt: float) -> Array:
+        """Return a correction, shortened until the residual does little work over it.
+
+        Source: Crisfield, Non-linear Finite Element Analysis, vol. 1 (1991), section 9.2.
+        """
+        constraints = self.system.constraint_map
+        q, s = du[constraints.free], 1.0
+        before = float(q @ r)
+        for _ in range(SEARCHES):
+            forces = self.law.evaluate(self._strained(u + s * du), self.states, dt, tangent=False)[0]
+            after = float(q @ constraints.reduce(load - forces.ravel()))
+            if after * before >= 0 or abs(after) <= SLACK * abs(before):
+                break
+            s *= float(np.clip(before / (before - after), 0.1, 0.5))
+        return s * du
+
+    def diverged(self) -> bool:
+        """Return whether displacements are not finite."""
+        return not np.isfinite(self.u).all()
+
+    # ---- what is known at the time ---------------------------------------------------------------
+
+    def state(self) -> State:
+        """Return the model as it is now."""
+        values = {"u": self._whole(self.u).copy(), "reactions": self._reactions(), "load": self.load.copy()}
+        values |= {"internal": self.internal.copy(), "work": np.array(self.work)}
+        for i, states in enumerate(self.states):
+            if states is not None:
+                values[f"stress_{i}"] = states.stress.copy()
+                values |= {f"{name}_{i}": v.copy() for name, v in states.variables.items()}
+                if states.modes is not None:
+                    values[f"modes_{i}"] = states.modes.copy()
+        return State("model", "quasi_static", self.time, self.step, values, self.parts)
+
+    def restore(self, state: State) -> None:
+        """Go on from a state of this model.
+
+        Parameters
+        ----------
+        state : of a model of the same mesh, elements and laws.
+
+        Raises
+        ------
+        InputError
+            It is no such state.
+        """
+        now = self.state()
+        check_state(state, "model", {name: np.shape(value) for name, value in now.values.items()})
+        if state.integrator != "quasi_static":
+            raise InputError(f"this state was made by {state.integrator}, not by a quasi-static analysis")
+        get = state.values
+        self.u = self.system.gather(get["u"]).copy()
+        self.load, self.internal, self.work = get["load"].copy(), get["internal"].copy(), float(get["work"])
+        self.states = [
+            states
+            and PointStates(
+                get[f"stress_{i}"].copy(),
+                {name: get[f"{name}_{i}"].copy() for name in states.variables},
+                None if states.modes is None else get[f"modes_{i}"].copy(),
+            )
+            for i, states in enumerate(self.states)
+        ]
+        self.time, self.step = float(state.time), int(state.step)
+
+    def _whole(self, values: Array) -> Array:
+        return self.system.scatter(values)
+
+    def _reactions(self) -> Array:
+        return self.model.supports.supported(self._whole(self.internal - self.load))
+
+    def result(self, state: State | None = None) -> Result:
+        """Return a state as a result with strains, stresses and internal variables.
+
+        Parameters
+        ----------
+        state : of this model; that of now if not given.
+
+        Returns
+        -------
+        Result
+        """
+        if state is not None:
+            now = self.state()
+            self.restore(state)
+            try:
+                return self.result()
+            finally:
+                self.restore(now)
+        model, loads, reactions = self.model, self._whole(self.load).copy(), self._reactions()
+        last = self.reports[-1] if self.reports else StepReport(self.time, (0.0,))
+        report = Report(
+            unknowns=len(self.system.constraint_map.free),
+            total_load=loads.sum(axis=0),
+            total_reaction=reactions.sum(axis=0),
+            solver="newton",
+            reason=f"step {self.step}, {last}",
+            iterations=sum(step.iterations for step in self.reports),
+            backward_error=last.residuals[-1],
+            force_error=None,
+            moment_error=None,
+            seconds={},
+            warnings=list(self.warnings),
+            notes=model.remarks(),
+            formulation=model.chosen(self.groups),
+        )
+        groups = [replace(g, states=s) for g, s in zip(self.groups, self.states, strict=True)]
+        u0 = model.initial_displacement
+        return Result(model.mesh, groups, self._whole(self.u).copy(), reactions, loads, report, u0)
+
+
+def solve_nonlinear(
+    model: Structure, tolerance: float, progress: Progress | None, start: float = 0.0, end: float = 1.0
+) -> Result:
+    """Return the result of one step from the undeformed body to the loads of the time 1 s."""
+    analysis = QuasiStaticAnalysis(model, tolerance=max(tolerance, 1e-10), progress=progress)
+    analysis.time = start
+    analysis.prepare(end - start, 1)
+    analysis.advance(end - start, 1)
+    return analysis.result()

@@ -1,0 +1,264 @@
+"""Constitutive laws in elements: internal forces, tangent and new states of groups whose law is not linear.
+
+With the strain ε = B u of small displacements, or Green's strain, the law gives σ and its tangent D, and
+
+    r_int = Σ B^T σ γ det J,    K = Σ B^T D B γ det J (+ what the stress adds to K at large displacements).
+
+Groups whose law and strain are linear keep one stiffness matrix.  Kernels know stresses and tangents at Gauss
+points alone, so that they serve every law.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from kratos_lite.assembly import finite_strain
+from kratos_lite.assembly.block_matrix import BlockMatrix
+from kratos_lite.assembly.element_groups import ElementGroup, PointStates, add_nodal, as_double, compiled
+from kratos_lite.assembly.gauss_point_fields import displaced, internal_load, volumes
+from kratos_lite.assembly.sparsity_pattern import Pattern
+from kratos_lite.assembly.stiffness import assemble_stiffness
+from kratos_lite.elements import tables
+from kratos_lite.elements import total_lagrangian as lagrange
+from kratos_lite.errors import MaterialError, SolveError
+from kratos_lite.typing import Array
+
+States: TypeAlias = "list[PointStates | None]"
+"""States of each group of elements; None where the law is linear."""
+POINTS = 4000
+"""Gauss points at which a law is evaluated at once: few enough for the cache."""
+WINDOW_BYTES = 256_000_000
+"""Memory of the tangents that are known at once."""
+MODES_MAX, MODES_CONVERGED = 30, 1e-10
+"""Iterations for the amplitudes of enhanced strains, and the fraction of the forces that they may miss."""
+
+
+class Constitutive:
+    """Internal forces, tangent and states of all elements of a model."""
+
+    def __init__(self, points: Array, groups: Sequence[ElementGroup], pattern: Pattern) -> None:
+        self.points, self.groups, self.pattern = as_double(points), list(groups), pattern
+        self._linear = _only(groups, lambda group: group.is_linear)
+        self._lagrange = _only(groups, lambda group: group.element.finite and group.material.is_linear)
+        self._dilatations = [None if g.material.is_linear else dilatation(self.points, g) for g in groups]
+
+    def start(self) -> States:
+        """Return the states of an undeformed body; None of groups with a linear law."""
+        return [None if g.material.is_linear else initial_states(self.points, g) for g in self.groups]
+
+    @cached_property
+    def _linear_part(self) -> tuple[BlockMatrix, Array]:
+        """Stiffness of the linear groups, and their forces (n, 3) at rest, those of a prestress."""
+        at_rest = internal_load(self.points, self._linear, np.zeros_like(self.points))
+        return assemble_stiffness(self.points, self._linear, self.pattern), at_rest
+
+    def evaluate(
+        self, u: Array, states: States, dt: float, *, tangent: bool = True
+    ) -> tuple[Array, BlockMatrix | None, States]:
+        """Return internal forces (n, 3) in N, tangent stiffness and new states at displacements u (n, 3).
+
+        `states` are those at the start of a step of `dt` s.  SolveError names an element that is turned
+        inside out; MaterialError says where a law fails.
+        """
+        K, at_rest = self._linear_part
+        forces, data = at_rest + (K @ u.ravel()).reshape(-1, 3), K.data
+        if any(map(len, self._lagrange)):
+            forces += finite_strain.internal_load(self.points, self._lagrange, u)
+        if tangent:
+            large = finite_strain.stiffness(self.points, self._lagrange, self.pattern, u)
+            data = np.add(data, large.data, out=large.data)
+        new: States = []
+        for number, (group, state) in enumerate(zip(self.groups, states, strict=True)):
+            parts = []
+            for window in group.chunks(WINDOW_BYTES) if state is not None else ():
+                part = Window(self, number, window, u, data if tangent else None)
+                before = state.take(window)  # type: ignore[union-attr]
+                add = part.add if before.modes is None else part.add_enhanced
+                parts.append(add(forces, before, dt))
+            new.append(_joined(parts) if parts else None)
+        return forces, BlockMatrix(data, K.indices, K.indptr) if tangent else None, new
+
+
+def _only(groups: Sequence[ElementGroup], wanted: Callable[[ElementGroup], bool]) -> list[ElementGroup]:
+    """Return the groups, empty but where they are wanted, so that they keep their numbers."""
+    return [group.take(np.full(len(group), wanted(group))) for group in groups]
+
+
+def initial_states(points: Array, group: ElementGroup) -> PointStates:
+    """Return the states of a group at the beginning; a law that asks for it knows the length of elements."""
+    shape = len(group), len(group.rule)
+    variables = group.material.initial_state(*shape)
+    if "element_length" in variables:
+        variables["element_length"][...] = np.cbrt(volumes(points, group).sum(axis=1))[:, None, None]
+    modes = np.zeros((len(group), 21)) if group.element.formulation == "enhanced" else None
+    return PointStates(np.zeros((*shape, 6)), variables, modes)
+
+
+def dilatation(points: Array, group: ElementGroup) -> Array | None:
+    """Return what B has beyond that of gradients in each normal strain, (m, g, k, 3), or None for nothing."""
+    if group.element.custom or group.element.formulation != "b_bar":
+        return None
+    parts = []
+    for chunk in group.chunks():
+        element = group.at(points, chunk)
+        change = element._operator(group.material.C) - tables.strain_rows(element._gauss[1])
+        parts.append(change[..., 0, :].reshape(*change.shape[:2], -1, 3))
+    return np.concatenate(parts)
+
+
+class Window:
+    """Some elements of a group at displacements u (n, 3), whose forces and stiffness are added to totals."""
+
+    def __init__(self, law: Constitutive, number: int, window: slice, u: Array, data: Array | None) -> None:
+        chosen = np.zeros(len(law.groups[number]), dtype=bool)
+        chosen[window] = True
+        self.group, self.u, self.points = law.groups[number].take(chosen), as_double(u), law.points
+        self.pattern, self.number, self.window, self.data = law.pattern, number, window, data
+        extra = law._dilatations[number]
+        self.dilatation = None if extra is None else np.ascontiguousarray(extra[window])
+        self.kernels = compiled("constitutive", self.group.element)
+
+    def add(self, forces: Array, state: PointStates, dt: float) -> PointStates:
+        """Add internal forces (n, 3) and stiffness; return the new states."""
+        stress, D, variables = self._respond(state, dt)
+        group, finite = self.group, self.group.element.finite
+        if self.kernels:
+            nodes, _, dN, weights = group.tables()
+            placed = self.points, nodes, dN, weights, self.u, stress
+            forces += self.kernels.internal_load(*placed, self.dilatation, finite)
+            if self.data is not None:
+                rows = self.pattern.indptr, self.pattern.indices
+                symmetric = bool(group.material.symmetric_tangent)
+                self.kernels.add_stiffness(*placed, D, self.dilatation, finite, symmetric, *rows, self.data)
+            return PointStates(stress, variables)
+        for chunk in group.chunks():
+            element, q, s = group.at(self.points, chunk), self.u[group.nodes[chunk]], stress[chunk]
+            F = np.eye(3) + lagrange.displacement_gradient(element, q) if finite else np.eye(3)
+            at = lagrange.Deformation(F, s, F, 1.0, 1.0)
+            of_element = lagrange.internal_force(element, at) if finite else None
+            if of_element is None:
+                of_element = element.internal_force(s, group.material.C)
+            add_nodal(forces, group.nodes[chunk], of_element)
+            if self.data is None:
+                continue
+            if finite:
+                self._scatter(chunk, lagrange.stiffness_by_axis(element, D[chunk], at))
+            else:
+                B = element._operator(group.material.C)
+                self._scatter(chunk, tables.by_axis(tables.summed(B, D[chunk] @ B, element.dV)))
+        return PointStates(stress, variables)
+
+    def _scatter(self, chunk: slice, K: Array) -> None:
+        """Add the matrices (m, 3, k, 3, k) of some elements."""
+        assert self.data is not None
+        first = self.window.start
+        place = slice(first + chunk.start, first + chunk.stop)
+        self.pattern.add(self.data, self.number, place, K.transpose(0, 2, 4, 1, 3))
+
+    def _respond(self, state: PointStates, dt: float) -> tuple[Array, Array, dict[str, Array]]:
+        """Return stresses (m, g, 6), tangents and internal variables, a few elements at a time."""
+        strain, tangent = self._strain() + initial_strain(self.group), self.data is not None
+        m, g = strain.shape[:2]
+        stress, D = np.empty_like(strain), np.empty((m, g, 6, 6) if tangent else 0)
+        variables = {name: np.empty_like(values) for name, values in state.variables.items()}
+        for first in range(0, m, max(1, POINTS // g)):
+            some = slice(first, first + max(1, POINTS // g))
+            stress[some], found, new = self._evaluate(some, strain[some], state, dt, tangent)
+            if tangent:
+                D[some] = found
+            for name, values in new.items():
+                variables[name][some] = values
+        return stress, D, variables
+
+    def _evaluate(
+        self, some: slice, strain: Array, state: PointStates, dt: float, tangent: bool = True
+    ) -> tuple[Array, Array, dict[str, Array]]:
+        """Return the response of the law for some elements; an error of it names them."""
+        try:
+            return self.group.material.evaluate(strain, state.take(some).variables, dt, tangent=tangent)
+        except MaterialError as error:
+            rows = self.group.rows[some]
+            where = f"[element, point] of the elements in rows {rows[0]} … {rows[-1]}"
+            raise MaterialError(f"{error}; {where}") from None
+
+    def _strain(self) -> Array:
+        """Return ε = B u, or Green's strain, (m, g, 6)."""
+        group = self.group
+        if not group.element.finite:
+            if module := compiled("gauss", group.element):
+                return module.stress(*displaced(self.points, group, self.u, stress=False))
+            C = group.material.C
+            parts = [group.at(self.points, c).strain(self.u[group.nodes[c]], C) for c in group.chunks()]
+            return np.concatenate(parts)
+        if self.kernels:
+            nodes, _, dN, weights = group.tables()
+            green = self.kernels.green(self.points, nodes, dN, weights, self.u)
+            strain, det = green[..., :6], green[..., 6]
+        else:
+            found = []
+            for c in group.chunks():
+                element, q = group.at(self.points, c), self.u[group.nodes[c]]
+                F = np.eye(3) + lagrange.displacement_gradient(element, q)
+                found.append((lagrange.green_strain(element, q), tables.determinant(F)))
+            strain, det = (np.concatenate(values) for values in zip(*found, strict=True))
+        if (det <= 0).any():
+            at, point = np.argwhere(det <= 0)[0]
+            raise SolveError(
+                f"the element in row {group.rows[at]} is turned inside out at Gauss point {point + 1}: "
+                "det F ≤ 0"
+            )
+        return strain
+
+    def add_enhanced(self, forces: Array, state: PointStates, dt: float) -> PointStates:
+        """Do the same with enhanced strains G α, whose amplitudes α satisfy ∫ G^T σ dV = 0."""
+        parts = []
+        for chunk in self.group.chunks():
+            element, q = self.group.at(self.points, chunk), self.u[self.group.nodes[chunk]]
+            B, G = tables.strain_rows(element._gauss[1]), element._modes(element.rule.points)  # type: ignore[attr-defined]
+            initial = initial_strain(self.group)
+            compatible = (B @ q.reshape(len(q), 1, -1, 1))[..., 0]
+            compatible += initial[chunk] if isinstance(initial, np.ndarray) else initial
+            alpha, dV = state.modes[chunk], element.dV  # type: ignore[index]
+            weighted = G * dV[..., None, None]
+            for _ in range(MODES_MAX):
+                strain = compatible + (G @ alpha[:, None, :, None])[..., 0]
+                stress, D, variables = self._evaluate(chunk, strain, state, dt)
+                h = np.einsum("mgci,mgc->mi", weighted, stress)
+                A = tables.summed(G, D @ G, dV)
+                size = np.einsum("mgci,mgc->mi", np.abs(weighted), np.abs(stress))
+                if (np.abs(h) <= MODES_CONVERGED * size.max(axis=1, keepdims=True)).all():
+                    break
+                alpha = alpha - np.linalg.solve(A, h[..., None])[..., 0]
+            else:
+                raise SolveError(
+                    f"enhanced strains do not converge in {MODES_MAX} iterations; take smaller steps"
+                )
+            parts.append(PointStates(stress, variables, alpha))
+            found = np.einsum("mgci,mgc->mi", B * dV[..., None, None], stress)
+            add_nodal(forces, self.group.nodes[chunk], found.reshape(len(q), -1, 3))
+            if self.data is not None:
+                DB, flat = D @ B, weighted.reshape(len(q), -1, 21)
+                L = np.swapaxes(flat, -1, -2) @ DB.reshape(len(q), -1, DB.shape[-1])
+                K = tables.summed(B, DB, dV) - np.swapaxes(L, -1, -2) @ np.linalg.solve(A, L)
+                self._scatter(chunk, tables.by_axis(K))
+        return _joined(parts)
+
+
+def _joined(parts: Sequence[PointStates]) -> PointStates:
+    """Return the states of parts of a group as one."""
+    if len(parts) == 1:
+        return parts[0]
+    names = parts[0].variables
+    variables = {name: np.concatenate([part.variables[name] for part in parts]) for name in names}
+    modes: Any = None if parts[0].modes is None else np.concatenate([part.modes for part in parts])
+    return PointStates(np.concatenate([part.stress for part in parts]), variables, modes)
+
+
+def initial_strain(group: ElementGroup) -> Array | float:
+    """Return the elastic strain (m, 1, 6) of the prestress, or 0."""
+    stress = group.initial_stress(slice(None))
+    return stress @ np.linalg.inv(group.material.C) if isinstance(stress, np.ndarray) else 0.0

@@ -1,0 +1,151 @@
+"""J2Plasticity3D: plasticity of von Mises with isotropic and kinematic hardening."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from kratos_lite import voigt
+from kratos_lite.errors import MaterialError
+from kratos_lite.materials.isotropic3d import Isotropic3D
+from kratos_lite.materials.material import GaussState, Material, Response
+from kratos_lite.typing import Array
+
+CONVERGED = 1e-13
+"""Fraction of the yield stress that the return may miss."""
+MOST_ITERATIONS = 50
+
+
+@dataclass(frozen=True)
+class J2Plasticity3D(Material):
+    """Elastic up to the yield stress of von Mises, then plastic flow without change of volume.
+
+    The yield stress grows with the accumulated plastic strain p, and its center, the back stress, with the
+    plastic strain:
+
+        σ_Y(p) = yield_stress + hardening p + (saturation_stress - yield_stress) (1 - exp(-exponent p)),
+        dα = ⅔ kinematic dε_p.
+
+    Parameters
+    ----------
+    E, nu : Young's modulus in Pa and Poisson's ratio.
+    yield_stress : Pa, > 0.
+    hardening : linear isotropic hardening modulus in Pa, ≥ 0.
+    kinematic : kinematic hardening modulus in Pa, ≥ 0.
+    saturation_stress : Pa, ≥ yield_stress, to which the yield stress grows (Voce); 0 for none.
+    exponent : rate of that growth, ≥ 0.
+    density : kg/m³.
+
+    Raises
+    ------
+    MaterialError
+        If a constant lies outside its bounds.
+
+    Notes
+    -----
+    Radial return with the consistent tangent.  Source: Simo & Hughes, Computational Inelasticity (1998),
+    boxes 3.1 and 3.2.
+
+    Examples
+    --------
+    >>> import kratos_lite as kl
+    >>> steel = kl.J2Plasticity3D(E=200e9, nu=0.3, yield_stress=250e6)
+    >>> shear = np.array([0, 0, 0, 0.01, 0, 0])
+    >>> stress, _, state = steel.evaluate(shear, steel.initial_state(), 1.0)
+    >>> print(f"{stress[3] / 1e6:.2f} MPa")  # σ_Y / √3
+    144.34 MPa
+    """
+
+    E: float
+    nu: float
+    yield_stress: float
+    hardening: float = 0.0
+    kinematic: float = 0.0
+    saturation_stress: float = 0.0
+    exponent: float = 0.0
+    density: float = 0.0
+
+    isotropic: ClassVar[bool] = True
+    aliases: ClassVar[tuple[str, ...]] = ("SmallStrainJ2Plasticity3DLaw", "SmallStrainJ2Plasticity3D")
+    variables: ClassVar[dict[str, str]] = {
+        "E": "YOUNG_MODULUS",
+        "nu": "POISSON_RATIO",
+        "yield_stress": "YIELD_STRESS",
+        "hardening": "ISOTROPIC_HARDENING_MODULUS",
+        "saturation_stress": "EXPONENTIAL_SATURATION_YIELD_STRESS",
+        "exponent": "HARDENING_EXPONENT",
+        "density": "DENSITY",
+    }
+    internal_variables: ClassVar[Mapping[str, int]] = {
+        "plastic_strain": 6,
+        "accumulated_plastic_strain": 1,
+        "back_stress": 6,
+    }
+
+    def check(self) -> None:
+        """Check the bounds of the constants.
+
+        Raises
+        ------
+        MaterialError
+            If one is beyond them.
+        """
+        Isotropic3D(self.E, self.nu)
+        if not self.yield_stress > 0:
+            raise MaterialError(f"{self._name('yield_stress')} {self.yield_stress:g} must be > 0 Pa")
+        for name in ("hardening", "kinematic", "exponent"):
+            if getattr(self, name) < 0:
+                raise MaterialError(
+                    f"{self._name(name)} {getattr(self, name):g} must be ≥ 0; "
+                    "for softening take a law of damage"
+                )
+        if self.saturation_stress and self.saturation_stress < self.yield_stress:
+            raise MaterialError(
+                f"{self._name('saturation_stress')} {self.saturation_stress:g} must be ≥ the yield stress "
+                f"{self.yield_stress:g} Pa, or 0 for none"
+            )
+
+    def _yield_stress(self, p: Array) -> tuple[Array, Array]:
+        """Return the yield stress in Pa and its slope at accumulated plastic strains p (...)."""
+        rise = max(self.saturation_stress - self.yield_stress, 0.0)
+        decay = np.exp(-self.exponent * p)
+        stress = self.yield_stress + self.hardening * p + rise * (1 - decay)
+        return stress, self.hardening + rise * self.exponent * decay
+
+    def response(self, strain: Array, state: GaussState, dt: float) -> Response:
+        """Return stress, consistent tangent and internal variables; see `Material.response`."""
+        elastic = Isotropic3D(self.E, self.nu)
+        C, G = elastic.C, elastic.lame[1]
+        stress = (strain - state["plastic_strain"]) @ C.T
+        relative = voigt.deviator(stress) - state["back_stress"]
+        norm = np.sqrt(relative**2 @ voigt.SHEAR_TWICE)
+        q, p = 1.5**0.5 * norm, state["accumulated_plastic_strain"][..., 0]
+        dp, slope = self._increment(q, p, G)
+        n = relative / np.where(norm > 0, norm, 1.0)[..., None]
+        flow = (1.5**0.5 * dp)[..., None] * n
+        new = {
+            "plastic_strain": state["plastic_strain"] + flow * voigt.SHEAR_TWICE,
+            "accumulated_plastic_strain": (p + dp)[..., None],
+            "back_stress": state["back_stress"] + 2 / 3 * self.kinematic * flow,
+        }
+        beta = 3 * G * dp / np.where(q > 0, q, 1.0)
+        rate = np.where(dp > 0, 3 * G / (3 * G + self.kinematic + slope), 0.0)
+        D = C - 2 * G * beta[..., None, None] * voigt.DEVIATOR
+        D = D - (2 * G * (rate - beta))[..., None, None] * n[..., :, None] * n[..., None, :]
+        return stress - 2 * G * flow, D, new
+
+    def _increment(self, q: Array, p: Array, G: float) -> tuple[Array, Array]:
+        """Return the increment of p at which q - (3G + kinematic) Δp = σ_Y(p + Δp), and the slope of σ_Y."""
+        dp = np.zeros_like(q)
+        stress, slope = self._yield_stress(p)
+        plastic = q > stress
+        for _ in range(MOST_ITERATIONS):  # a convex function: Newton comes from below
+            excess = np.where(plastic, q - (3 * G + self.kinematic) * dp - stress, 0.0)
+            if (np.abs(excess) <= CONVERGED * np.maximum(q, self.yield_stress)).all():
+                break
+            dp = dp + excess / (3 * G + self.kinematic + slope)
+            stress, slope = self._yield_stress(p + dp)
+        return dp, slope

@@ -1,0 +1,284 @@
+"""Material: what every constitutive law is, linear or not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from sys import float_info
+from typing import Any, ClassVar, TypeAlias
+
+import numpy as np
+
+from kratos_lite.errors import MaterialError
+from kratos_lite.registry import Registry
+from kratos_lite.tabular import names_of
+from kratos_lite.typing import Array
+
+MAX_FLOAT = float_info.max
+
+MATERIALS: Registry[type[Material]] = Registry("material")
+"""Every material by its class name and by the names of Kratos."""
+
+GaussState: TypeAlias = "dict[str, Array]"
+"""Internal variables (..., size) at Gauss points by name."""
+Response: TypeAlias = "tuple[Array, Array | None, GaussState]"
+"""Stress (..., 6) in Pa, its tangent (..., 6, 6) in Pa or None, and the internal variables after the step."""
+
+STRAIN_STEP = 1e-3
+"""Strain from which on steps of differences grow with it: that of metals at their yield stress."""
+
+
+class Material:
+    """A constitutive law: from strain and internal variables to stress, tangent and new internal variables.
+
+    A subclass is a frozen dataclass of its constants that defines `response`; it registers itself under its
+    class name and its `aliases`.
+
+    Attributes
+    ----------
+    density : kg/m³, ≥ 0.
+    aliases : further names, such as those of Kratos' constitutive laws.
+    variables : field name → name of the variable in `.mdpa` and JSON files.
+    strain_measure : ``"small"``; or ``"finite"``: the strain is Green's, the stress the second of Piola and
+        Kirchhoff, and elements are total Lagrangian.
+    internal_variables : name → numbers at each Gauss point; all are 0 at the beginning.
+    symmetric_tangent : whether the tangent is symmetric.
+    rate_dependent : whether the stress depends on the length of a step.
+
+    Raises
+    ------
+    MaterialError
+        If a constant is not a finite number, or the density is negative.
+
+    Notes
+    -----
+    Voigt order xx yy zz xy yz zx, engineering shear.  Contract: Simo & Hughes, Computational Inelasticity
+    (1998), ch. 3: a law is driven by the strain at the end of a step.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> import kratos_lite as kl
+    >>> @dataclass(frozen=True)
+    ... class Cubic(kl.Material):  # stiffens with the strain; its tangent is found by differences
+    ...     E: float
+    ...     density: float = 0.0
+    ...
+    ...     def response(self, strain, state, dt):
+    ...         return self.E * (strain + 100 * strain**3), None, {}
+    >>> stress, tangent, _ = Cubic(E=2e9).evaluate(np.full(6, 0.1), {}, 1.0)
+    >>> float(stress[0]), f"{tangent[0, 0]:.4g}"
+    (400000000.0, '8e+09')
+    """
+
+    density: float
+    aliases: ClassVar[tuple[str, ...]] = ()
+    variables: ClassVar[dict[str, str]] = {"density": "DENSITY"}
+    strain_measure: ClassVar[str] = "small"
+    internal_variables: ClassVar[Mapping[str, int]] = {}
+    symmetric_tangent: ClassVar[bool] = True
+    rate_dependent: ClassVar[bool] = False
+    is_linear: ClassVar[bool] = False
+
+    def __init_subclass__(cls, family: bool = False, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        if family:
+            return
+        if cls.strain_measure not in ("small", "finite"):
+            raise MaterialError(
+                f"{cls.__name__}.strain_measure is 'small' or 'finite'; got {cls.strain_measure!r}"
+            )
+        MATERIALS.add(cls.__name__, cls, cls.__dict__.get("aliases", ()))
+
+    def __post_init__(self) -> None:
+        for name in names_of(type(self)):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
+                raise MaterialError(f"{self._name(name)} must be a number; got {value!r}")
+            size: Any = abs(value)
+            if not size <= MAX_FLOAT:
+                raise MaterialError(f"{self._name(name)} must be finite; got {value}")
+        if self.density < 0:
+            raise MaterialError(
+                f"{self._name('density')} {self.density:g} must be ≥ 0 kg/m³; reverse gravity instead"
+            )
+        self.check()
+
+    @classmethod
+    def _name(cls, field: str) -> str:
+        variable = cls.variables.get(field)
+        return f"{field} ({variable})" if variable else field
+
+    def check(self) -> None:
+        """Check the constants; subclasses check their own bounds here.
+
+        Raises
+        ------
+        MaterialError
+            If one is beyond its bounds.
+        """
+
+    def response(self, strain: Array, state: GaussState, dt: float) -> Response:
+        """Return stress, tangent and internal variables at the end of a step; subclasses define it.
+
+        Parameters
+        ----------
+        strain : (..., 6), at the end of the step.
+        state : internal variables (..., size) by name, at its start; not to be changed.
+        dt : s, its length.
+
+        Returns
+        -------
+        stress : (..., 6) Pa.
+        tangent : (..., 6, 6) Pa, its derivative by the strain; None to have it found by differences.
+        state : internal variables at the end of the step, new arrays.
+
+        Raises
+        ------
+        TypeError
+            The subclass does not define it.
+        """
+        raise TypeError(f"{type(self).__name__} must define response(strain, state, dt)")
+
+    def energy(self, strain: Array, stress: Array, state: GaussState) -> Array:
+        """Return the stored energy: ½ σ:C⁻¹:σ of the elastic strain, unless a law defines another.
+
+        Parameters
+        ----------
+        strain, stress, state : (..., 6), (..., 6) and internal variables at the end of a step.
+
+        Returns
+        -------
+        (...) J/m³
+        """
+        return np.asarray((stress @ np.linalg.inv(self.C) * stress).sum(axis=-1) / 2)
+
+    def initial_state(self, *shape: int) -> GaussState:
+        """Return the internal variables at the beginning, 0.
+
+        Parameters
+        ----------
+        shape : leading axes, such as elements and Gauss points.
+
+        Returns
+        -------
+        dict of (*shape, size) arrays
+        """
+        return {name: np.zeros((*shape, size)) for name, size in self.internal_variables.items()}
+
+    def evaluate(
+        self, strain: Array, state: GaussState, dt: float, *, tangent: bool = True
+    ) -> tuple[Array, Array, GaussState]:
+        """Return the response, checked, with a tangent by differences where the law gives none.
+
+        Parameters
+        ----------
+        strain, state, dt : as for `response`.
+        tangent : False where it is not needed; it is empty then.
+
+        Returns
+        -------
+        stress, tangent, state : as by `response`.
+
+        Raises
+        ------
+        MaterialError
+            The law returns something else than its contract says, or numbers that are not finite.
+        """
+        answer = self.response(strain, state, dt)
+        if not isinstance(answer, tuple) or len(answer) != 3:
+            raise MaterialError(
+                f"{type(self).__name__}.response must return stress, tangent (or None) and state; "
+                f"got {type(answer).__name__}"
+            )
+        stress, D, new = answer
+        self._check_shape("stress", stress, strain.shape)
+        self._check_state(new, strain.shape[:-1])
+        if not tangent:
+            return stress, np.zeros(0), new
+        if D is None:
+            D = self._tangent_by_differences(strain, state, dt, stress)
+        D = np.broadcast_to(D, (*strain.shape, 6)) if np.shape(D) == (6, 6) else D
+        self._check_shape("tangent", D, (*strain.shape, 6))
+        return stress, D, new
+
+    def _tangent_by_differences(self, strain: Array, state: GaussState, dt: float, stress: Array) -> Array:
+        """Return ∂σ/∂ε (..., 6, 6) from one-sided differences, six more evaluations."""
+        size = np.maximum(np.abs(strain).max(axis=-1), STRAIN_STEP)
+        h = np.finfo(float).eps ** 0.5 * size
+        D = np.empty((*strain.shape, 6))
+        for column in range(6):
+            moved = strain.copy()
+            moved[..., column] += h
+            exact = moved[..., column] - strain[..., column]  # what rounding has made of h
+            D[..., column] = (self.response(moved, state, dt)[0] - stress) / exact[..., None]
+        return D
+
+    def _check_shape(self, what: str, values: Any, shape: tuple[int, ...]) -> None:
+        if np.shape(values) != shape:
+            raise MaterialError(
+                f"{type(self).__name__}.response: the {what} must have shape {shape} here; "
+                f"got {np.shape(values)}"
+            )
+        if not np.isfinite(values).all():
+            at = np.argwhere(~np.isfinite(values))[0].tolist()
+            raise MaterialError(f"{type(self).__name__}.response: the {what} is not finite at {at}")
+
+    def _check_state(self, state: Any, lead: tuple[int, ...]) -> None:
+        names = dict(self.internal_variables)
+        if not isinstance(state, dict) or state.keys() != names.keys():
+            found = ", ".join(state) if isinstance(state, dict) else type(state).__name__
+            raise MaterialError(
+                f"{type(self).__name__}.response must return the internal variables "
+                f"{', '.join(names) or 'as an empty dict'}; got {found or 'none'}"
+            )
+        for name, size in names.items():
+            self._check_shape(f"internal variable {name}", state[name], (*lead, size))
+
+    @cached_property
+    def C(self) -> Array:
+        """Elasticity matrix (6, 6) in Pa, the tangent at the beginning; read-only.
+
+        Raises
+        ------
+        MaterialError
+            The response needs it itself, or breaks its contract.
+        """
+        if "_making_C" in vars(self):
+            raise MaterialError(
+                f"{type(self).__name__}.response uses self.C, which is its own tangent at rest; make the "
+                "elasticity of the constants, such as kl.Isotropic3D(self.E, self.nu).C"
+            )
+        vars(self)["_making_C"] = True
+        try:
+            C = np.array(self.evaluate(np.zeros(6), self.initial_state(), 1.0)[1])
+        finally:
+            del vars(self)["_making_C"]
+        C = (C + C.T) / 2
+        C.setflags(write=False)
+        return C
+
+    @classmethod
+    def from_variables(cls, values: dict[str, Any]) -> Material:
+        """Make the material from the variables of a file, such as YOUNG_MODULUS.
+
+        Parameters
+        ----------
+        values : variables by name; the density may be missing and is 0 then.
+
+        Returns
+        -------
+        Material
+
+        Raises
+        ------
+        MaterialError
+            If a variable is missing or outside its bounds.
+        """
+        constants = {field: values[name] for field, name in cls.variables.items() if name in values}
+        needed = {name for name in names_of(cls) if name != "density"}
+        absent = sorted(needed - constants.keys())
+        missing = [f"{field} ({cls.variables.get(field, field)})" for field in absent]
+        if missing:
+            raise MaterialError(f"{cls.__name__} needs {', '.join(missing)}")
+        return cls(**constants)

@@ -1,0 +1,229 @@
+"""Checks of any constitutive law: its contract, its tangent, and what thermodynamics demands."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from kratos_lite import voigt
+from kratos_lite.materials import Material
+from kratos_lite.materials.material import GaussState
+from kratos_lite.testing.report import Finding, Measured, difference, largest, run, run_after
+from kratos_lite.typing import Array
+
+POINTS = 12
+"""Gauss points of each check."""
+DT = 0.7
+LENGTH = 1e-3
+"""Length in m of the elements for laws that ask for it: short, so that nothing snaps back."""
+SMALLEST, GREATEST = 1e-7, {"small": 0.3, "finite": 0.1}
+"""Strains between which a law is looked at."""
+BEYOND = (0.3, 0.97, 1.05, 3.0)
+"""Strains, in parts of that where the law ceases to be elastic."""
+
+
+def check_law(law: Material) -> list[Finding]:
+    """Check a law: shapes, states, tangent, elastic limit, dissipation, steps, rate, isotropy where claimed.
+
+    Parameters
+    ----------
+    law : an instance.  ``symmetric_tangent``, ``rate_dependent`` and ``isotropic = True`` in its class are
+        what it claims.
+
+    Returns
+    -------
+    list of Finding
+    """
+    first = run([contract], law)
+    return first + run_after(first, CHECKS, law)
+
+
+def start(law: Material, *shape: int) -> GaussState:
+    """Return the internal variables at the beginning."""
+    state = law.initial_state(*shape)
+    if "element_length" in state:
+        state["element_length"][...] = LENGTH
+    return state
+
+
+def limit(law: Material) -> float:
+    """Return the strain up to which a law is elastic, or the largest that is looked at."""
+    greatest, way = GREATEST[law.strain_measure], _directions()[0]
+    if law.rate_dependent or not law.internal_variables:
+        return greatest / 3
+    for size in np.geomspace(SMALLEST, greatest, 120):
+        state = law.evaluate(size * way, start(law), DT)[2]
+        tangent = law.evaluate(size * way, start(law), DT)[1]
+        moved = any(np.abs(v - start(law)[name]).max() > 1e-9 * size for name, v in state.items())
+        if moved and np.abs(tangent - law.C).max() > 1e-6 * np.abs(law.C).max():
+            return float(size)
+    return greatest / 3
+
+
+def _directions() -> Array:
+    """Return strains (POINTS, 6) of size 1 in all directions."""
+    ways = np.random.default_rng(5).normal(size=(POINTS, 6))
+    return ways / np.abs(ways).max(axis=1, keepdims=True)
+
+
+def _paths(law: Material) -> Iterator[tuple[str, Array, GaussState]]:
+    """Yield where a law is, a strain (POINTS, 6) and the state before: from rest, and on from there."""
+    size, state = limit(law), start(law, POINTS)
+    for factor in BEYOND:
+        strain = factor * size * _directions()
+        yield f"{factor:g} times the elastic limit", strain, state
+        new = law.evaluate(strain, state, DT)[2]
+        yield f"back from {factor:g} times the elastic limit", -0.6 * np.roll(strain, 1, axis=0), new
+
+
+def contract(law: Material) -> Measured:
+    """Check that the response has its shapes for one point and many, and leaves its arguments as they are."""
+    strain, state = 1e-4 * _directions(), start(law, POINTS)
+    kept = strain.copy(), {name: v.copy() for name, v in state.items()}
+    stress, _, new = law.evaluate(strain, state, DT)
+    faults = {"the strain was changed: work on copies": float((strain != kept[0]).sum())}
+    for name, values in state.items():
+        text = f"{name} was changed in place: return new arrays, as a step that fails is taken again"
+        faults[text] = float((values != kept[1][name]).sum() + (new[name] is values))
+    for i in (0, POINTS - 1):
+        alone = law.evaluate(strain[i], {name: v[i] for name, v in state.items()}, DT)[0]
+        text = "one point alone has another stress than among many: use [..., i] for components"
+        faults[text] = max(faults.get(text, 0.0), float(difference(alone, stress[i]) > 1e-10))
+    return largest(faults, 0)
+
+
+def rest(law: Material) -> Measured:
+    """Check that there is no stress without strain."""
+    stress = law.evaluate(np.zeros(6), start(law), DT)[0]
+    return Measured(float(np.abs(stress).max() / np.abs(law.C).max()), 1e-12, f"stress at rest is {stress}")
+
+
+def tangent(law: Material) -> Measured:
+    """Check that the tangent is the derivative of the stress, inside and beyond the elastic limit."""
+    errors = {}
+    for place, strain, state in _paths(law):
+        stress, D, _ = law.evaluate(strain, state, DT)
+        scale = np.abs(law.C).max()
+        numeric = [np.empty_like(D), np.empty_like(D)]
+        h = 1e-5 * np.abs(strain).max(axis=-1, keepdims=True)
+        for j, unit in enumerate(np.eye(6)):
+            plus, minus = (law.evaluate(strain + s * h * unit, state, DT)[0] for s in (1, -1))
+            numeric[0][..., j], numeric[1][..., j] = (plus - stress) / h, (stress - minus) / h
+        smooth = np.abs(numeric[0] - numeric[1]).max(axis=(-2, -1)) < 1e-2 * scale  # no kink between
+        error = np.abs(sum(numeric) / 2 - D).max(axis=(-2, -1)) / scale
+        errors[f"∂σ/∂ε against differences, {place}"] = float(error[smooth].max(initial=0.0))
+    return largest(errors, 1e-5)
+
+
+def symmetric_tangent(law: Material) -> Measured | str:
+    """Check that the tangent is symmetric, as the law claims."""
+    if not law.symmetric_tangent:
+        return f"{type(law).__name__} claims no symmetry"
+    errors = {
+        f"D against D^T, {place}; symmetric_tangent = False in the class would say so": difference(
+            D, np.swapaxes(D, -1, -2)
+        )
+        for place, strain, state in _paths(law)
+        for D in [law.evaluate(strain, state, DT)[1]]
+    }
+    return largest(errors, 1e-6)
+
+
+def elastic_strain(law: Material) -> Measured | str:
+    """Check that the stress is C (ε - plastic strain)."""
+    if dict(law.internal_variables).get("plastic_strain") != 6:
+        return f"{type(law).__name__} has no plastic_strain of six components"
+    errors = {}
+    for place, strain, state in _paths(law):
+        stress, _, new = law.evaluate(strain, state, DT)
+        text = f"σ against C (ε - ε_p), {place}; ε_p has engineering shear, and changes as the stress does"
+        errors[text] = difference(stress, (strain - new["plastic_strain"]) @ law.C.T)
+    return largest(errors, 1e-8)
+
+
+def staying(law: Material) -> Measured | str:
+    """Check that the same strain once more changes nothing."""
+    if law.rate_dependent:
+        return f"{type(law).__name__} depends on the rate"
+    errors = {}
+    for place, strain, state in _paths(law):
+        stress, _, new = law.evaluate(strain, state, DT)
+        again, _, same = law.evaluate(strain, new, DT)
+        errors[f"stress of the same strain again, {place}"] = difference(again, stress)
+        for name in new:
+            errors[f"{name} at the same strain again, {place}"] = difference(same[name], new[name])
+    return largest(errors, 1e-8)
+
+
+def one_step_or_two(law: Material) -> Measured | str:
+    """Check that a proportional strain in one step or in two gives the same stress."""
+    if law.rate_dependent:
+        return f"{type(law).__name__} depends on the rate"
+    strain = BEYOND[-1] * limit(law) * _proportional()
+    once = law.evaluate(strain, start(law, POINTS), DT)
+    half = law.evaluate(0.7 * strain, start(law, POINTS), DT)[2]
+    twice = law.evaluate(strain, half, DT)
+    text = "after one step against two: is a variable updated twice?"
+    errors = {f"stress {text}": difference(once[0], twice[0])}
+    for name in once[2]:
+        errors[f"{name} {text}"] = difference(twice[2][name], once[2][name])
+    return largest(errors, 1e-8)
+
+
+def _proportional() -> Array:
+    """Return strains without change of volume, over which the stress of an isotropic law is proportional."""
+    ways = _directions()
+    ways[:, :3] -= ways[:, :3].mean(axis=1, keepdims=True)
+    return ways
+
+
+def rate(law: Material) -> Measured:
+    """Check that the length of the step matters where the law depends on the rate, and nowhere else."""
+    strain = BEYOND[-1] * limit(law) * _directions()
+    fast, slow = (law.evaluate(strain, start(law, POINTS), dt)[0] for dt in (1e-12, 1e12))
+    changes = difference(fast, slow) > 1e-9
+    text = "the stress depends on dt: rate_dependent = True in the class says so"
+    if law.rate_dependent:
+        text = "the stress of a step of 1e-12 s is that of 1e12 s: is dt ignored?"
+    return Measured(float(changes != law.rate_dependent), 0, text)
+
+
+def dissipation(law: Material) -> Measured:
+    """Check that no closed path of strains gives energy, and that an elastic one costs none."""
+    size, worst = limit(law), {}
+    for factor in BEYOND[1:]:
+        rng, state = np.random.default_rng(7), start(law, POINTS)
+        corners = rng.normal(size=(5, POINTS, 6))
+        corners *= factor * size / np.abs(corners).max()
+        corners[-1] = 0.0
+        before, s_before, work, gross = np.zeros((POINTS, 6)), np.zeros((POINTS, 6)), 0.0, 0.0
+        for corner in corners:
+            begin = before
+            for i in range(1, 33):
+                strain = begin + (corner - begin) * (i / 32)
+                stress, _, state = law.evaluate(strain, state, DT)
+                part = ((stress + s_before) / 2 * (strain - before)).sum(axis=-1)
+                work, gross = work + part, gross + np.abs(part)
+                before, s_before = strain, stress
+        left = law.energy(before, s_before, state)
+        gained = float((-(np.asarray(work) - left) / np.asarray(gross)).max())
+        worst[f"energy gained over closed paths up to {factor:g} times the elastic limit"] = gained
+    return largest(worst, 5e-3)
+
+
+def isotropy(law: Material) -> Measured | str:
+    """Check that a turned strain gives the turned stress."""
+    if not getattr(type(law), "isotropic", False):
+        return f"{type(law).__name__} claims no isotropy; isotropic = True in the class would"
+    Q = np.linalg.qr(np.random.default_rng(11).normal(size=(3, 3)))[0]
+    strain = BEYOND[-1] * limit(law) * _directions()
+    turned = voigt.vector(Q @ voigt.tensor(strain * voigt.HALF_SHEAR) @ Q.T) * voigt.SHEAR_TWICE
+    stress, of_turned = (law.evaluate(e, start(law, POINTS), DT)[0] for e in (strain, turned))
+    expected = voigt.vector(Q @ voigt.tensor(stress) @ Q.T)
+    return Measured(difference(of_turned, expected), 1e-9, "stress of a turned strain against the turned one")
+
+
+CHECKS = (
+    rest, tangent, symmetric_tangent, elastic_strain, staying, one_step_or_two, rate, dissipation, isotropy,
+)  # fmt: skip

@@ -1,0 +1,198 @@
+"""Quasi-static analyses beside closed forms; convergence, restart, cuts and refusals."""
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.errors import InputError, ModelError, SolveError
+
+E, H, Y = 200e9, 2e9, 200e6
+STEEL = kl.J2Plasticity3D(E, 0.3, Y, H)
+HARD = kl.J2Plasticity3D(E, 0.3, Y, 20e9, 5e9)
+ELEMENTS = (
+    "Element3D8N",
+    "KinematicLinear3D8N",
+    "EnhancedStrain3D8N",
+    "KinematicLinear3D20N",
+    "KinematicLinear3D27N",
+    "KinematicLinear3D10N",
+    "KinematicLinear3D4N",
+)
+
+
+def bar(material, element="Element3D8N", cells=(2, 2, 2), size=(1, 1, 2), **options):
+    """Return a bar along z on rollers."""
+    model = kl.Model(kl.box(size, cells=cells, element=element), material, **options)
+    for side, axis in (("x-", "x"), ("y-", "y"), ("z-", "z")):
+        model.fix(side, axis)
+    return model
+
+
+def steps(model, dt=1.0, count=1, **options):
+    """Return an analysis after some steps."""
+    analysis = model.quasi_static(**options)
+    for _ in kl.integrate(analysis, dt=dt, steps=count):
+        pass
+    return analysis
+
+
+@pytest.mark.parametrize("element", ELEMENTS)
+def test_a_bar_of_steel_yields_in_every_element(element):
+    model = bar(STEEL, element)
+    model.add(kl.Traction("z+", (0, 0, 1.05 * Y)))
+    analysis = steps(model)
+    result = analysis.result()
+    strain = Y / E + 0.05 * Y * (E + H) / (E * H)
+    assert np.abs(result.displacement("z+")[:, 2] - 2 * strain).max() < 1e-9 * strain
+    assert np.abs(np.concatenate([*result.stress("gauss")])[:, 2] - 1.05 * Y).max() < 1e-9 * Y
+    assert abs(result.report.total_reaction[2] + 1.05 * Y) < 1e-8 * Y
+
+
+@pytest.mark.parametrize(
+    ("law", "formulation", "load"),
+    [
+        (HARD, "standard", 2e7),
+        (HARD, "enhanced", 2e7),
+        (HARD, "b_bar", 2e7),
+        (kl.DruckerPrager3D(20e9, 0.3, 50e6, 20.0, 10.0, 1e9), "b_bar", 1.5e7),
+        (kl.NeoHookean3D(1e6, 0.3), "total_lagrangian", 2e3),
+        (kl.MooneyRivlin3D(1e5, 0.5e5, 1e6), "total_lagrangian", 2e3),
+        (kl.Ogden3D(2e5, 2.0, 1e6), "total_lagrangian", 2e3),
+        (kl.Isotropic3D(1e6, 0.3), "total_lagrangian", 2e3),
+    ],
+    ids=lambda v: type(v).__name__ if isinstance(v, kl.Material) else v if isinstance(v, str) else "",
+)
+def test_newton_converges_quadratically(law, formulation, load):
+    model = kl.Model(kl.box((4, 1, 1), (8, 2, 2), "Element3D8N"), law, formulation=formulation)
+    model.fix("x-")
+    model.add(kl.Traction("x+", (0, 0, -load)))
+    residuals = np.array(steps(model, tolerance=1e-12).reports[-1].residuals)
+    assert len(residuals) > 3
+    last = residuals[residuals > 1e-13][-2:]
+    assert last[1] < 50 * last[0] ** 2 or last[1] < 1e-11
+
+
+def test_rubber_is_pulled_to_twice_its_length():
+    law = kl.NeoHookean3D(1e6, 0.3)
+    model = bar(law, size=(1, 1, 1))
+    model.fix("z+", "z", 1.0)
+    result = model.solve()
+    lam, mu = 0.3e6 / 1.3 / 0.4, 1e6 / 2.6
+    side = 1 + result.displacement("x+")[:, 0].mean()
+    J = 2 * side**2
+    assert abs(mu * (side**2 - 1) + lam * np.log(J)) < 1e-6 * mu  # no stress at the sides
+    exact = (mu * (4 - 1) + lam * np.log(J)) / J
+    assert abs(result.stress()[0, 0, 2] - exact) < 1e-8 * exact
+    assert abs(result.reaction("z+")[:, 2].sum() - exact * side**2) < 1e-8 * exact
+    energy = mu / 2 * (4 + 2 * side**2 - 3) - mu * np.log(J) + lam / 2 * np.log(J) ** 2
+    assert abs(result.energy() - energy) < 1e-8 * energy
+
+
+def test_a_cantilever_turns_by_a_force_at_its_end():
+    """Sze, Liu & Lo, Finite Elem. Anal. Des. 40 (2004) 1551: 3.286 and 6.698 of the shell."""
+    model = kl.Model(
+        kl.box((10, 1, 0.1), (20, 1, 1), "Element3D27N"),
+        kl.Isotropic3D(1.2e6, 0.0),
+        formulation="total_lagrangian",
+    )
+    model.fix("x-")
+    model.add(kl.Traction("x+", (0, 0, 4 / 0.1)))
+    tip = model.solve().displacement("x+").mean(axis=0)
+    assert abs(-tip[0] / 3.286 - 1) < 0.01
+    assert abs(tip[2] / 6.698 - 1) < 0.01
+
+
+def test_a_beam_of_steel_bends_beyond_its_yield_moment():
+    """M/M_y = (3 - (κ_y/κ)²)/2 of an elastic, perfectly plastic rectangle."""
+    mesh = kl.box((1, 0.1, 1), (1, 1, 16), "KinematicLinear3D20N")
+    model = kl.Model(mesh, kl.J2Plasticity3D(E, 0.0, Y), formulation="standard")
+    x, z = mesh.points[:, 0], mesh.points[:, 2] - 0.5
+    kappa = 3 * Y / E / 0.5  # three times that of the first yield
+    model.fix("x-", "x")
+    for node in mesh.nodes("x+"):
+        model.fix([int(node)], "x", float(kappa * z[node] * x[node]))
+    model.fix((0, 0, 0.5), "yz")
+    model.fix((0, 0.1, 0.5), "z")
+    result = model.solve()
+    moment = (result.reaction("x+")[:, 0] * z[mesh.nodes("x+")]).sum()
+    elastic = Y * 0.1 / 6
+    assert abs(moment / elastic / ((3 - 1 / 9) / 2) - 1) < 0.01
+
+
+def test_restart_goes_on_bit_by_bit():
+    model = bar(STEEL)
+    model.fix("z+", "z", lambda t: 0.02 * np.sin(3 * t))
+    whole = model.quasi_static()
+    states = list(kl.integrate(whole, dt=0.2, steps=6))
+    again = model.quasi_static()
+    states[2].restore(again)
+    for _ in kl.integrate(again, dt=0.2, steps=3):
+        pass
+    for name, value in states[-1].values.items():
+        assert (np.asarray(again.state().values[name]) == np.asarray(value)).all(), name
+    assert abs(whole.work) > 0
+    other = bar(kl.J2Plasticity3D(E, 0.3, Y), "KinematicLinear3D20N").quasi_static()
+    with pytest.raises(InputError, match="does not fit"):
+        states[2].restore(other)
+
+
+def test_a_load_beyond_the_limit_is_refused_with_how_far_it_came():
+    model = bar(kl.J2Plasticity3D(E, 0.3, Y))
+    model.add(kl.Traction("z+", (0, 0, 2 * Y)))
+    analysis = model.quasi_static(iterations=8)
+    with pytest.raises(SolveError, match=r"converges up to t = 0\.5 s only.* limit load"):
+        for _ in kl.integrate(analysis, dt=1.0, steps=1):
+            pass
+    assert 0.49 < analysis.time <= 0.5  # the last converged state is kept
+    assert abs(analysis.result().stress()[0, 0, 2] - 2 * Y * analysis.time) < 1e-6 * Y
+
+
+def test_a_viscous_bar_creeps():
+    law = kl.GeneralizedMaxwell3D(1e9, 0.3, 0.5, 2.0)
+    model = bar(law)
+    model.add(kl.Traction("z+", (0, 0, 1e6)))
+    creep = []
+    for count in (40, 80):
+        analysis = model.quasi_static()
+        analysis.prepare(1e-9, 1)
+        analysis.advance(1e-9, 1)
+        for _ in kl.integrate(analysis, dt=4.0 / count, steps=count):
+            pass
+        creep.append(analysis.result().displacement("z+")[:, 2].mean() / 2)
+    exact = 1e-3 * (2 - np.exp(-4.0 / 4.0))  # J(t) of E (½ + ½ e^{-t/2})
+    errors = [abs(value / exact - 1) for value in creep]
+    assert errors[1] < 1e-4
+    assert 3.5 < errors[0] / errors[1] < 4.5
+
+
+def test_prestress_and_linear_parts_beside_a_law():
+    mesh = kl.box((1, 1, 2), (2, 2, 2), "KinematicLinear3D8N")
+    top = mesh.elements(None)[-4:]
+    model = kl.Model(mesh, STEEL)
+    model.assign(kl.Isotropic3D(E, 0.3), top)
+    for side, axis in (("x-", "x"), ("y-", "y"), ("z-", "z")):
+        model.fix(side, axis)
+    model.add_prestress((0, 0, 0.9 * Y, 0, 0, 0))
+    model.fix("z+", "z", 0.0)
+    result = model.solve()
+    stress = result.stress("element")
+    assert np.abs(stress[:, 2] - stress[0, 2]).max() < 1e-6 * Y
+    linear = kl.Model(mesh, kl.Isotropic3D(E, 0.3))
+    for side, axis in (("x-", "x"), ("y-", "y"), ("z-", "z")):
+        linear.fix(side, axis)
+    linear.add_prestress((0, 0, 0.9 * Y, 0, 0, 0))
+    linear.fix("z+", "z", 0.0)
+    assert np.abs(linear.solve().stress("element") - stress).max() < 1e-6 * Y  # nothing has yielded
+
+
+def test_refusals():
+    with pytest.raises(ModelError, match="total_lagrangian"):
+        bar(kl.NeoHookean3D(1e6, 0.3), "KinematicLinear3D8N").element_groups()
+    free = kl.Model(kl.box(), STEEL)
+    free.add(kl.Traction("z+", (0, 0, 1.0)))
+    with pytest.raises(ModelError):
+        free.solve()
+    model = bar(STEEL)
+    model.fix("z+", "z", 0.01)
+    with pytest.raises(InputError, match="estimate of the error"):
+        model.solve().error()

@@ -1,0 +1,253 @@
+"""Nonlinear laws at one point: tangents by differences, closed forms, energies, refusals."""
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.errors import MaterialError
+from kratos_lite.materials import Material
+
+LAWS = [
+    (kl.J2Plasticity3D(200e9, 0.3, 250e6), 3e-3),
+    (kl.J2Plasticity3D(200e9, 0.3, 250e6, 1e9, 2e9, 400e6, 20.0), 3e-3),
+    (kl.DruckerPrager3D(20e6, 0.3, 1e4, 30.0), 2e-3),
+    (kl.DruckerPrager3D(20e6, 0.3, 1e4, 30.0, 10.0, 1e5), 2e-3),
+    (kl.DruckerPrager3D(20e6, 0.3, 1e4, 30.0, 30.0, 1e5), 2e-3),
+    (kl.IsotropicDamage3D(30e9, 0.2, 3e6, 100.0), 2e-4),
+    (kl.IsotropicDamage3D(30e9, 0.2, 3e6, 100.0, linear=1), 2e-4),
+    (kl.GeneralizedMaxwell3D(1e9, 0.3, 0.3, 10.0, 0.2, 1.0), 1e-2),
+    (kl.SaintVenantKirchhoff3D(1e6, 0.3), 0.1),
+    (kl.NeoHookean3D(1e6, 0.3), 0.1),
+    (kl.MooneyRivlin3D(0.3e6, 0.1e6, 1e7), 0.1),
+    (kl.Ogden3D(0.63e6, 1.3, 1e7, 1.2e3, 5.0, -1e4, -2.0), 0.1),
+]
+HYPERELASTIC = [law for law, _ in LAWS if law.strain_measure == "finite"]
+
+
+def start(law: Material, *shape: int) -> dict:
+    """Return the state at the beginning, in elements of 0.1 m."""
+    state = law.initial_state(*shape)
+    if "element_length" in state:
+        state["element_length"][:] = 0.1
+    return state
+
+
+@pytest.mark.parametrize(
+    ("law", "size"), LAWS, ids=lambda v: type(v).__name__ if isinstance(v, Material) else ""
+)
+def test_the_tangent_is_the_derivative_of_the_stress(law, size):
+    strain = np.random.default_rng(1).normal(size=(40, 6)) * size
+    state = start(law, 40)
+    for _ in range(2):  # from rest, and on from there
+        before = {name: values.copy() for name, values in state.items()}
+        _, tangent, new = law.evaluate(strain, state, 0.7)
+        numeric = np.empty_like(tangent)
+        for j in range(6):
+            h = 1e-6 * size * np.eye(6)[j]
+            numeric[..., j] = (
+                law.evaluate(strain + h, state, 0.7)[0] - law.evaluate(strain - h, state, 0.7)[0]
+            ) / (2e-6 * size)
+        assert np.abs(numeric - tangent).max() < 1e-7 * np.abs(tangent).max()
+        if law.symmetric_tangent:
+            assert np.abs(tangent - np.swapaxes(tangent, 1, 2)).max() < 1e-14 * np.abs(tangent).max()
+        assert all((state[name] == before[name]).all() for name in before)
+        one = law.evaluate(strain[3], {name: values[3] for name, values in state.items()}, 0.7)[0]
+        assert np.abs(one - law.evaluate(strain, state, 0.7)[0][3]).max() <= 1e-14 * np.abs(one).max()
+        state, strain = new, -0.5 * strain
+
+
+@pytest.mark.parametrize("law", HYPERELASTIC, ids=lambda law: type(law).__name__)
+def test_the_stress_is_the_derivative_of_the_energy(law):
+    E, h = np.random.default_rng(2).normal(size=(20, 6)) * 0.1, 1e-6
+    stress = law.evaluate(E, {}, 1.0)[0]
+    for j in range(6):
+        step = h * np.eye(6)[j]
+        ends = [law.energy(e, law.evaluate(e, {}, 1.0)[0], {}) for e in (E + step, E - step)]
+        assert np.abs((ends[0] - ends[1]) / (2 * h) - stress[:, j]).max() < 1e-8 * np.abs(stress).max()
+
+
+@pytest.mark.parametrize("law", HYPERELASTIC[1:], ids=lambda law: type(law).__name__)
+def test_an_isotropic_law_turns_with_its_strain(law):
+    rng = np.random.default_rng(3)
+    Q = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    E = rng.normal(size=6) * 0.1
+    turned = strain_of(Q @ tensor_of(E) @ Q.T)
+    S, S_turned = (law.evaluate(e, {}, 1.0)[0] for e in (E, turned))
+    assert np.abs(Q @ tensor(S) @ Q.T - tensor(S_turned)).max() < 1e-12 * np.abs(S).max()
+
+
+def tensor(s):
+    return s[[[0, 3, 5], [3, 1, 4], [5, 4, 2]]]
+
+
+def tensor_of(strain):
+    return tensor(strain * [1, 1, 1, 0.5, 0.5, 0.5])
+
+
+def strain_of(t):
+    return np.array([t[0, 0], t[1, 1], t[2, 2], 2 * t[0, 1], 2 * t[1, 2], 2 * t[2, 0]])
+
+
+def uniaxial(law, strains, state=None, dt=1.0):
+    """Return the axial stress along a path of axial strains under uniaxial stress."""
+    state, e, out = start(law) if state is None else state, np.zeros(6), []
+    for axial in strains:
+        e[0] = axial
+        for _ in range(30):
+            stress, D, new = law.evaluate(e, state, dt)
+            if np.abs(stress[1:]).max() < 1e-11 * max(np.abs(stress[0]), 1.0):
+                break
+            e[1:] -= np.linalg.solve(D[1:, 1:], stress[1:])
+        state = new
+        out.append(stress[0])
+    return np.array(out), state
+
+
+def test_steel_hardens_along_the_lines_of_a_bar():
+    E, H, Y = 200e9, 2e9, 250e6
+    for isotropic, kinematic in ((H, 0.0), (0.0, H), (H / 4, 3 * H / 4)):
+        law = kl.J2Plasticity3D(E, 0.3, Y, isotropic, kinematic)
+        stress, state = uniaxial(law, [Y / E, 0.01])
+        slope = E * H / (E + H)
+        assert abs(stress[0] - Y) < 1e-9 * Y
+        top = Y + slope * (0.01 - Y / E)
+        assert abs(stress[1] - top) < 1e-9 * Y
+        p = 0.01 - top / E
+        assert abs(state["accumulated_plastic_strain"][0] - p) < 1e-12
+        # back again: yields after twice the present radius
+        radius = Y + isotropic * p
+        back, _ = uniaxial(law, [0.01 - 2 * radius / E, -0.01], state)
+        assert abs(back[0] - (top - 2 * radius)) < 1e-9 * Y
+        rest = 0.02 - 2 * radius / E
+        assert abs(back[1] - (top - 2 * radius - slope * rest)) < 1e-9 * Y
+
+
+def test_saturation_of_voce():
+    law = kl.J2Plasticity3D(200e9, 0.3, 200e6, 0.0, 0.0, 300e6, 50.0)
+    stress, state = uniaxial(law, [0.05])
+    p = state["accumulated_plastic_strain"][0]
+    assert abs(stress[0] - (200e6 + 100e6 * (1 - np.exp(-50 * p)))) < 1.0
+    assert abs(p - (0.05 - stress[0] / 200e9)) < 1e-12
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_cone_of_soils_in_triaxial_tests(sign):
+    c, phi = 10e3, np.radians(30)
+    law = kl.DruckerPrager3D(20e6, 0.3, c, 30.0, 30.0)
+    stress = uniaxial(law, sign * np.linspace(0, 0.05, 51)[1:])[0][-1:]
+    eta, xi = (6 * f / (3**0.5 * (3 - np.sin(phi))) for f in (np.sin(phi), np.cos(phi)))
+    strength = xi * c / (1 / 3**0.5 + sign * eta / 3)  # √J₂ = |σ|/√3, p = σ/3
+    assert abs(abs(stress[0]) - strength) < 1e-8 * strength
+    if sign < 0:  # Mohr and Coulomb's in compression
+        assert abs(strength - 2 * c * np.cos(phi) / (1 - np.sin(phi))) < 1e-8 * strength
+
+
+@pytest.mark.parametrize("linear", [0, 1])
+def test_damage_dissipates_the_fracture_energy(linear):
+    for length in (0.05, 0.1, 0.2):
+        law = kl.IsotropicDamage3D(30e9, 0.2, 3e6, 100.0, linear=linear)
+        state = law.initial_state()
+        state["element_length"][:] = length
+        strains = np.concatenate([[0.5e-4, 1e-4], np.geomspace(1.01e-4, 4e-2 if not linear else 2e-3, 200)])
+        stress, _ = uniaxial(law, strains, state)
+        energy = np.diff(strains, prepend=0) @ (stress + np.concatenate([[0], stress[:-1]])) / 2 * length
+        assert abs(stress.max() - 3e6) < 1e-9 * 3e6
+        assert abs(energy - 100.0) < 0.01 * 100.0
+
+
+def test_damage_does_not_heal():
+    law = kl.IsotropicDamage3D(30e9, 0.2, 3e6, 100.0)
+    stress, state = uniaxial(law, [3e-4], start(law))
+    back, again = uniaxial(law, [1e-4], state)
+    assert abs(back[0] / stress[0] - 1 / 3) < 1e-9
+    assert again["damage"] == state["damage"]
+
+
+def test_relaxation_and_creep_of_order_two():
+    law = kl.GeneralizedMaxwell3D(1e9, 0.3, 0.3, 10.0, 0.2, 1.0)
+    held = np.array([1e-3, 0, 0, 0, 0, 0])
+    stress, _, state = law.evaluate(held, law.initial_state(), 0.0)
+    for t in (1.0, 2.0, 3.0):
+        later, _, state = law.evaluate(held, state, 1.0)
+        factor = 1 - 0.3 * (1 - np.exp(-t / 10)) - 0.2 * (1 - np.exp(-t))
+        assert np.abs(later - factor * stress).max() < 1e-12 * np.abs(stress).max()
+    errors = []
+    for n in (20, 40, 80):  # a strain of sin t: convolution in closed form
+        state, h = law.initial_state(), 2.0 / n
+        for i in range(n):
+            out, _, state = law.evaluate(held * np.sin((i + 1) * h), state, h)
+        t, exact = 2.0, 0.5 * np.sin(2.0)
+        for w, tau in law.terms:
+            exact += w * tau * (tau * np.sin(t) + np.cos(t) - np.exp(-t / tau)) / (1 + tau**2)
+        errors.append(abs(out[0] / stress[0] - exact))
+    assert 3.8 < errors[0] / errors[1] < 4.2
+    assert 3.8 < errors[1] / errors[2] < 4.2
+
+
+@pytest.mark.parametrize("stretch", [0.6, 1.5, 3.0])
+def test_rubber_pulled_and_sheared(stretch):
+    green = (stretch**2 - 1) / 2
+    shear = np.array([0, 1 / 2, 0, 1.0, 0, 0])  # simple shear of 1: F = 1 + e_x e_y
+    F = np.array([[1.0, 1, 0], [0, 1, 0], [0, 0, 1]])
+    for law in HYPERELASTIC[1:]:
+        S = law.evaluate(shear, {}, 1.0)[0]
+        sigma = F @ tensor(S) @ F.T
+        if isinstance(law, kl.NeoHookean3D):
+            mu = law.E / (2 * (1 + law.nu))
+            assert abs(sigma[0, 1] - mu) < 1e-9 * mu
+        # Rivlin's universal relation
+        assert abs(sigma[0, 0] - sigma[1, 1] - sigma[0, 1]) < 1e-9 * abs(sigma[0, 1])
+    nearly = kl.MooneyRivlin3D(0.3e6, 0.1e6, 1e12)
+    stress, _ = uniaxial(nearly, [green])
+    exact = 2 * (stretch - stretch**-2) * (0.3e6 + 0.1e6 / stretch) / stretch
+    assert abs(stress[0] - exact) < 1e-4 * abs(exact)
+    ogden = kl.Ogden3D(0.63e6, 1.3, 1e12)
+    stress, _ = uniaxial(ogden, [green])
+    exact = 0.63e6 * (stretch**0.3 - stretch ** (-0.65 - 1)) / stretch
+    assert abs(stress[0] - exact) < 1e-4 * abs(exact)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda s, D, q: (s[:3], D, q), "stress must have shape"),
+        (lambda s, D, q: (s, D[:3], q), "tangent must have shape"),
+        (lambda s, D, q: (s * np.nan, D, q), "stress is not finite"),
+        (lambda s, D, q: (s, D, {}), "internal variables plastic_strain"),
+        (lambda s, D, q: (s, D, q | {"plastic_strain": np.zeros(2)}), "plastic_strain must have shape"),
+        (lambda s, D, q: s, "must return stress, tangent"),
+    ],
+)
+def test_a_law_that_breaks_the_contract_is_told_how(change, says, monkeypatch):
+    law, response = kl.J2Plasticity3D(200e9, 0.3, 250e6), kl.J2Plasticity3D.response
+    monkeypatch.setattr(kl.J2Plasticity3D, "response", lambda *a: change(*response(*a)))
+    with pytest.raises(MaterialError, match=says):
+        law.evaluate(np.full(6, 1e-3), law.initial_state(), 1.0)
+
+
+def test_a_law_cannot_use_its_own_tangent_at_rest(monkeypatch):
+    law = kl.J2Plasticity3D(200e9, 0.3, 250e6)
+    monkeypatch.setattr(kl.J2Plasticity3D, "response", lambda self, e, q, dt: (e @ self.C, None, q))
+    with pytest.raises(MaterialError, match=r"uses self\.C"):
+        law.C  # noqa: B018
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: kl.J2Plasticity3D(200e9, 0.3, 0.0), "YIELD_STRESS"),
+        (lambda: kl.J2Plasticity3D(200e9, 0.3, 1.0, -1.0), "softening"),
+        (lambda: kl.J2Plasticity3D(200e9, 0.3, 2.0, 0.0, 0.0, 1.0), "SATURATION"),
+        (lambda: kl.J2Plasticity3D(200e9, 0.5, 1.0), "POISSON_RATIO"),
+        (lambda: kl.DruckerPrager3D(1e6, 0.3, 1e3, 95.0), "FRICTION_ANGLE"),
+        (lambda: kl.DruckerPrager3D(1e6, 0.3, 1e3, 20.0, 30.0), "DILATANCY"),
+        (lambda: kl.MooneyRivlin3D(-1.0, 0.0, 1.0), "shear modulus"),
+        (lambda: kl.Ogden3D(1.0, -2.0, 1.0), "shear modulus"),
+        (lambda: kl.IsotropicDamage3D(1.0, 0.2, 1.0, 0.0), "FRACTURE_ENERGY"),
+        (lambda: kl.GeneralizedMaxwell3D(1.0, 0.2, 0.9, 1.0, 0.2), "sum ≤ 1"),
+        (lambda: kl.GeneralizedMaxwell3D(1.0, 0.2, 0.9, 0.0), "tau1"),
+    ],
+)
+def test_constants_beyond_their_bounds(make, says):
+    with pytest.raises(MaterialError, match=says):
+        make()
