@@ -102,13 +102,9 @@ class AffineBody(Body):
         """Return A times the vector; see `FreeBody.push_forward`."""
         return np.asarray(self._matrix_of(q) @ vector)
 
-    def mass_center(self) -> Array:
+    def mass_center(self, q: Array | None = None) -> Array:
         """Return x̄ (..., 3) in m."""
-        return self.q[..., 9:].copy()
-
-    def gravity_potential(self, g: Array, q: Array) -> Array:
-        """Return -m g · x̄, (...) in J."""
-        return np.asarray(-self.mass * (q[..., 9:] @ g))
+        return (self.q if q is None else q)[..., 9:].copy()
 
     def linear_momentum(self) -> Array:
         """Return m v̄ (..., 3) in kg m/s."""

@@ -13,9 +13,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from kratos_lite.bodies.constraints.base import Constraint
+from kratos_lite.bodies.applied_load import AppliedLoad, BodyLoad, apply_load
+from kratos_lite.bodies.constraints import Constraint
 from kratos_lite.bodies.free_body import FreeBody
-from kratos_lite.bodies.loads.base import AppliedLoad, BodyLoad, apply_load
 from kratos_lite.bodies.validation import Material
 from kratos_lite.errors import InputError, ModelError, nearest
 from kratos_lite.mesh import Mesh
@@ -24,7 +24,7 @@ from kratos_lite.model.mass_properties import MassProperties
 from kratos_lite.registry import Registry
 from kratos_lite.time_series import Factor
 from kratos_lite.typing import Array
-from kratos_lite.validation import finite
+from kratos_lite.validation import number
 
 _log = logging.getLogger("kratos_lite")
 BODIES: Registry[type[Body]] = Registry("kind of body")
@@ -143,25 +143,23 @@ class Body(FreeBody):
         }
 
     @abstractmethod
-    def affine_motion(self) -> tuple[Array, Array]:
-        """Return F and Ḟ (3, 3), in 1/s, of the affine motion nearest to the body with respect to mass."""
+    def affine_motion(self) -> tuple[Array, Array, Array]:
+        """Return the affine motion nearest to the body with respect to mass.
+
+        Returns
+        -------
+        F and Ḟ (3, 3), in 1/s, and the place (3,) of X̄ in m.
+        """
 
     @abstractmethod
-    def set_affine_motion(
-        self, F: Array, rate: Array, center: Array, velocity: Array, angular_momentum: Array
-    ) -> None:
-        """Take on the motion that is nearest to an affine one.
+    def set_affine_motion(self, F: Array, rate: Array, center: Array, velocity: Array) -> None:
+        """Take on the motion that is nearest to an affine one, but for the angular velocity of a rigid body.
 
         Parameters
         ----------
         F, rate : (3, 3), deformation gradient and its rate in 1/s.
         center, velocity : (3,), place of X̄ in m, and velocity of the mass center in m/s.
-        angular_momentum : (3,) kg m²/s about the mass center; only a rigid body takes it from here.
         """
-
-    def reference_center(self) -> Array:
-        """Return the mass center (3,) in m of the undeformed body as its mass matrix has it."""
-        return self.center
 
     @property
     def integrator(self) -> str:
@@ -170,14 +168,13 @@ class Body(FreeBody):
 
     @integrator.setter
     def integrator(self, name: str) -> None:
-        words = [word for word, alias in self.integrators.items() if name in (word, alias or word)]
-        if not words:
-            known = ", ".join(self.integrators) or "none"
-            aliases = [alias for alias in self.integrators.values() if alias]
-            hint = nearest(name, [*self.integrators, *aliases], 1) if isinstance(name, str) else ""
-            text = f"the integrators of a {self.kind} body are {known}; got {name!r}"
+        names = [word for word, alias in self.integrators.items() if name in (word, alias or word)]
+        if not names:
+            known = [*self.integrators, *filter(None, self.integrators.values())]
+            hint = nearest(name, known, 1) if isinstance(name, str) else ""
+            text = f"the integrators of a {self.kind} body are {', '.join(self.integrators)}; got {name!r}"
             raise InputError(f"{text}.{hint}" if hint else text)
-        self._integrator = words[0]
+        self._integrator = names[0]
 
     @property
     def damping(self) -> float:
@@ -186,10 +183,7 @@ class Body(FreeBody):
 
     @damping.setter
     def damping(self, value: float) -> None:
-        damping = finite(value, "a damping")
-        if damping.ndim or damping < 0:
-            raise InputError(f"a damping must be one number of seconds, ≥ 0; got {value}")
-        self._damping = float(damping)
+        self._damping = number(value, "a damping", least=0, unit="s")
 
     @property
     def tolerance(self) -> float:
@@ -198,10 +192,7 @@ class Body(FreeBody):
 
     @tolerance.setter
     def tolerance(self, value: float) -> None:
-        tolerance = finite(value, "a tolerance")
-        if tolerance.ndim or not 0 <= tolerance < 1:
-            raise InputError(f"a tolerance must be one number from 0 to less than 1; got {value}")
-        self._tolerance = float(tolerance)
+        self._tolerance = number(value, "a tolerance", least=0, below=1)
 
     # ---- loads and constraints -------------------------------------------------------------------
 
@@ -272,28 +263,19 @@ class Body(FreeBody):
         -------
         (..., dofs) float.
         """
-        q, t = self.q if q is None else q, self.time if time is None else time
-        u = self.u if u is None else u
-        total = np.zeros_like(self.u)
-        for load in self.loads:
-            total += load(q, u, t)
-        return total
+        q, u = self.q if q is None else q, self.u if u is None else u
+        time = self.time if time is None else time
+        return sum((load(q, u, time) for load in self.loads), np.zeros_like(self.u))
 
     def constant_loads(self) -> tuple[Array, Array, Array]:
         """Return acceleration (..., 3) and forces (..., dofs) fixed in space and body of constant loads."""
-        if self._constant is not None and self._constant[0] == len(self.loads):
-            return self._constant[1]
-        lead = self.q.shape[:-1]
-        acceleration, spatial, follower = np.zeros((*lead, 3)), np.zeros_like(self.u), np.zeros_like(self.u)
-        for load in self.loads:
-            amplitude = load.amplitude(self.time)
-            if load.acceleration is not None:
-                acceleration += amplitude * load.acceleration
-            if load.spatial is not None:
-                spatial += amplitude * load.spatial
-            if load.follower is not None:
-                follower += amplitude * load.follower
-        self._constant = len(self.loads), (acceleration, spatial, follower)
+        if self._constant is None or self._constant[0] != len(self.loads):
+            totals = np.zeros((*self.q.shape[:-1], 3)), np.zeros_like(self.u), np.zeros_like(self.u)
+            for load in self.loads:
+                for i, part in enumerate((load.acceleration, load.spatial, load.follower)):
+                    if part is not None:
+                        totals[i][...] += load.amplitude(self.time) * part
+            self._constant = len(self.loads), totals
         return self._constant[1]
 
     # ---- energies --------------------------------------------------------------------------------

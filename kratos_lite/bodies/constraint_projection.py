@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 import numpy as np
 
 from kratos_lite.bodies.body import Body
-from kratos_lite.bodies.constraints.base import with_slices
+from kratos_lite.bodies.constraints import with_slices
 from kratos_lite.bodies.linear_algebra import Solve
 from kratos_lite.errors import InputError, SolveError
 from kratos_lite.typing import Array
@@ -69,7 +69,7 @@ def project_velocity(body: Body, h: float) -> None:
     wanted, size = [], _extent(body)
     for constraint in body.constraints:
         x, v = body.position(constraint.points), body.velocity(constraint.points)
-        gap = float(np.abs(constraint.gap(x, v, body.time, 2.0)).max()) if constraint.positional else 0.0
+        gap = float(np.abs(constraint.violation(x, v, body.time)).max()) if constraint.positional else 0.0
         if gap > JUMP * size:
             raise InputError(
                 f"a {type(constraint).__name__} is not met: its gap is {gap:.3g} m at t = {body.time:g} s, "
@@ -108,21 +108,16 @@ def constraint_jacobian(body: Body, q: Array) -> Array:
     return np.concatenate([constraint.jacobian(body, q) for constraint in body.constraints])
 
 
-def allowed(H: Array) -> csr_array[Any, Any]:
-    """Return the motions (dofs, k) that rows H (c, dofs) leave free: H T = 0."""
+def unconstrained_motions(H: Array) -> csr_array[Any, Any]:
+    """Return a basis (dofs, k) of the motions that rows H (c, dofs) leave free: H T = 0."""
     from scipy.linalg import null_space
-    from scipy.sparse import csr_array, eye_array
+    from scipy.sparse import csr_array, eye_array, hstack
 
-    count = (H != 0).sum(axis=1)
-    if (count <= 1).all():  # each row holds one displacement, or none
-        return csr_array(eye_array(H.shape[1], format="csr")[:, ~(H != 0).any(axis=0)])
-    tied = (H != 0).any(axis=0)  # only these take part in constraints
-    inner = null_space(H[:, tied])
-    free = np.flatnonzero(~tied)
-    T = np.zeros((H.shape[1], inner.shape[1] + len(free)))
-    T[np.ix_(tied, np.arange(inner.shape[1]))] = inner
-    T[free, inner.shape[1] + np.arange(len(free))] = 1.0
-    return csr_array(T)
+    tied = (H != 0).any(axis=0)  # only these dofs take part in constraints
+    several = ((H != 0).sum(axis=1) > 1).any()  # else each row fixes one displacement
+    inner = null_space(H[:, tied]) if several else np.zeros((tied.sum(), 0))
+    unit = eye_array(H.shape[1], format="csc")
+    return csr_array(hstack([csr_array(unit[:, tied] @ inner), unit[:, ~tied]], format="csr"))
 
 
 def _corrected(body: Body, h: float, H: Array, inverse: Array, advance: Advance) -> tuple[Step, Array]:

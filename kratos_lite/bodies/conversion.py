@@ -75,10 +75,8 @@ def convert(body: Body, kind: Any, **options: Any) -> Any:
     if body.q.ndim > 1 or body.mesh is None or body.material is None:
         raise ModelError(f"only a single body with a mesh and a material changes its kind; got {body!r}")
     other = _made(body, kind, options)
-    F, rate = body.affine_motion()
-    center = body.mass_center() + F @ (body.center - body.reference_center())
-    velocity = body.linear_momentum() / body.mass
-    other.set_affine_motion(F, rate, center, velocity, body.angular_momentum())
+    F, rate, center = body.affine_motion()
+    other.set_affine_motion(F, rate, center, body.linear_momentum() / body.mass)
     _turn(other, body.angular_momentum())
     other.time, other.step = body.time, body.step
     other.external_work = np.array(body.external_work)
@@ -94,16 +92,15 @@ def _made(body: Body, kind: type[Body], options: dict[str, Any]) -> Body:
     """Return a new body at rest with the settings of another."""
     settings, takes = body.settings(), signature(kind).parameters
     integrator = settings.pop("integrator")
-    for name in [name for name in settings if name not in takes]:
-        value = settings.pop(name)
-        if name == "mass_properties" and value is not None:
-            _check_mass(body, kind)
-        elif name == "damping" and value:
-            _log.warning("a %s body takes no damping: %g s is omitted", kind.kind, value)
+    if settings["mass_properties"] is not None and "mass_properties" not in takes:
+        _check_mass(body, kind)
+    if settings["damping"] and "damping" not in takes:
+        _log.warning("a %s body takes no damping: %g s is omitted", kind.kind, settings["damping"])
     if "formulation" in options:
         settings.pop("modes", None)
     if type(body) is not kind:  # its default is that of the kind
-        settings.pop("tolerance", None)
+        settings.pop("tolerance")
+    settings = {name: value for name, value in settings.items() if name in takes}
     other = kind(body.mesh, body.material, **{**settings, **options})
     if "integrator" not in options:
         if integrator in other.integrators:
@@ -138,19 +135,14 @@ def _check_mass(body: Body, kind: type[Body]) -> None:
     """Refuse mass properties that a body takes from its mesh, but that are others."""
     assert body.mesh is not None
     assert body.material is not None
-    own = mass_properties_of(body.mesh, body.material)
-    properties = body.mass_properties
+    own, given = mass_properties_of(body.mesh, body.material), body.mass_properties
     size = float(np.ptp(body.mesh.points, axis=0).max())
-    pairs = (
-        (properties.mass, own.mass, 1.0),
-        (properties.center, own.center, size),
-        (properties.euler, own.euler, size**2),
-    )
-    for value, other, scale in pairs:
-        if not np.allclose(value, other, rtol=0, atol=1e-9 * own.mass * scale):
+    for name, scale in (("mass", 1.0), ("center", size), ("euler", size**2)):
+        pair = getattr(given, name), getattr(own, name)
+        if not np.allclose(*pair, rtol=0, atol=1e-9 * own.mass * scale):
             raise ModelError(
                 f"the mass of a {kind.kind} body follows from its mesh ({own.mass:g} kg), and the mass "
-                f"properties that were given to this {body.kind} body are others ({properties.mass:g} kg); "
+                f"properties that were given to this {body.kind} body are others ({given.mass:g} kg); "
                 "make one of a mesh and a density that have them"
             )
 

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from kratos_lite.bodies.body import Body
-from kratos_lite.bodies.linear_algebra import Entries, Solve
+from kratos_lite.bodies.linear_algebra import Solve
 from kratos_lite.model.checks import check_wave_speeds
 from kratos_lite.typing import Array
 
@@ -48,24 +48,6 @@ class Deformable(Body):
         Returns
         -------
         function of columns b (dofs, k) or (dofs,) that returns x.
-        """
-
-    @abstractmethod
-    def solve_static(
-        self, residual: Array, entries: Entries, gap: Array, tangent: Entries
-    ) -> tuple[Array, Array]:
-        """Solve (K(q) - A) x = residual + H^T multipliers with H x = -gap: one step towards equilibrium.
-
-        Parameters
-        ----------
-        residual : (dofs,), external less internal force vector.
-        entries : rows, dofs and values (k,) of H (c, dofs).
-        gap : (c,) m.
-        tangent : rows, dofs and values of A, the derivative of loads and reactions with respect to q.
-
-        Returns
-        -------
-        x (dofs,) and multipliers (c,) float.
         """
 
     @abstractmethod

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.bodies.body import Body
-from kratos_lite.bodies.constraints.base import with_slices
+from kratos_lite.bodies.constraints import with_slices
 from kratos_lite.bodies.deformable import Deformable
 from kratos_lite.bodies.finite_element import FiniteElementBody
-from kratos_lite.bodies.formulations.corotational import Modal
+from kratos_lite.bodies.formulations import Modal
 from kratos_lite.bodies.linear_algebra import Entries, sum_of
 from kratos_lite.errors import InputError, ModelError, SolveError
-from kratos_lite.typing import Array, Progress
+from kratos_lite.solvers import direct
+from kratos_lite.solvers.constraints import ConstraintMap
+from kratos_lite.solvers.linear_solver import LinearSolver
+from kratos_lite.solvers.plan import Facts, choose
+from kratos_lite.typing import Array, Ints, Progress
 
 INCREMENTS = (1, 4, 16, 64)
 """Numbers of load increments that are tried one after the other."""
@@ -98,8 +104,7 @@ def _increment(body: Deformable, start: Array, fraction: float, progress: Progre
     for iteration in range(1, NEWTON_MAX + 1):
         residual = fraction * _load(body) - body.internal_force(body.q)
         gap = _gap(body, body.q) - (1 - fraction) * initial
-        tangent = _tangent(body, fraction, multipliers)
-        step, multipliers = body.solve_static(residual, _entries(body), gap, tangent)
+        step, multipliers = _newton_step(body, residual, gap, _tangent(body, fraction, multipliers))
         largest = float(np.abs(step).max())
         if not np.isfinite(largest):
             break
@@ -131,12 +136,12 @@ def _tangent(body: Deformable, fraction: float, multipliers: Array) -> Entries:
         row, column, value = load.derivative(body.q, zero, body.time)
         parts.append((row, column, fraction * value))
     for constraint, part in with_slices(body.constraints):
-        parts += constraint.tangent_entries(body, body.q, multipliers[part])
+        parts.append(constraint.tangent_entries(body, body.q, multipliers[part]))
     return sum_of(parts)
 
 
-def _entries(body: Deformable) -> Entries:
-    """Return rows, dofs and values of all constraints."""
+def _jacobian(body: Deformable) -> Entries:
+    """Return rows, dofs and values of H of all constraints."""
     parts = []
     for constraint, part in with_slices(body.constraints):
         row, dof, value = constraint.jacobian_entries(body, body.q)
@@ -145,11 +150,11 @@ def _entries(body: Deformable) -> Entries:
 
 
 def _balance(body: Deformable, fraction: float, multipliers: Array) -> None:
-    """Note the reactions; SolveError if loads, reactions and internal forces do not balance."""
+    """Set the reactions; SolveError if loads, reactions and internal forces do not balance."""
     reaction = np.zeros_like(body.q)
     for constraint, part in with_slices(body.constraints):
         constraint.set_reactions(body, body.q, multipliers[part])
-    row, dof, value = _entries(body)
+    row, dof, value = _jacobian(body)
     np.add.at(reaction, dof, multipliers[row] * value)
     load, inner = fraction * _load(body), body.internal_force(body.q)
     residual = np.abs(load + reaction - inner).max()
@@ -158,3 +163,71 @@ def _balance(body: Deformable, fraction: float, multipliers: Array) -> None:
     roundoff = 1e-14 * float(np.abs(K.data if isinstance(K, BlockMatrix) else K).max() * np.abs(body.q).max())
     if residual > UNBALANCED * scale + roundoff:
         raise SolveError(f"{residual / scale:.1%} of the loads find no reaction, so the body would move")
+
+
+# ---- one Newton step: (K - A) x = residual + H^T multipliers with H x = -gap ---------------------------
+
+
+def _newton_step(body: Deformable, residual: Array, gap: Array, tangent: Entries) -> tuple[Array, Array]:
+    """Return x (dofs,) and multipliers (c,), with the tangent A of loads and reactions."""
+    K, H = body.stiffness(), _jacobian(body)
+    row, dof, value = H
+    if not isinstance(K, BlockMatrix):
+        return _dense_step(K, residual, H, gap, tangent)
+    symmetric = not len(tangent[0])
+    if not symmetric:
+        K = BlockMatrix.of(K.scipy().tocsr() - _sparse(tangent, K.shape))
+    if len(row) == len(gap) == len(np.unique(row)):  # each row prescribes one displacement
+        assert body.mesh is not None
+        return _eliminated(K, body.mesh.points, residual, dof, value, gap, symmetric)
+    return _with_multipliers(K, residual, H, gap)
+
+
+def _dense_step(K: Array, residual: Array, H: Entries, gap: Array, tangent: Entries) -> tuple[Array, Array]:
+    """Return the step of a full matrix K of the first dofs, which may be singular: least squares."""
+    n, c = len(residual), len(gap)
+    row, dof, value = H
+    A = np.zeros((n + c, n + c))
+    A[: len(K), : len(K)] = K
+    np.subtract.at(A, tangent[:2], tangent[2])
+    size = np.abs(A).max()
+    A[n + row, dof], A[dof, n + row] = value, value
+    scale = np.concatenate([np.full(n, size**-0.5), np.full(c, size**0.5)])
+    b = np.concatenate([residual, -gap])
+    x = scale * np.linalg.lstsq(scale[:, None] * A * scale, scale * b, rcond=1e-12)[0]
+    return x[:n], -x[n:]
+
+
+def _eliminated(
+    K: BlockMatrix, points: Array, residual: Array, dof: Ints, value: Array, gap: Array, symmetric: bool
+) -> tuple[Array, Array]:
+    n = len(residual)
+    prescribed, free = np.zeros(n), np.ones(n, dtype=bool)
+    prescribed[dof], free[dof] = -gap / value, False
+    constraints = ConstraintMap(np.flatnonzero(free), prescribed)
+    plan = choose("auto", Facts(len(constraints.free), n, symmetric))
+    matrix: Any = K.scipy().toarray() if plan.method == "dense" else K
+    solver = LinearSolver(matrix, constraints, points, plan, symmetric=symmetric)
+    x = solver.solve(residual, 1e-12).x
+    reaction = (K @ x - residual)[dof] / value
+    twice = np.bincount(dof, minlength=n)[dof]
+    return x, np.asarray(reaction / twice)
+
+
+def _with_multipliers(K: BlockMatrix, residual: Array, H: Entries, gap: Array) -> tuple[Array, Array]:
+    from scipy.sparse import block_array, csr_array, eye_array
+
+    n, c = len(residual), len(gap)
+    size = K.norm()
+    rows = _sparse(H, (c, n)) * size
+    soft = -1e-11 * size * eye_array(c)  # lets rows that say the same share their reaction
+    A = block_array([[K.scipy(), rows.T], [rows, soft]], format="csr") if c else K.scipy().tocsr()
+    x = direct.factorize(csr_array(A), symmetric=False).solve(np.concatenate([residual, -gap * size]))
+    return x[:n], -x[n:] * size
+
+
+def _sparse(entries: Entries, shape: tuple[int, int]) -> Any:
+    from scipy.sparse import csr_array
+
+    row, column, value = entries
+    return csr_array((value, (row, column)), shape=shape)

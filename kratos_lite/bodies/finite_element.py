@@ -14,11 +14,10 @@ from numpy.typing import ArrayLike
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.sparsity_pattern import Pattern
-from kratos_lite.bodies.constraint_projection import allowed
+from kratos_lite.bodies.constraint_projection import unconstrained_motions
 from kratos_lite.bodies.deformable import Deformable
 from kratos_lite.bodies.formulations import FORMULATIONS
 from kratos_lite.bodies.linear_algebra import Entries, Solve
-from kratos_lite.bodies.newton import sparse_step
 from kratos_lite.bodies.rotations import check_rotation
 from kratos_lite.bodies.validation import Material, elements_of, fitting, one_point, points_of, vector_of
 from kratos_lite.elements.tables import tabulate
@@ -158,8 +157,8 @@ class FiniteElementBody(Deformable):
     def rotate(self, rotation: ArrayLike) -> None:
         """Set q = (Λ - 1)(X - X̄) and leave the mass center where it is; see `Body.rotate`."""
         R = fitting(check_rotation(rotation), (), 2, "a rotation")
-        arms = self.points - self._shares @ self.points
-        self.q = (arms @ R.T - arms + self._shares @ self.displacement).ravel()
+        arms = self.points - self._center
+        self.q = (arms @ R.T - arms + self._fractions @ self.displacement).ravel()
 
     def set_velocity(self, linear: ArrayLike = (0, 0, 0), angular: ArrayLike = (0, 0, 0)) -> None:
         """Set v + ω × (x - x̄) at the nodes; see `Body.set_velocity`."""
@@ -172,21 +171,19 @@ class FiniteElementBody(Deformable):
         """Return v at every node; see `Body.translation`."""
         return np.tile(v, len(self.points))
 
-    def affine_motion(self) -> tuple[Array, Array]:
-        """Return F and Ḟ nearest with respect to mass; see `Body.affine_motion`."""
-        arms = self.points - self.reference_center()
+    def affine_motion(self) -> tuple[Array, Array, Array]:
+        """Return F and Ḟ nearest with respect to mass, and the place of X̄; see `Body.affine_motion`."""
+        arms = self.points - self._center
         weighted = self.times_mass(arms.ravel()).reshape(-1, 3)
         inverse = np.linalg.inv(weighted.T @ arms)
-        moved = self.displacement - self.displacement.mean(axis=0)
-        rate = self.u.reshape(-1, 3) - self.u.reshape(-1, 3).mean(axis=0)
-        return np.eye(3) + moved.T @ weighted @ inverse, rate.T @ weighted @ inverse
+        q, u = (v.reshape(-1, 3) - v.reshape(-1, 3).mean(axis=0) for v in (self.q, self.u))
+        F = np.eye(3) + q.T @ weighted @ inverse
+        return F, u.T @ weighted @ inverse, self.mass_center() + F @ (self.center - self._center)
 
-    def set_affine_motion(
-        self, F: Array, rate: Array, center: Array, velocity: Array, angular_momentum: Array
-    ) -> None:
+    def set_affine_motion(self, F: Array, rate: Array, center: Array, velocity: Array) -> None:
         """Move the nodes along; see `Body.set_affine_motion`."""
         self.set_configuration((self.points - self.center) @ F.T + center - self.points)
-        self.u = ((self.points - self.reference_center()) @ rate.T + velocity).ravel()
+        self.u = ((self.points - self._center) @ rate.T + velocity).ravel()
 
     def settings(self) -> dict[str, Any]:
         """Return those of all bodies, formulation, modes and kind of mass; see `Body.settings`."""
@@ -225,13 +222,6 @@ class FiniteElementBody(Deformable):
         """Return dofs of the nodes around X and H = N(X) 1; see `Body.jacobian`."""
         nodes, N = self._at(X)
         return (3 * nodes[:, None] + np.arange(3)).ravel(), (np.eye(3)[:, None] * N[:, None]).reshape(3, -1)
-
-    def generalized_force(self, X: Array, force: Array, q: Array) -> Array:
-        """Return N_a(X) f at the nodes; see `Body.generalized_force`."""
-        nodes, N = self._at(X)
-        out = np.zeros((len(self.points), 3))
-        out[nodes] = N[:, None] * force
-        return out.ravel()
 
     def generalized_nodal_force(self, forces: Array, q: Array) -> Array:
         """Return the nodal forces as (3n,); see `Body.generalized_nodal_force`."""
@@ -276,12 +266,6 @@ class FiniteElementBody(Deformable):
         """Return what solves (M + c K(q)) x = b."""
         return self.formulation.solver(q, c)
 
-    def solve_static(
-        self, residual: Array, entries: Entries, gap: Array, tangent: Entries
-    ) -> tuple[Array, Array]:
-        """Return step and multipliers; see `Deformable.solve_static`."""
-        return sparse_step(self.stiffness(), self.points, residual, entries, gap, tangent)
-
     def extent(self) -> float:
         """Return the largest side of the undeformed body in m."""
         return float(np.ptp(self.points, axis=0).max())
@@ -291,7 +275,7 @@ class FiniteElementBody(Deformable):
         return self.formulation.highest_frequency(self.q)
 
     def modes(self, count: int = 12) -> tuple[Array, Array]:
-        """Return the lowest natural frequencies of the undeformed body as its constraints hold it.
+        """Return the lowest natural frequencies of the undeformed body as its constraints allow.
 
         Parameters
         ----------
@@ -306,28 +290,25 @@ class FiniteElementBody(Deformable):
         constrained = [c.jacobian(self, np.zeros(self.dofs)) for c in self.constraints]
         if not constrained:
             return modes(K, M, count)
-        T = allowed(np.concatenate(constrained))
+        T = unconstrained_motions(np.concatenate(constrained))
         omega, shapes = modes((T.T @ K @ T).tocsr(), (T.T @ M @ T).tocsr(), count)
         return omega, np.asarray(T @ shapes)
 
     # ---- momenta ---------------------------------------------------------------------------------
 
     @cached_property
-    def _shares(self) -> Array:
+    def _fractions(self) -> Array:
+        """The fraction (n,) of the mass at each node."""
         return np.asarray(self._mass.nodal / self._mass.nodal.sum())
 
-    def mass_center(self) -> Array:
+    @cached_property
+    def _center(self) -> Array:
+        """The mass center (3,) of the undeformed body; lumped mass may shift it from `center`."""
+        return np.asarray(self._fractions @ self.points)
+
+    def mass_center(self, q: Array | None = None) -> Array:
         """Return x̄ (3,) in m."""
-        return np.asarray(self._shares @ (self.points + self.displacement))
-
-    def reference_center(self) -> Array:
-        """Return the mass center (3,) of the undeformed body in m; lumped mass may shift it from `center`."""
-        return np.asarray(self._shares @ self.points)
-
-    def gravity_potential(self, g: Array, q: Array) -> Array:
-        """Return -∫ρ g · (X + u) dV in J."""
-        weight = self.times_mass(self.translation(g))
-        return np.asarray(-(weight @ q) - self.mass * (g @ self.center))
+        return np.asarray(self._fractions @ (self.points + (self.q if q is None else q).reshape(-1, 3)))
 
     def linear_momentum(self) -> Array:
         """Return Σ (M u)_a, (3,) in kg m/s."""

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.bodies.linear_algebra import Entries, Solve
+from kratos_lite.bodies.linear_algebra import Entries, Solve, transposed
 from kratos_lite.bodies.validation import Material, elements_of, mass_properties_of
 from kratos_lite.errors import ModelError
 from kratos_lite.materials.isotropic3d import Isotropic3D
@@ -25,7 +25,7 @@ from kratos_lite.typing import Array, Ints
 
 @dataclass
 class Clock:
-    """Time in s and number of steps; bodies share one while they advance together."""
+    """Time in s and number of steps; bodies of a batch share one."""
 
     time: float = 0.0
     step: int = 0
@@ -141,7 +141,7 @@ class FreeBody(ABC):
 
     @abstractmethod
     def jacobian(self, X: Array, q: Array) -> tuple[Ints, Array]:
-        """Return the derivative of the velocity of a point with respect to u, of a single body.
+        """Return the derivative of the velocity of a point with respect to u.
 
         Where `jacobian_is_constant` it does not depend on q.
 
@@ -152,12 +152,11 @@ class FreeBody(ABC):
 
         Returns
         -------
-        dofs (k,) int and H (3, k) float with velocity(X) = H u[dofs].
+        dofs (k,) int and H (..., 3, k) float with velocity(X) = H u[dofs].
         """
 
-    @abstractmethod
     def generalized_force(self, X: Array, force: Array, q: Array) -> Array:
-        """Return what a force on a point does: its power is the product with u.
+        """Return what a force on a point does, H^T f: its power is the product with u.
 
         Parameters
         ----------
@@ -169,6 +168,10 @@ class FreeBody(ABC):
         -------
         (..., dofs) float.
         """
+        dofs, H = self.jacobian(X, q)
+        out = np.zeros((*q.shape[:-1], self.dofs))
+        out[..., dofs] = transposed(H, force)
+        return out
 
     @abstractmethod
     def generalized_nodal_force(self, forces: Array, q: Array) -> Array:
@@ -238,20 +241,6 @@ class FreeBody(ABC):
         (..., 3) float.
         """
 
-    def body_fixed_force(self, X: Array, force: Array) -> Array | None:
-        """Return what a force does that moves with the body, if that is always the same seen from the body.
-
-        Parameters
-        ----------
-        X : (3,) m, a point of the undeformed body.
-        force : (3,) or (..., 3) N, in the undeformed body.
-
-        Returns
-        -------
-        (..., dofs) float, or None.
-        """
-        return None
-
     def elements(self) -> list[ElementGroup]:
         """Return the elements of the mesh; where no material is given, with the mean density of the body.
 
@@ -303,21 +292,16 @@ class FreeBody(ABC):
         """Return the function that solves M x = b, (dofs,) or columns (dofs, k), of a single body."""
 
     @abstractmethod
-    def mass_center(self) -> Array:
-        """Return the place (..., 3) in m of the mass center."""
-
-    @abstractmethod
-    def gravity_potential(self, g: Array, q: Array) -> Array:
-        """Return the potential energy of the weight.
+    def mass_center(self, q: Array | None = None) -> Array:
+        """Return the place of the mass center.
 
         Parameters
         ----------
-        g : (3,) m/s², acceleration of gravity.
-        q : configuration.
+        q : configuration; that of the body if not given.
 
         Returns
         -------
-        (...) float, J.
+        (..., 3) float, m.
         """
 
     @abstractmethod

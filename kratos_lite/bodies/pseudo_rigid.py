@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 from kratos_lite.bodies.affine import AffineBody
 from kratos_lite.bodies.deformable import Deformable
 from kratos_lite.bodies.linear_algebra import Entries, Solve, apply, block_entries, transposed
-from kratos_lite.bodies.newton import dense_step
 from kratos_lite.bodies.rotations import axial, hat
 from kratos_lite.bodies.validation import Material, mass_properties_of
 from kratos_lite.errors import InputError
@@ -111,13 +110,11 @@ class PseudoRigidBody(AffineBody, Deformable):
         w = self._rigid_velocity(linear, angular)
         self.u[..., :9] = (hat(w) @ self.deformation).reshape(self.u[..., :9].shape)
 
-    def affine_motion(self) -> tuple[Array, Array]:
-        """Return F and Ḟ (3, 3); see `Body.affine_motion`."""
-        return self.deformation, self._matrix_of(self.u).copy()
+    def affine_motion(self) -> tuple[Array, Array, Array]:
+        """Return F, Ḟ and x̄; see `Body.affine_motion`."""
+        return self.deformation, self._matrix_of(self.u).copy(), self.mass_center()
 
-    def set_affine_motion(
-        self, F: Array, rate: Array, center: Array, velocity: Array, angular_momentum: Array
-    ) -> None:
+    def set_affine_motion(self, F: Array, rate: Array, center: Array, velocity: Array) -> None:
         """Take the affine motion; see `Body.set_affine_motion`."""
         self.set_configuration(np.concatenate([F.ravel(), center]))
         self.u[...] = np.concatenate([rate.ravel(), velocity])
@@ -126,14 +123,11 @@ class PseudoRigidBody(AffineBody, Deformable):
 
     def jacobian(self, X: Array, q: Array) -> tuple[Ints, Array]:
         """Return dofs and H = [(X - X̄)^T in three rows, 1]; see `Body.jacobian`."""
-        H = np.hstack([np.kron(np.eye(3), X - self.center), np.eye(3)])
-        return np.arange(12), H
-
-    def generalized_force(self, X: Array, force: Array, q: Array) -> Array:
-        """Return f_i A_j row by row with A = X - X̄, and the force f; see `Body.generalized_force`."""
-        f = np.broadcast_to(force, (*q.shape[:-1], 3))
-        moment = f[..., :, None] * (X - self.center)[..., None, :]
-        return np.concatenate([moment.reshape(*moment.shape[:-2], 9), f], axis=-1)
+        A = X - self.center
+        rows = np.einsum("ij,...k->...ijk", np.eye(3), A).reshape(*A.shape[:-1], 3, 9)
+        return np.arange(12), np.concatenate(
+            [rows, np.broadcast_to(np.eye(3), (*A.shape[:-1], 3, 3))], axis=-1
+        )
 
     def generalized_nodal_force(self, forces: Array, q: Array) -> Array:
         """Return Σ f_i A_j row by row and Σ f of nodal forces; see `Body.generalized_nodal_force`."""
@@ -146,10 +140,8 @@ class PseudoRigidBody(AffineBody, Deformable):
         """Return G^T A G as a full matrix, x = G q + const; see `FreeBody.generalized_nodal_tangent`."""
         assert self.mesh is not None
         row, column, value = entries
-        arms = self.mesh.points - self.center
-        G = np.einsum("ij,na->nija", np.eye(3), arms).reshape(-1, 9)
-        G = np.hstack([G, np.tile(np.eye(3), (len(arms), 1))])
-        dofs = np.arange(12)
+        dofs, H = self.jacobian(self.mesh.points, self.q)
+        G = H.reshape(-1, 12)
         return block_entries(dofs, dofs, G[row].T @ (value[:, None] * G[column]))
 
     def times_mass(self, v: Array) -> Array:
@@ -203,15 +195,6 @@ class PseudoRigidBody(AffineBody, Deformable):
         K = self.stiffness()
         squares = np.linalg.eigvalsh(L @ K @ np.swapaxes(L, -1, -2))
         return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
-
-    def solve_static(
-        self, residual: Array, entries: Entries, gap: Array, tangent: Entries
-    ) -> tuple[Array, Array]:
-        """Return step and multipliers; see `Deformable.solve_static`."""
-        K = np.zeros((self.dofs, self.dofs))
-        K[:9, :9] = self.stiffness()
-        np.subtract.at(K, tangent[:2], tangent[2])
-        return dense_step(K, residual, entries, gap)
 
     def extent(self) -> float:
         """Return 1, the size of F."""

@@ -109,29 +109,21 @@ class RigidBody(AffineBody):
         """Set the velocity of the mass center in m/s and the spatial angular velocity in rad/s."""
         self.u[..., :3] = transposed(self.rotation, self._rigid_velocity(linear, angular))
 
-    def affine_motion(self) -> tuple[Array, Array]:
-        """Return Λ and its rate (3, 3); see `Body.affine_motion`."""
-        return self.rotation, self.rotation @ hat(self.u[:3])
+    def affine_motion(self) -> tuple[Array, Array, Array]:
+        """Return Λ, its rate and x̄; see `Body.affine_motion`."""
+        return self.rotation, self.rotation @ hat(self.u[:3]), self.mass_center()
 
-    def set_affine_motion(
-        self, F: Array, rate: Array, center: Array, velocity: Array, angular_momentum: Array
-    ) -> None:
-        """Take the nearest rotation, and both momenta; see `Body.set_affine_motion`."""
+    def set_affine_motion(self, F: Array, rate: Array, center: Array, velocity: Array) -> None:
+        """Take the nearest rotation and the velocity; see `Body.set_affine_motion`."""
         self.set_configuration(np.concatenate([polar(F).T.ravel(), center]))
-        referential = self.rotation.T @ angular_momentum
-        self.u[...] = np.concatenate([np.linalg.solve(self.mass_properties.inertia, referential), velocity])
+        self.set_velocity(velocity)
 
     # ---- forces ----------------------------------------------------------------------------------
 
     def jacobian(self, X: Array, q: Array) -> tuple[Ints, Array]:
         """Return dofs and H = [-Λ hat(X - X̄), 1]; see `Body.jacobian`."""
-        return np.arange(6), np.hstack([-rotation_of(q) @ hat(X - self.center), np.eye(3)])
-
-    def generalized_force(self, X: Array, force: Array, q: Array) -> Array:
-        """Return the referential torque (X - X̄) × Λ^T f and the force f; see `Body.generalized_force`."""
-        f = np.broadcast_to(force, (*q.shape[:-1], 3))
-        referential = transposed(rotation_of(q), f)
-        return np.concatenate([np.cross(X - self.center, referential), f], axis=-1)
+        turned = -rotation_of(q) @ hat(X - self.center)
+        return np.arange(6), np.concatenate([turned, np.broadcast_to(np.eye(3), turned.shape)], axis=-1)
 
     def generalized_nodal_force(self, forces: Array, q: Array) -> Array:
         """Return the resultant torque and force of nodal forces; see `Body.generalized_nodal_force`."""
@@ -145,12 +137,6 @@ class RigidBody(AffineBody):
         """Return the referential torque Λ^T t and no force; see `Body.generalized_torque`."""
         referential = transposed(rotation_of(q), np.asarray(torque))
         return np.concatenate([referential, np.zeros_like(referential)], axis=-1)
-
-    def body_fixed_force(self, X: Array, force: Array) -> Array:
-        """Return the force and its torque as they are without rotation; see `Body.body_fixed_force`."""
-        upright = np.zeros_like(self.q)
-        upright[..., [0, 4, 8]] = 1.0
-        return self.generalized_force(X, force, upright)
 
     def times_mass(self, v: Array) -> Array:
         """Return J W and m v̄; see `Body.times_mass`."""

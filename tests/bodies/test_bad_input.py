@@ -79,7 +79,7 @@ def elastic(**options):
 
 
 IMPLICIT = "of a finite-element body are linearly_implicit, explicit"
-WHOLE_MODES = "modes must be a whole number"
+WHOLE_MODES = "modes must be a whole number ≥ 6"
 AS_MANY, ASCEND = "as many values as times", "times of a series must ascend"
 
 
@@ -101,9 +101,9 @@ AS_MANY, ASCEND = "as many values as times", "times of a series must ascend"
     (lambda: elastic(formulation="modal", integrator="ENERGY_MOMENTUM"), IMPLICIT),
     (lambda: elastic(formulation="TLL"), "(?s)formulation of a finite-element body.*TLL"),
     (lambda: elastic(modes=9), "modes are for formulation='modal'"),
-    (lambda: elastic(formulation="modal", modes=5), "modes must be at least 6"),
+    (lambda: elastic(formulation="modal", modes=5), WHOLE_MODES),
     (lambda: elastic(formulation="modal", modes=99), r"1 … 24 modes; got 99"),
-    (lambda: elastic(damping=-1.0), "a damping must be one number of seconds, ≥ 0"),
+    (lambda: elastic(damping=-1.0), "a damping must be one number ≥ 0, in s"),
     (lambda: elastic(damping=NAN), "a damping"),
     (lambda: elastic(damping=[0.1, 0.2]), "a damping"),
     *((lambda m=m: elastic(formulation="modal", modes=m), WHOLE_MODES) for m in (6.5, "many", True)),
@@ -173,8 +173,8 @@ WHOLE, SUBSTEPS = "must be a whole number ≥ 1", "substeps must be a whole numb
     load(lambda: kl.Force((NAN, 5, 5), (1, 0, 0)), "material points"),
     load(lambda: kl.Force((0, 0, 0), (1, NAN, 0)), "a force must be finite"),
     load(lambda: kl.Force((0, 0, 0), (1, 0)), "a force must have three components"),
-    load(lambda: kl.Force((0, 0, 0), (1, 0, 0), frame="body"), "'spatial' or 'follower'"),
-    load(lambda: kl.Torque((1, 0, 0), frame="body"), "'spatial' or 'follower'"),
+    load(lambda: kl.Force((0, 0, 0), (1, 0, 0), frame="body"), "frame must be one of spatial, follower"),
+    load(lambda: kl.Torque((1, 0, 0), frame="body"), "frame must be one of spatial, follower"),
     load(lambda: kl.Torque((1, NAN, 0)), "a torque must be finite"),
     load(lambda: kl.Spring((0, 0, 0), (1, 1, 1), -5.0), "stiffness of a spring must be one number ≥ 0"),
     load(lambda: kl.Spring((0, 0, 0), (1, 1, 1), 5.0, damping=-1), "damping of a spring"),

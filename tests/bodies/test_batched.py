@@ -111,7 +111,7 @@ def test_many_pseudo_rigid_bodies_keep_their_invariants(integrator):
     ("change", "error", "words"),
     [
         (lambda bodies: bodies.clear(), kl.InputError, "there is no body to advance"),
-        (lambda bodies: bodies.append(bodies[0]), kl.InputError, "a body occurs twice"),
+        (lambda bodies: bodies.append(bodies[0]), kl.InputError, "a body occurs twice in a batch"),
         (
             lambda b: setattr(b[1], "integrator", "RIG_IMP"),
             kl.InputError,
@@ -132,14 +132,14 @@ def test_many_pseudo_rigid_bodies_keep_their_invariants(integrator):
         (
             lambda b: b.append(kl.FiniteElementBody(kl.box(), kl.Isotropic3D(1.0, 0.0, 1.0))),
             kl.ModelError,
-            "only single rigid and pseudo-rigid bodies",
+            "only single rigid and pseudo-rigid bodies form a batch",
         ),
         (
             lambda b: b.append(kl.PseudoRigidBody(kl.box(), kl.Isotropic3D(1.0, 0.0, 1.0))),
             kl.InputError,
             "need the same kind",
         ),
-        (lambda b: b.append("body"), kl.ModelError, "only single rigid and pseudo-rigid bodies"),
+        (lambda b: b.append("body"), kl.ModelError, "only single rigid and pseudo-rigid bodies form a batch"),
     ],
 )
 def test_bodies_that_cannot_advance_together(change, error, words):

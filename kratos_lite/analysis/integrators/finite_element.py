@@ -20,7 +20,7 @@ from kratos_lite.analysis.integrators.base import BodyIntegrator
 from kratos_lite.bodies.constraint_projection import Step, constrained_step
 from kratos_lite.bodies.deformable import Deformable
 from kratos_lite.bodies.finite_element import FiniteElementBody
-from kratos_lite.bodies.formulations.base import Iterated
+from kratos_lite.bodies.formulations import Iterated
 from kratos_lite.bodies.linear_algebra import Solve
 from kratos_lite.errors import SolveError
 from kratos_lite.solvers.direct import one_thread

@@ -22,7 +22,6 @@ Generalized: TypeAlias = Callable[[Array, Array, float], Array]
 """Gives the generalized force (..., dofs) at a configuration, a velocity and a time."""
 Tangent: TypeAlias = Callable[[Array, Array, float], Entries]
 """Gives the derivative of a generalized force with respect to q, in the velocities at rest."""
-FRAMES = ("spatial", "follower")
 
 
 def no_potential(q: Array) -> Array:
@@ -38,24 +37,12 @@ class AppliedLoad:
     acceleration: Array | None = None  # (3,) m/s² of gravity
     spatial: Array | None = None  # (..., dofs), if it is fixed in space
     follower: Array | None = None  # (..., dofs), if it is fixed in a rigid body
-    tangent: Tangent | None = None  # derivative by q of single deformable bodies
+    tangent: Tangent = lambda q, u, time: NO_ENTRIES  # derivative by q of single deformable bodies
     potential_energy: Callable[[Array], Array] = no_potential  # (...) J
     follows_velocity: bool = False
     amplitude: Callable[[float], float] = lambda time: 1.0  # of the time in s
     steady: bool = True  # the amplitude never changes
     ends: tuple[Array, Array] | None = None  # of a spring, for pictures
-
-    @classmethod
-    def constant(cls, mass: Array, acceleration: Array, spatial: Array, follower: Array) -> AppliedLoad:
-        """Return constant loads on many bodies, for compiled steps alone."""
-
-        def generalized(q: Array, u: Array, time: float) -> Array:
-            raise ModelError("loads of many bodies are known only to steps that take them all at once")
-
-        def potential(q: Array) -> Array:
-            return np.asarray(-(mass * (acceleration * q[..., 9:]).sum(axis=-1)))
-
-        return cls(generalized, acceleration, spatial, follower, potential_energy=potential)
 
     def __call__(self, q: Array, u: Array, time: float) -> Array:
         """Return the generalized force (..., dofs) at a configuration, a velocity and a time."""
@@ -63,8 +50,6 @@ class AppliedLoad:
 
     def derivative(self, q: Array, u: Array, time: float) -> Entries:
         """Return the derivative of the generalized force with respect to q."""
-        if self.tangent is None:
-            return NO_ENTRIES
         row, column, value = self.tangent(q, u, time)
         return row, column, self.amplitude(time) * value
 
@@ -95,10 +80,11 @@ def apply_load(load: BodyLoad | Load, body: FreeBody, amplitude: Factor | None) 
         raise InputError(f"a load such as Gravity or Force is needed; got {type(load).__name__}")
     elif isinstance(load, Gravity) and load.where is None and np.ndim(load.force) == 1:
         applied = _gravity(load.force, body)
-    elif isinstance(load, TimeDependentLoad):
-        applied = _time_dependent(load, body)
+    elif body.mesh is None:
+        what = type(load).__name__
+        raise ModelError(f"a {what} acts on a mesh; this body has none: use Force or Torque")
     else:
-        applied = _dead(load, body)
+        applied = _on_nodes(load, body.mesh, body)
     applied.amplitude, applied.steady = function, not callable(amplitude)
     return applied
 
@@ -106,31 +92,22 @@ def apply_load(load: BodyLoad | Load, body: FreeBody, amplitude: Factor | None) 
 def _gravity(g: Array, body: FreeBody) -> AppliedLoad:
     """Return the weight: no torque about the mass center, whatever the body does."""
     weight = body.times_mass(body.translation(g))
-    return AppliedLoad(
-        lambda q, u, t: weight, acceleration=g, potential_energy=lambda q: body.gravity_potential(g, q)
-    )
+
+    def potential(q: Array) -> Array:
+        return np.asarray(-body.mass * (body.mass_center(q) @ g))
+
+    return AppliedLoad(lambda q, u, t: weight, acceleration=g, potential_energy=potential)
 
 
-def _dead(load: Load, body: FreeBody) -> AppliedLoad:
+def _on_nodes(load: Load, mesh: Mesh, body: FreeBody) -> AppliedLoad:
     """Return the nodal forces of the undeformed mesh, which keep their direction in space."""
-    mesh = _mesh_of(load, body)
-    f = load.forces(mesh, body.elements())
+    elements = body.elements()
+    if isinstance(load, TimeDependentLoad):
+        forces, nothing = load.history(lambda one: one.forces(mesh, elements)), np.zeros_like(mesh.points)
+        return AppliedLoad(lambda q, u, t: body.generalized_nodal_force(forces(t) + nothing, q))
+    f = load.forces(mesh, elements)
     return AppliedLoad(
         lambda q, u, t: body.generalized_nodal_force(f, q),
         spatial=body.generalized_nodal_force(f, body.q) if body.jacobian_is_constant else None,
         potential_energy=lambda q: np.asarray(-(f * body.position(mesh.points, q)).sum(axis=(-2, -1))),
     )
-
-
-def _time_dependent(load: TimeDependentLoad, body: FreeBody) -> AppliedLoad:
-    """Return the nodal forces that a function of time gives; they keep their direction in space."""
-    mesh, elements = _mesh_of(load, body), body.elements()
-    forces = load.history(lambda one: one.forces(mesh, elements))
-    nothing = np.zeros_like(mesh.points)
-    return AppliedLoad(lambda q, u, t: body.generalized_nodal_force(forces(t) + nothing, q))
-
-
-def _mesh_of(load: Load, body: FreeBody) -> Mesh:
-    if body.mesh is None:
-        raise ModelError(f"a {type(load).__name__} acts on a mesh; this body has none: use Force or Torque")
-    return body.mesh

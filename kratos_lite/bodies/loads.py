@@ -1,4 +1,8 @@
-"""Forces on points, torques, springs, which pull at points, and functions of the user."""
+"""Loads on bodies: forces and torques fixed in space or in the body, following pressure, springs, callbacks.
+
+A load is bound to a body when it is added; what is bound gives the generalized force at any configuration.
+Loads of models (gravity, tractions, dead pressure, …) act through their nodal forces, on every kind of body.
+"""
 
 from __future__ import annotations
 
@@ -7,13 +11,19 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kratos_lite.assembly.element_groups import add_nodal
+from kratos_lite.bodies.applied_load import AppliedLoad, BodyLoad, no_potential
 from kratos_lite.bodies.free_body import FreeBody
-from kratos_lite.bodies.linear_algebra import Entries, block_entries
-from kratos_lite.bodies.loads.base import FRAMES, AppliedLoad, BodyLoad, no_potential
+from kratos_lite.bodies.linear_algebra import Entries, block_entries, sum_of
 from kratos_lite.bodies.validation import fitting, one_point, vector_of
+from kratos_lite.elements.surface import surface_pressure, surface_pressure_tangent
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.typing import Array
-from kratos_lite.validation import finite
+from kratos_lite.mesh import Where
+from kratos_lite.model.loads.surface import outward
+from kratos_lite.typing import Array, Ints
+from kratos_lite.validation import choice, finite, number
+
+FRAMES = ("spatial", "follower")
 
 
 class Force(BodyLoad):
@@ -28,16 +38,17 @@ class Force(BodyLoad):
 
     def __init__(self, point: ArrayLike, force: ArrayLike, frame: str = "spatial") -> None:
         self.point, self.force = one_point(point), vector_of(force, "a force")
-        self.frame = _checked_frame(frame)
+        self.frame = choice(frame, "frame", FRAMES)
 
     def bind(self, body: FreeBody) -> AppliedLoad:
         """Return the load on a body; MeshError if the point lies outside."""
         X, f = self.point, fitting(self.force, body.q.shape[:-1], 1, "a force")
         body.locate(X)
         if self.frame == "follower":
+            moment, f = np.broadcast_arrays(np.cross(X - body.center, f), f)
             return AppliedLoad(
                 lambda q, u, t: body.generalized_force(X, body.push_forward(f, X, q), q),
-                follower=body.body_fixed_force(X, f),
+                follower=np.concatenate([moment, f], axis=-1) if body.takes_torques else None,
                 tangent=lambda q, u, t: _follower_tangent(body, X, f, q),
             )
         central = body.jacobian_is_constant or bool((np.abs(X - body.center) == 0).all())
@@ -46,6 +57,18 @@ class Force(BodyLoad):
             spatial=body.generalized_force(X, f, body.q) if central else None,
             potential_energy=lambda q: np.asarray(-(f * body.position(X, q)).sum(axis=-1)),
         )
+
+
+def _follower_tangent(body: FreeBody, X: Array, force: Array, q: Array) -> Entries:
+    """Return the derivative of a force that moves with a body, whose F is linear in q."""
+    dofs, H = body.jacobian(X, q)
+    zero = np.zeros_like(q)
+    columns = []
+    for dof in dofs:
+        one = zero.copy()
+        one[dof] = 1.0
+        columns.append(body.push_forward(force, X, one) - body.push_forward(force, X, zero))
+    return block_entries(dofs, dofs, H.T @ np.transpose(columns))
 
 
 class Torque(BodyLoad):
@@ -58,7 +81,7 @@ class Torque(BodyLoad):
     """
 
     def __init__(self, torque: ArrayLike, frame: str = "spatial") -> None:
-        self.torque, self.frame = vector_of(torque, "a torque"), _checked_frame(frame)
+        self.torque, self.frame = vector_of(torque, "a torque"), choice(frame, "frame", FRAMES)
 
     def bind(self, body: FreeBody) -> AppliedLoad:
         """Return the load on a body; ModelError unless it is rigid."""
@@ -91,39 +114,50 @@ class Spring(BodyLoad):
         length: float | None = None,
     ) -> None:
         self.point, self.anchor = one_point(point), one_point(anchor)
-        self.stiffness = stiffness if callable(stiffness) else _not_negative(stiffness, "stiffness", "N/m")
-        self.damping = _not_negative(damping, "damping", "N s/m")
-        self.length = None if length is None else _not_negative(length, "length", "m")
+        self.stiffness = (
+            stiffness
+            if callable(stiffness)
+            else number(stiffness, "the stiffness of a spring", least=0, unit="N/m")
+        )
+        self.damping = number(damping, "the damping of a spring", least=0, unit="N s/m")
+        self.length = None if length is None else number(length, "the length of a spring", least=0, unit="m")
 
     def bind(self, body: FreeBody) -> AppliedLoad:
-        """Return the load on a body; MeshError if the point lies outside."""
+        """Return the load on a body; MeshError if the point lies outside.
+
+        Raises
+        ------
+        ModelError
+            The body is a batch.
+        """
+        if body.q.ndim > 1:
+            raise ModelError("a spring acts on single bodies; integrate them one by one")
         X, anchor = self.point, self.anchor
         body.locate(X)
         L = float(np.linalg.norm(body.position(X) - anchor)) if self.length is None else self.length
 
-        def generalized(q: Array, u: Array, time: float) -> Array:
-            if q.ndim > 1:
-                raise ModelError("a spring acts on single bodies; integrate them one by one")
+        def stretched(q: Array, u: Array) -> tuple[Ints, Array, Array, float, float]:
+            """Return dofs and Jacobian of the point, direction and distance from the anchor, and its rate."""
             y = body.position(X, q) - anchor
             distance = float(np.linalg.norm(y))
-            direction = y / distance if distance > 0 else np.zeros(3)
+            n = y / distance if distance > 0 else np.zeros(3)
             dofs, H = body.jacobian(X, q)
-            rate = float(direction @ (H @ u[dofs]))
-            return body.generalized_force(X, -self._pull(distance - L, rate) * direction, q)
+            return dofs, H, n, distance, float(n @ (H @ u[dofs]))
+
+        def generalized(q: Array, u: Array, time: float) -> Array:
+            _, _, n, distance, rate = stretched(q, u)
+            return body.generalized_force(X, -self._pull(distance - L, rate) * n, q)
 
         def tangent(q: Array, u: Array, time: float) -> Entries:
-            y = body.position(X, q) - anchor
-            distance = float(np.linalg.norm(y))
-            dofs, H = body.jacobian(X, q)
-            n = y / distance if distance > 0 else np.zeros(3)
-            along, across = self._stiffness(distance - L, float(n @ (H @ u[dofs])), distance)
+            dofs, H, n, distance, rate = stretched(q, u)
+            along, across = self._stiffness(distance - L, rate, distance)
             push = -across * np.eye(3) - (along - across) * np.outer(n, n)
             return block_entries(dofs, dofs, H.T @ push @ H)
 
         def potential(q: Array) -> Array:
             if callable(self.stiffness):
                 return no_potential(q)
-            stretch = np.linalg.norm(body.position(X, q) - anchor, axis=-1) - L
+            stretch = np.linalg.norm(body.position(X, q) - anchor) - L
             return np.asarray(self.stiffness * stretch**2 / 2)
 
         damped = callable(self.stiffness) or self.damping > 0
@@ -148,6 +182,63 @@ class Spring(BodyLoad):
         if callable(self.stiffness):
             return float(self.stiffness(elongation, rate))
         return self.stiffness * elongation + self.damping * rate
+
+
+class FollowerPressure(BodyLoad):
+    """Pressure on faces of the deformed body: it follows their normals and areas.
+
+    A positive pressure pushes into the body.  `kratos_lite.Pressure` is the dead one: normals and areas are
+    those of the undeformed body (as in Solfec-1.0, whose sign is the other way round).
+
+    Parameters
+    ----------
+    where : part; its conditions if it has any, otherwise the boundary faces among its nodes.
+    pressure : Pa.
+
+    Raises
+    ------
+    InputError
+        The pressure is not one number.
+    """
+
+    def __init__(self, where: Where, pressure: float) -> None:
+        self.where, self.pressure = where, number(pressure, "a pressure", unit="Pa")
+
+    def bind(self, body: FreeBody) -> AppliedLoad:
+        """Return the load on a body.
+
+        Raises
+        ------
+        ModelError
+            The body is a batch of bodies or has no mesh, or there are no such faces.
+        """
+        mesh = body.mesh
+        if mesh is None:
+            raise ModelError("a pressure acts on the faces of a mesh; this body has none")
+        if body.q.ndim > 1:
+            raise ModelError("a following pressure acts on single bodies; integrate them one by one")
+        blocks = [(block, self.pressure * outward(mesh, block)) for block in mesh.faces(self.where)]
+        if not blocks:
+            raise ModelError(f"a pressure finds no face on {self.where!r}")
+
+        def generalized(q: Array, u: Array, time: float) -> Array:
+            x = body.position(mesh.points, q)
+            nodal = np.zeros_like(x)
+            for block, p in blocks:
+                assert block.shape is not None
+                add_nodal(nodal, block.nodes, surface_pressure(block.shape, x[block.nodes], p))
+            return body.generalized_nodal_force(nodal, q)
+
+        def tangent(q: Array, u: Array, time: float) -> Entries:
+            x, changes = body.position(mesh.points, q), []
+            for block, p in blocks:
+                assert block.shape is not None
+                dofs = (3 * block.nodes[..., None] + np.arange(3)).reshape(len(block.nodes), -1)
+                change = surface_pressure_tangent(block.shape, x[block.nodes], p)
+                changes.append(block_entries(dofs, dofs, change))
+            return body.generalized_nodal_tangent(sum_of(changes))
+
+        return AppliedLoad(generalized, tangent=tangent)
 
 
 class Callback(BodyLoad):
@@ -196,28 +287,3 @@ class Callback(BodyLoad):
             return out
 
         return AppliedLoad(generalized, follows_velocity=self.of_velocity)
-
-
-def _follower_tangent(body: FreeBody, X: Array, force: Array, q: Array) -> Entries:
-    """Return the derivative of a force that moves with a body, whose F is linear in q."""
-    dofs, H = body.jacobian(X, q)
-    zero = np.zeros_like(q)
-    columns = []
-    for dof in dofs:
-        one = zero.copy()
-        one[dof] = 1.0
-        columns.append(body.push_forward(force, X, one) - body.push_forward(force, X, zero))
-    return block_entries(dofs, dofs, H.T @ np.transpose(columns))
-
-
-def _checked_frame(frame: str) -> str:
-    if frame not in FRAMES:
-        raise InputError(f"frame must be 'spatial' or 'follower'; got {frame!r}")
-    return frame
-
-
-def _not_negative(value: float, what: str, unit: str) -> float:
-    number = finite(value, f"the {what} of a spring")
-    if number.ndim or number < 0:
-        raise InputError(f"the {what} of a spring must be one number ≥ 0 {unit}; got {value}")
-    return float(number)
