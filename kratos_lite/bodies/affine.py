@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from kratos_lite.bodies.body import Body
 from kratos_lite.bodies.rotations import check_rotation
-from kratos_lite.bodies.validation import Material, fitting, points_of, vector_of
+from kratos_lite.bodies.validation import Material, fitting, one_point, points_of, vector_of
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.mass_properties import MassProperties
@@ -52,6 +52,11 @@ class AffineBody(Body):
 
     @staticmethod
     @abstractmethod
+    def _rate_of(q: Array, u: Array) -> Array:
+        """Return the rate of A (..., 3, 3) of configurations and velocities."""
+
+    @staticmethod
+    @abstractmethod
     def _check_matrix(A: Array) -> None:
         """Raise InputError unless A (..., 3, 3) is one of this kind of body."""
 
@@ -59,6 +64,15 @@ class AffineBody(Body):
         """Return x = A (X - X̄) + x̄; see `Body.position`."""
         q = self.q if q is None else q
         return self._moved(X, self._matrix_of(q), q[..., 9:])
+
+    def velocity(self, X: ArrayLike, q: Array | None = None, u: Array | None = None) -> Array:
+        """Return v = Ȧ (X - X̄) + v̄, shaped as by `position`, in m/s."""
+        q, u = self.q if q is None else q, self.u if u is None else u
+        return self._moved(X, self._rate_of(q, u), u[..., -3:])
+
+    def affine_motion(self) -> tuple[Array, Array, Array]:
+        """Return A, its rate and x̄, copies; see `Body.affine_motion`."""
+        return self._matrix_of(self.q).copy(), self._rate_of(self.q, self.u).copy(), self.mass_center()
 
     def _moved(self, X: ArrayLike, A: Array, translation: Array) -> Array:
         """Return A (X - X̄) + translation, (..., m, 3) or (..., 3)."""
@@ -88,8 +102,8 @@ class AffineBody(Body):
     def _rigid_velocity(self, linear: ArrayLike, angular: ArrayLike) -> Array:
         """Set the velocity of the mass center; return the spatial angular velocity, both checked."""
         lead = self.q.shape[:-1]
-        w = fitting(vector_of(angular, "an angular velocity"), lead, 1, "an angular velocity")
-        self.u[..., -3:] = fitting(vector_of(linear, "a velocity"), lead, 1, "a velocity")
+        w = vector_of(angular, lead, "an angular velocity")
+        self.u[..., -3:] = vector_of(linear, lead, "a velocity")
         return w
 
     def translation(self, v: Array) -> Array:
@@ -115,7 +129,7 @@ class AffineBody(Body):
         spin = self.spin()
         if about is None:
             return spin
-        arm = self.q[..., 9:] - vector_of(about, "a point")
+        arm = self.q[..., 9:] - one_point(about)
         return np.asarray(spin + np.cross(arm, self.linear_momentum()))
 
     @abstractmethod

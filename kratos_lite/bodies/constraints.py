@@ -18,10 +18,11 @@ from numpy.typing import ArrayLike
 
 from kratos_lite.bodies.free_body import FreeBody
 from kratos_lite.bodies.linear_algebra import NO_ENTRIES, Entries, block_entries
-from kratos_lite.bodies.validation import one_point, points_of, vector_of
+from kratos_lite.bodies.validation import one_point, points_of
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.time_series import Factor, function_of, integral_of
 from kratos_lite.typing import Array
+from kratos_lite.validation import finite
 
 Points: TypeAlias = "str | Callable[[Array], ArrayLike] | ArrayLike"
 """Points (3,) or (m, 3) in m of the undeformed body; or nodes by a part of the mesh or a predicate."""
@@ -179,11 +180,10 @@ class AlongDirection(Constraint):
 
     def __init__(self, points: Points, direction: ArrayLike) -> None:
         super().__init__(points)
-        n = vector_of(direction, "a direction")
-        length = float(np.linalg.norm(n))
-        if n.shape != (3,) or length == 0:
+        n = finite(direction, "a direction", (3,))
+        if not n.any():
             raise InputError(f"a direction needs three components, not all 0; got {direction!r}")
-        self.direction = n / length
+        self.direction = n / float(np.linalg.norm(n))
 
     def directions(self, x: Array) -> Array:
         """Return the direction, for each point."""

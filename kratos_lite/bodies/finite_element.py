@@ -163,9 +163,8 @@ class FiniteElementBody(Deformable):
     def set_velocity(self, linear: ArrayLike = (0, 0, 0), angular: ArrayLike = (0, 0, 0)) -> None:
         """Set v + ω × (x - x̄) at the nodes; see `Body.set_velocity`."""
         arms = self.points + self.displacement - self.mass_center()
-        v = fitting(vector_of(linear, "a velocity"), (), 1, "a velocity")
-        w = fitting(vector_of(angular, "an angular velocity"), (), 1, "an angular velocity")
-        self.u = (v + np.cross(w, arms)).ravel()
+        w = vector_of(angular, (), "an angular velocity")
+        self.u = (vector_of(linear, (), "a velocity") + np.cross(w, arms)).ravel()
 
     def translation(self, v: Array) -> Array:
         """Return v at every node; see `Body.translation`."""

@@ -15,7 +15,7 @@ from kratos_lite.assembly.element_groups import add_nodal
 from kratos_lite.bodies.applied_load import AppliedLoad, BodyLoad, no_potential
 from kratos_lite.bodies.free_body import FreeBody
 from kratos_lite.bodies.linear_algebra import Entries, block_entries, sum_of
-from kratos_lite.bodies.validation import fitting, one_point, vector_of
+from kratos_lite.bodies.validation import fitting, one_point
 from kratos_lite.elements.surface import surface_pressure, surface_pressure_tangent
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Where
@@ -37,7 +37,7 @@ class Force(BodyLoad):
     """
 
     def __init__(self, point: ArrayLike, force: ArrayLike, frame: str = "spatial") -> None:
-        self.point, self.force = one_point(point), vector_of(force, "a force")
+        self.point, self.force = one_point(point), finite(force, "a force", ("...", 3))
         self.frame = choice(frame, "frame", FRAMES)
 
     def bind(self, body: FreeBody) -> AppliedLoad:
@@ -81,7 +81,7 @@ class Torque(BodyLoad):
     """
 
     def __init__(self, torque: ArrayLike, frame: str = "spatial") -> None:
-        self.torque, self.frame = vector_of(torque, "a torque"), choice(frame, "frame", FRAMES)
+        self.torque, self.frame = finite(torque, "a torque", ("...", 3)), choice(frame, "frame", FRAMES)
 
     def bind(self, body: FreeBody) -> AppliedLoad:
         """Return the load on a body; ModelError unless it is rigid."""

@@ -92,6 +92,11 @@ class PseudoRigidBody(AffineBody, Deformable):
         return q[..., :9].reshape(*q.shape[:-1], 3, 3)
 
     @staticmethod
+    def _rate_of(q: Array, u: Array) -> Array:
+        """Return Ḟ; see `AffineBody._rate_of`."""
+        return PseudoRigidBody._matrix_of(u)
+
+    @staticmethod
     def _check_matrix(A: Array) -> None:
         """Raise InputError unless det F > 0."""
         lowest = float(np.linalg.det(A).min())
@@ -100,19 +105,10 @@ class PseudoRigidBody(AffineBody, Deformable):
                 f"a deformation gradient needs det F > 0; got {lowest:g}: it turns the body over"
             )
 
-    def velocity(self, X: ArrayLike, q: Array | None = None, u: Array | None = None) -> Array:
-        """Return v = Ḟ (X - X̄) + v̄, shaped as by `position`, in m/s."""
-        u = self.u if u is None else u
-        return self._moved(X, self._matrix_of(u), u[..., 9:])
-
     def set_velocity(self, linear: ArrayLike = (0, 0, 0), angular: ArrayLike = (0, 0, 0)) -> None:
         """Set the velocity of the mass center in m/s and the spatial angular velocity in rad/s."""
         w = self._rigid_velocity(linear, angular)
         self.u[..., :9] = (hat(w) @ self.deformation).reshape(self.u[..., :9].shape)
-
-    def affine_motion(self) -> tuple[Array, Array, Array]:
-        """Return F, Ḟ and x̄; see `Body.affine_motion`."""
-        return self.deformation, self._matrix_of(self.u).copy(), self.mass_center()
 
     def set_affine_motion(self, F: Array, rate: Array, center: Array, velocity: Array) -> None:
         """Take the affine motion; see `Body.set_affine_motion`."""

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from kratos_lite.bodies.affine import AffineBody
 from kratos_lite.bodies.linear_algebra import Solve, apply, transposed
 from kratos_lite.bodies.rotations import axial, check_rotation, hat, polar, rotation_of
-from kratos_lite.bodies.validation import Material, mass_properties_of, points_of
+from kratos_lite.bodies.validation import Material, mass_properties_of
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.mesh import Mesh
@@ -88,6 +88,11 @@ class RigidBody(AffineBody):
         return rotation_of(q)
 
     @staticmethod
+    def _rate_of(q: Array, u: Array) -> Array:
+        """Return Λ hat(W); see `AffineBody._rate_of`."""
+        return np.asarray(rotation_of(q) @ hat(u[..., :3]))
+
+    @staticmethod
     def _check_matrix(A: Array) -> None:
         """Raise InputError unless A is a rotation."""
         check_rotation(A, "the rotation of a configuration")
@@ -97,21 +102,9 @@ class RigidBody(AffineBody):
         """Rotation Λ (..., 3, 3), a copy."""
         return rotation_of(self.q).copy()
 
-    def velocity(self, X: ArrayLike, q: Array | None = None, u: Array | None = None) -> Array:
-        """Return v = Λ (W × (X - X̄)) + v̄, shaped as by `position`, in m/s."""
-        q, u = self.q if q is None else q, self.u if u is None else u
-        points = points_of(X)
-        spin = np.cross(u[..., None, :3], np.atleast_2d(points) - self.center[..., None, :])
-        v = spin @ np.swapaxes(rotation_of(q), -1, -2) + u[..., None, 3:]
-        return np.asarray(v if points.ndim == 2 else v[..., 0, :])
-
     def set_velocity(self, linear: ArrayLike = (0, 0, 0), angular: ArrayLike = (0, 0, 0)) -> None:
         """Set the velocity of the mass center in m/s and the spatial angular velocity in rad/s."""
         self.u[..., :3] = transposed(self.rotation, self._rigid_velocity(linear, angular))
-
-    def affine_motion(self) -> tuple[Array, Array, Array]:
-        """Return Λ, its rate and x̄; see `Body.affine_motion`."""
-        return self.rotation, self.rotation @ hat(self.u[:3]), self.mass_center()
 
     def set_affine_motion(self, F: Array, rate: Array, center: Array, velocity: Array) -> None:
         """Take the nearest rotation and the velocity; see `Body.set_affine_motion`."""

@@ -51,18 +51,12 @@ def points_of(X: ArrayLike) -> Array:
 
 def one_point(X: ArrayLike) -> Array:
     """Return one point (3,) as floats."""
-    point = points_of(X)
-    if point.ndim != 1:
-        raise InputError(f"one point (3,) is needed; got shape {point.shape}")
-    return point
+    return finite(X, "a point", (3,))
 
 
-def vector_of(value: ArrayLike, what: str) -> Array:
-    """Return a vector (..., 3) as floats."""
-    vector = finite(value, what)
-    if vector.shape[-1:] != (3,):
-        raise InputError(f"{what} must have three components; got shape {vector.shape}")
-    return vector
+def vector_of(value: ArrayLike, lead: tuple[int, ...], what: str) -> Array:
+    """Return a vector (3,), or one for each body of leading axes, as floats."""
+    return fitting(finite(value, what, ("...", 3)), lead, 1, what)
 
 
 def fitting(value: Array, lead: tuple[int, ...], tail: int, what: str) -> Array:

@@ -366,8 +366,8 @@ MUTATIONS = [
     ),
     Mutation(
         "bodies/affine.py",
-        'arm = self.q[..., 9:] - vector_of(about, "a point")',
-        'arm = self.q[..., 9:] + vector_of(about, "a point")',
+        "arm = self.q[..., 9:] - one_point(about)",
+        "arm = self.q[..., 9:] + one_point(about)",
         "tests/bodies/test_simple_mechanics.py -k angular_momentum_about",
     ),
     Mutation("bodies/rotations.py", "np.sin(safe / 2) / safe", "np.sin(safe) / safe", STEPS),
