@@ -104,8 +104,6 @@ AS_MANY, ASCEND = "as many values as times", "times of a series must ascend"
     (lambda: elastic(formulation="modal", modes=5), WHOLE_MODES),
     (lambda: elastic(formulation="modal", modes=99), r"1 … 24 modes; got 99"),
     (lambda: elastic(damping=-1.0), "a damping must be one number ≥ 0, in s"),
-    (lambda: elastic(damping=NAN), "a damping"),
-    (lambda: elastic(damping=[0.1, 0.2]), "a damping"),
     *((lambda m=m: elastic(formulation="modal", modes=m), WHOLE_MODES) for m in (6.5, "many", True)),
     (lambda: elastic(formulation=3), "unknown formulation of a finite-element body 3"),
     (lambda: kl.FixedBody(None), "a mesh must be a Mesh, such as"),
@@ -113,9 +111,7 @@ AS_MANY, ASCEND = "as many values as times", "times of a series must ascend"
     (lambda: elastic().position((2, 0, 0)), "outside the mesh", kl.MeshError),
     (lambda: kl.TimeSeries([0, 1], [0]), AS_MANY),
     (lambda: kl.TimeSeries([], []), AS_MANY),
-    (lambda: kl.TimeSeries([[0, 1]], [[0, 1]]), AS_MANY),
     (lambda: kl.TimeSeries([0, 0], [1, 2]), ASCEND),
-    (lambda: kl.TimeSeries([1, 0], [1, 2]), ASCEND),
     (lambda: kl.TimeSeries([0, NAN], [1, 2]), "times must be finite"),
     (lambda: kl.TimeSeries([0, 1], [1, NAN]), "values must be finite"),
 )
@@ -125,18 +121,10 @@ def test_bodies_and_series_that_are_not_made(action, words, error):
 
 
 @pytest.mark.parametrize(
-    ("kind", "integrator", "words"),
-    [
-        (
-            kl.RigidBody,
-            "DEF_EXP",
-            "of a rigid body are momentum_conserving, explicit, implicit; got 'DEF_EXP'",
-        ),
-        (kl.PseudoRigidBody, "RIG_NEG", "integrators of a pseudo-rigid body are .*; got 'RIG_NEG'"),
-        (kl.FiniteElementBody, "DEF_IMP", "integrators of a finite-element body are .*; got 'DEF_IMP'"),
-    ],
+    ("kind", "integrator"), list(zip(KINDS, ("DEF_EXP", "RIG_NEG", "DEF_IMP"), strict=True))
 )
-def test_an_integrator_of_another_kind(kind, integrator, words):
+def test_an_integrator_of_another_kind(kind, integrator):
+    words = f"integrators of a {kind.kind} body are {', '.join(kind.integrators)}; got '{integrator}'"
     with pytest.raises(kl.InputError, match=words):
         body_of(kind, integrator=integrator)
     refused(body_of(kind), lambda body: setattr(body, "integrator", integrator), words)
@@ -157,73 +145,71 @@ def integrated(words, **arguments):
     return lambda body: kl.integrate(body, **{"dt": 1e-3, "steps": 3, **arguments}), words
 
 
-VELOCITIES = (1, 2), (1, 2, NAN), "fast", (1, 2, 1j), [[1, 2, 3, 4]]
+VELOCITIES = (1, 2), (1, 2, NAN), "fast", (1, 2, 1j)
 POINTS = (1, 2), (NAN, 0, 0), np.zeros((2, 2, 3))
 MANY, X = np.ones((8, 3)), (0.5, 0.5, 0.5)
-WHOLE, SUBSTEPS = "must be a whole number ≥ 1", "substeps must be a whole number ≥ 1, or 'auto'"
+SUBSTEPS = "substeps must be a whole number ≥ 1, or 'auto'"
 
 
 @each_kind
 @table(
     *((lambda body, v=v: body.set_velocity(v), "a velocity") for v in VELOCITIES),
-    *((lambda body, v=v: body.set_velocity((1, 0, 0), v), "velocity") for v in VELOCITIES),
+    *((lambda body, v=v: body.set_velocity((1, 0, 0), v), "an angular velocity") for v in VELOCITIES),
     *((lambda body, X=X: body.position(X), "material points") for X in POINTS),
     *((lambda body, X=X: body.velocity(X), "material points") for X in POINTS),
     load(lambda: kl.Force((5, 5, 5), (1, 0, 0)), "outside the mesh", kl.MeshError),
-    load(lambda: kl.Force((NAN, 5, 5), (1, 0, 0)), "a point must be finite"),
-    load(lambda: kl.Force((0, 0, 0), (1, NAN, 0)), "a force must be finite"),
-    load(lambda: kl.Force((0, 0, 0), (1, 0)), r"a force must have shape \(..., 3\)"),
-    load(lambda: kl.Force((0, 0, 0), (1, 0, 0), frame="body"), "frame must be one of spatial, follower"),
-    load(lambda: kl.Torque((1, 0, 0), frame="body"), "frame must be one of spatial, follower"),
-    load(lambda: kl.Torque((1, NAN, 0)), "a torque must be finite"),
-    load(lambda: kl.Spring((0, 0, 0), (1, 1, 1), -5.0), "stiffness of a spring must be one number ≥ 0"),
-    load(lambda: kl.Spring((0, 0, 0), (1, 1, 1), 5.0, damping=-1), "damping of a spring"),
     load(lambda: kl.Spring((9, 0, 0), (1, 1, 1), 5.0), "outside the mesh", kl.MeshError),
     load(lambda: kl.FollowerPressure("lid", 5.0), "lid", kl.KratosLiteError),
-    load(lambda: kl.FollowerPressure("z+", NAN), "a pressure"),
     load(lambda: kl.Pressure("lid", 5.0), "lid", kl.KratosLiteError),
-    load(lambda: kl.Gravity((0, NAN, 0)), "gravity"),
-    load(lambda: kl.Callback(3), "a callback is a function"),
+    load(lambda: kl.Force(X, MANY[:2]), "a force of shape"),
     load(lambda: "weight", "a load such as Gravity or Force is needed; got str"),
-    constraint(lambda: kl.FixPoint((5, 5, 5)), "outside the mesh", kl.MeshError),
     constraint(lambda: kl.FixPoint([[0, 0, 0], [5, 5, 5]]), "outside the mesh", kl.MeshError),
-    constraint(lambda: kl.FixPoint((0, NAN, 0)), "material points"),
-    constraint(lambda: kl.FixDirection((0, 0, 0), (0, 0, 0)), "a direction needs three components"),
-    constraint(lambda: kl.FixDirection((0, 0, 0), (0, NAN, 0)), "a direction must be finite"),
-    constraint(lambda: kl.PrescribedVelocity((0, 0, 0), (1, 0, 0), NAN), "a velocity"),
-    constraint(lambda: kl.PrescribedDisplacement((0, 0, 0), (1, 0, 0), "up"), "a displacement"),
-    constraint(lambda: kl.PrescribedAcceleration((0, 0, 0), (1, 0, 0), [1, 2]), "an acceleration"),
     constraint(lambda: kl.RigidLink((0, 0, 0), (0, 0, 0)), "a rigid link needs a length"),
-    constraint(lambda: kl.RigidLink([[0, 0, 0]], (1, 0, 0)), r"a point must have shape \(3,\)"),
-    constraint(lambda: kl.RigidLink((9, 0, 0), (1, 0, 0)), "outside the mesh", kl.MeshError),
     (lambda body: body.set_velocity(linear=MANY), r"a velocity of shape .* does not fit a single body"),
-    (lambda body: body.set_velocity(angular=MANY), "an angular velocity of shape"),
     (lambda body: body.rotate(np.broadcast_to(np.eye(3), (4, 3, 3))), "a rotation of shape"),
-    (lambda body: body.angular_momentum((1, 2)), "three components|shape"),
+    (lambda body: body.angular_momentum((1, 2)), r"a point must have shape \(3,\)"),
     (lambda body: setattr(body, "damping", NAN), "a damping must be finite"),
     (lambda body: setattr(body, "damping", -1.0), "a damping must be one number"),
     (lambda body: setattr(body, "tolerance", NAN), "a tolerance must be finite"),
     (lambda body: setattr(body, "tolerance", -1.0), "a tolerance must be one number"),
     (lambda body: type(body)(body.mesh, body.material, integrator=""), "the integrators of a"),
-    load(lambda: kl.Force(X, MANY[:2]), "a force of shape"),
-    load(lambda: kl.Spring(X, (1, 0, 0), [1, 2]), "the stiffness of a spring must be one number"),
-    load(lambda: kl.Spring(X, (1, 0, 0), 1, damping=[1, 2]), "the damping of a spring must be one"),
-    load(lambda: kl.Spring(X, (1, 0, 0), 1, length=-1), "the length of a spring must be one number"),
-    load(lambda: kl.Spring(X, (1, 0, 0), 1, length="long"), "the length of a spring must be made of"),
-    constraint(lambda: kl.FixPoint(np.zeros((0, 3))), "a FixPoint needs one point at least"),
     integrated("a step must be one number > 0, in s; got 0", dt=0.0),
-    integrated("a step must be one number > 0, in s", dt=-1e-3),
-    integrated("a step must be finite", dt=NAN),
-    integrated("a step", dt="short"),
-    integrated("a step must be one number", dt=[1e-3, 1e-3]),
-    integrated(f"steps {WHOLE}; got 0", steps=0),
-    integrated(f"steps {WHOLE}; got 2.5", steps=2.5),
-    integrated(f"steps {WHOLE}", steps=True),
-    integrated(f"every {WHOLE}", every=0),
-    *(integrated(SUBSTEPS, substeps=value) for value in (0, "many", NAN, 2.5, None, np.inf, [1], True)),
+    integrated("steps must be a whole number ≥ 1; got 0", steps=0),
+    *(integrated(SUBSTEPS, substeps=value) for value in (0, "many", NAN, 2.5, None, [1], True)),
 )
 def test_what_every_body_refuses(kind, action, words, error):
     refused(body_of(kind), action, words, error)
+
+
+FRAME = "frame must be one of spatial, follower"
+
+
+@table(
+    (lambda: kl.Force((NAN, 5, 5), (1, 0, 0)), "a point must be finite"),
+    (lambda: kl.Force(X, (1, NAN, 0)), "a force must be finite"),
+    (lambda: kl.Force(X, (1, 0)), r"a force must have shape \(..., 3\)"),
+    (lambda: kl.Force(X, (1, 0, 0), frame="body"), FRAME),
+    (lambda: kl.Torque((1, 0, 0), frame="body"), FRAME),
+    (lambda: kl.Torque((1, NAN, 0)), "a torque must be finite"),
+    (lambda: kl.Spring(X, (1, 1, 1), -5.0), "stiffness of a spring must be one number ≥ 0"),
+    (lambda: kl.Spring(X, (1, 0, 0), [1, 2]), "the stiffness of a spring must be one number"),
+    (lambda: kl.Spring(X, (1, 1, 1), 5.0, damping=-1), "damping of a spring must be one number"),
+    (lambda: kl.Spring(X, (1, 0, 0), 1, length=-1), "the length of a spring must be one number"),
+    (lambda: kl.Spring(X, (1, 0, 0), 1, length="long"), "the length of a spring must be made of"),
+    (lambda: kl.FollowerPressure("z+", NAN), "a pressure"),
+    (lambda: kl.Callback(3), "a callback is a function"),
+    (lambda: kl.FixPoint((0, NAN, 0)), "material points"),
+    (lambda: kl.FixPoint(np.zeros((0, 3))), "a FixPoint needs one point at least"),
+    (lambda: kl.FixDirection(X, (0, 0, 0)), "a direction needs three components"),
+    (lambda: kl.FixDirection(X, (0, NAN, 0)), "a direction must be finite"),
+    (lambda: kl.PrescribedVelocity(X, (1, 0, 0), NAN), "a velocity"),
+    (lambda: kl.PrescribedDisplacement(X, (1, 0, 0), "up"), "a displacement"),
+    (lambda: kl.PrescribedAcceleration(X, (1, 0, 0), [1, 2]), "an acceleration"),
+    (lambda: kl.RigidLink([[0, 0, 0]], (1, 0, 0)), r"a point must have shape \(3,\)"),
+)
+def test_loads_and_constraints_that_are_not_made(action, words, error):
+    with pytest.raises(error, match=words):
+        action()
 
 
 @pytest.mark.parametrize(

@@ -39,7 +39,7 @@ def herd(kind, integrator, count=5, damping=0.0):
 @each
 def test_each_moves_as_if_it_were_alone(kind, integrator, damping):
     bodies, alone = herd(kind, integrator, damping=damping), herd(kind, integrator, damping=damping)
-    states = list(kl.integrate(bodies, 2e-3, 30, every=10))
+    states = list(kl.integrate(bodies, 2e-3, 20, every=10)) + list(kl.integrate(bodies, 2e-3, 10, every=10))
     assert [state.step for state in states] == [10, 20, 30]
     assert states[-1].q.shape == (5, 12)
     for i, body in enumerate(alone):
@@ -51,20 +51,6 @@ def test_each_moves_as_if_it_were_alone(kind, integrator, damping):
         assert bodies[i].step == 30
         assert float(bodies[i].energy()) == pytest.approx(float(body.energy()), rel=1e-10)
         assert float(bodies[i].external_work) == pytest.approx(float(body.external_work), rel=1e-9, abs=1e-9)
-
-
-@each
-def test_they_advance_again_together_or_alone(kind, integrator):
-    bodies, alone = herd(kind, integrator), herd(kind, integrator)
-    for _ in kl.integrate(bodies, 2e-3, 5):
-        pass
-    for _ in kl.integrate(bodies, 2e-3, 5):
-        pass
-    for _ in kl.integrate(alone, 2e-3, 10):
-        pass
-    for one, other in zip(bodies, alone, strict=True):
-        np.testing.assert_allclose(one.q, other.q, rtol=1e-13, atol=1e-13)
-        assert one.step == other.step == 10
 
 
 def test_one_object_holds_many():
@@ -87,24 +73,6 @@ def test_one_object_holds_many():
     single.add(kl.Gravity((0, 0, -9.81)))
     end(single, 1e-3, 100)
     np.testing.assert_allclose(many.q[1], single.q, rtol=1e-13, atol=1e-13)
-
-
-@pytest.mark.parametrize("integrator", ["DEF_LIM", "ENERGY_MOMENTUM"])
-def test_many_pseudo_rigid_bodies_keep_their_invariants(integrator):
-    rng = np.random.default_rng(1)
-    many = kl.PseudoRigidBody(
-        material=kl.Isotropic3D(1e6, 0.3, 1000.0),
-        mass_properties=kl.MassProperties.box(rng.uniform(0.5, 1, (20, 3)), np.full(20, 1000.0)),
-        integrator=integrator,
-    )
-    many.set_velocity(rng.uniform(-1, 1, (20, 3)), rng.uniform(-5, 5, (20, 3)))
-    L, E = many.angular_momentum(), many.energy()
-    end(many, 2e-3, 50)
-    if integrator == "ENERGY_MOMENTUM":
-        np.testing.assert_allclose(many.energy(), E, rtol=1e-12)
-        np.testing.assert_allclose(many.angular_momentum(), L, rtol=1e-11, atol=1e-11)
-    assert many.external_work.shape == (20,)
-    np.testing.assert_allclose(many.energy(), E, rtol=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ Reference values: closed forms, and the equations of motion solved with 12 digit
 import motions
 import numpy as np
 import pytest
-from computing import BUILT, compiled
+from computing import compiled
 from motions import end
 
 import kratos_lite as kl
@@ -84,10 +84,9 @@ def test_frequencies_of_a_box(brick):
     [(OMEGA_B, np.eye(3), 0), (OMEGA_S, np.eye(3)[[1, 0, 2]] - np.diag([0, 0, 1]), 1)],
     ids=["breathing", "shear"],
 )
-@pytest.mark.parametrize("omega_h", [0.2, 0.8, 1.6])
 @each_integrator
-def test_the_frequency_of_small_vibrations_is_that_of_the_step(integrator, omega_h, omega, shape, entry):
-    amplitude, h = 1e-7, omega_h / OMEGA_B
+def test_the_frequency_of_small_vibrations_is_that_of_the_step(integrator, omega, shape, entry):
+    amplitude, h = 1e-7, 0.8 / OMEGA_B
     body, rest = deformed(cube(integrator), np.eye(3) + amplitude * shape), np.eye(3).ravel()[entry]
     seen = [amplitude] + [state.q[entry] - rest for state in kl.integrate(body, h, 40)]
     inverse = np.arcsin if integrator == "DEF_EXP" else np.arctan
@@ -143,11 +142,7 @@ def test_damping_takes_a_half_omega_squared_times_eta(integrator):
     [
         ("DEF_EXP", 1e6, 1000, 1.68799e-3, 4.833e-5, 0.0),
         ("DEF_LIM", 1e6, 1000, 2.19968e-3, 4.807e-5, 3.574e-8),
-        pytest.param("DEF_EXP", 1e6, 8000, 1.30725e-5, 7.567e-7, 0.0, marks=compiled),
-        pytest.param("DEF_LIM", 1e6, 8000, 2.40804e-5, 7.480e-7, 8.77e-12, marks=compiled),
         ("ENERGY_MOMENTUM", 1e6, 1000, 2.16e-3, 0.0, 0.0),
-        pytest.param("ENERGY_MOMENTUM", 1e6, 4000, 8.05e-5, 0.0, 0.0, marks=compiled),
-        pytest.param("DEF_EXP", 1e8, 4000, 1.74584e-4, 3.021e-6, 0.0, marks=compiled),
         ("DEF_LIM", 1e8, 1000, 5.32291e-4, 7.453e-5, 3.835e-6),
     ],
 )
@@ -168,18 +163,6 @@ def test_errors_of_a_box_that_rotates_freely(integrator, E, steps, error, gain, 
     np.testing.assert_allclose(body.linear_momentum(), 0, atol=1e-12)
 
 
-@each_integrator
-def test_errors_fall_with_the_second_power_of_the_step(integrator, brick):
-    def at_a_tenth(steps):
-        body = brick(kl.PseudoRigidBody, integrator=integrator)
-        body.set_velocity(angular=SPIN)
-        return end(body, 0.1 / steps, steps).deformation
-
-    fine = at_a_tenth(1600)
-    errors = [np.linalg.norm(at_a_tenth(steps) - fine) for steps in (200, 400)]
-    assert np.log2(errors[0] / errors[1]) == pytest.approx(np.log2((1 - 1 / 64) / (1 / 4 - 1 / 64)), abs=0.15)
-
-
 @pytest.mark.parametrize(
     ("E", "stretches", "apart"), [(1e6, (0.99346, 1.01531), 1.0), (1e8, (0.999937, 1.000159), 0.0053)]
 )
@@ -190,7 +173,7 @@ def test_stretches_and_nearness_to_the_rigid_body(E, stretches, apart, brick):
     low, high, far = 1.0, 1.0, 0.0
     for body in (soft, rigid):
         body.set_velocity(angular=SPIN)
-    steps = 10_000
+    steps = 4000
     for one, _ in zip(
         kl.integrate(soft, 1 / steps, steps, every=10),
         kl.integrate(rigid, 1 / steps, steps, every=10),
@@ -223,56 +206,6 @@ def test_steps_that_blow_the_linearly_implicit_integrator_up(E, h, steps, brick,
         highest = np.inf
     assert highest > 5 * 1160
     assert "may gain energy without bound" in caplog.text
-
-
-@pytest.mark.parametrize(
-    ("E", "h"),
-    [
-        (1e6, 1e-3),
-        (1e6, 5e-3),
-        (1e6, 2e-2),
-        (1e6, 5e-2),
-        (1e8, 5e-3),
-        (1e8, 2e-2),
-        (2e11, 1e-4),
-        (2e11, 1e-3),
-    ],
-)
-def test_energy_and_momenta_stay_whatever_the_step(E, h, brick, drift):
-    body = brick(kl.PseudoRigidBody, E)
-    body.set_velocity((1, 2, 3), SPIN)
-    start, p = float(body.energy()), body.linear_momentum()
-    worst = [0.0, 0.0]
-    for _ in kl.integrate(body, h, 60):
-        worst[0] = max(worst[0], abs(float(body.energy()) / start - 1))
-        worst[1] = max(worst[1], drift(MOMENTUM, body.angular_momentum()))
-    assert worst[0] < 2e-12
-    assert worst[1] < 1e-12
-    np.testing.assert_allclose(body.linear_momentum(), p, rtol=1e-13)
-
-
-def test_a_stiff_spinning_box_for_a_hundred_thousand_steps(brick, drift):
-    body = brick(kl.PseudoRigidBody, 2e11)
-    body.set_velocity(angular=SPIN)
-    start, worst = float(body.energy()), [0.0, 0.0]
-    for _ in kl.integrate(body, 1e-3, 100_000 if BUILT else 400, every=100):
-        worst[0] = max(worst[0], abs(float(body.energy()) / start - 1))
-        worst[1] = max(worst[1], drift(MOMENTUM, body.angular_momentum()))
-    assert worst[0] < 1e-10
-    assert worst[1] < 1e-10
-    assert body.deformation.T @ body.deformation == pytest.approx(np.eye(3), abs=1e-4)
-
-
-@pytest.mark.parametrize("h", [1e-3, 2e-2])
-def test_damping_dissipates_and_leaves_the_angular_momentum(h, brick, drift):
-    body = brick(kl.PseudoRigidBody, damping=1e-3)
-    body.set_velocity(angular=SPIN)
-    energies = [float(body.energy())]
-    for _ in kl.integrate(body, h, 60):
-        energies.append(float(body.energy()))
-        assert drift(MOMENTUM, body.angular_momentum()) < 1e-13
-    assert (np.diff(energies) < 1e-9).all()
-    assert energies[-1] < 1160.0
 
 
 def test_a_rotated_start_gives_the_rotated_motion(brick):

@@ -67,15 +67,7 @@ def test_going_on_from_a_file_changes_no_bit(kind, integrator, options, loads, b
     kl.write(tmp_path / "rest.npz", kl.State.of(part))
     fresh = body_of(brick, kind, integrator, options, loads)
     kl.read_state(tmp_path / "rest.npz").restore(fresh)
-    assert_same(end(fresh, 8), end(whole, 15))
-
-
-@pytest.mark.parametrize("loads", LOADS)
-@each
-def test_how_often_states_are_taken_changes_no_bit(kind, integrator, options, loads, brick):
-    one = end(body_of(brick, kind, integrator, options, loads), 12)
-    assert_same(end(body_of(brick, kind, integrator, options, loads), 12, every=1), one)
-    assert_same(end(body_of(brick, kind, integrator, options, loads), 12, every=5), one)
+    assert_same(end(fresh, 8, every=3), end(whole, 15))
 
 
 @pytest.mark.parametrize("loads", ["constant", "changing"])
@@ -107,25 +99,8 @@ def test_an_integration_ends_where_it_is_told_to(brick):
     body = brick(kl.RigidBody)
     body.set_velocity((1, 0, 0))
     states = list(kl.integrate(body, 0.1, 100, until=lambda state: state.q[9] > 0.45))
-    assert len(states) == 5
+    assert [round(float(state.q[9]), 12) for state in states] == [0.1, 0.2, 0.3, 0.4, 0.5]  # copies
     assert body.time == states[-1].time
-
-
-def test_an_integration_that_is_left_has_moved_the_body_so_far(brick):
-    body = brick(kl.RigidBody)
-    body.set_velocity((1, 0, 0))
-    for state in kl.integrate(body, 0.1, 100):
-        if state.step == 3:
-            break
-    assert body.mass_center()[0] == pytest.approx(0.3)
-    assert body.step == 3
-
-
-def test_states_are_copies(brick):
-    body = brick(kl.RigidBody)
-    body.set_velocity((1, 0, 0))
-    states = list(kl.integrate(body, 0.1, 3))
-    assert [round(float(state.q[9]), 12) for state in states] == [0.1, 0.2, 0.3]
 
 
 def test_a_file_holds_no_objects(brick, tmp_path):
@@ -134,26 +109,6 @@ def test_a_file_holds_no_objects(brick, tmp_path):
     with np.load(path, allow_pickle=False) as file:
         assert {"kind", "q", "u", "time", "step", "external_work"} <= set(file.files)
         assert all(file[name].dtype != object for name in file.files)
-
-
-@pytest.mark.parametrize("content", [b"", b"not a zip", None])
-def test_files_that_are_no_states(content, tmp_path):
-    path = tmp_path / "broken.npz"
-    if content is None:
-        np.savez(path, q=np.zeros(3))
-    else:
-        path.write_bytes(content)
-    with pytest.raises(kl.InputError, match=r"broken\.npz: not a state that kl\.write wrote"):
-        kl.read_state(path)
-    with pytest.raises(kl.InputError, match="there is no such file"):
-        kl.read_state(tmp_path / "missing.npz")
-
-
-def test_a_file_of_pickled_objects_is_refused(tmp_path):
-    path = tmp_path / "pickled.npz"
-    np.savez(path, kind=np.array([object()], dtype=object))
-    with pytest.raises(kl.InputError, match="not a state"):
-        kl.read_state(path)
 
 
 def test_a_state_of_another_body_is_refused(brick):

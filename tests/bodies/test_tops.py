@@ -76,43 +76,6 @@ def test_errors_of_the_free_top_after_one_second(integrator, error, gain, drift)
     assert np.abs(body.rotation.T @ body.rotation - np.eye(3)).max() < 1e-13
 
 
-@pytest.mark.parametrize(
-    ("integrator", "coarse", "fine"),
-    [
-        ("RIG_POS", 2.5882e-3, 6.4306e-4),
-        ("RIG_NEG", 4.3239e-3, 5.7171e-4),
-        ("RIG_IMP", 6.7033e-4, 1.6761e-4),
-    ],
-)
-def test_orders_of_convergence(integrator, coarse, fine):
-    errors = [
-        np.linalg.norm(end(free(integrator), 1 / steps, steps).rotation - FREE_AT_1) for steps in (200, 400)
-    ]
-    np.testing.assert_allclose(errors, (coarse, fine), rtol=0.01)
-    order = np.log2(errors[0] / errors[1])
-    assert 1.95 < order < (3.0 if integrator == "RIG_NEG" else 2.05)
-
-
-@pytest.mark.parametrize(("integrator", "sign"), [("RIG_POS", 1), ("RIG_NEG", -1)])
-def test_the_energy_drifts_with_the_third_power_of_the_step_and_the_sign_that_gives_the_name(
-    integrator, sign
-):
-    coarse, fine = gains(free(integrator), 0.01, 100), gains(free(integrator), 0.005, 200)[1::2]
-    assert (sign * coarse > 0).all()
-    assert (sign * fine > 0).all()
-    assert coarse[-1] / fine[-1] == pytest.approx(8, rel=0.02)
-
-
-@pytest.mark.parametrize(
-    ("integrator", "h", "at_end"),
-    [("RIG_POS", 0.01, 1.2586e-2), ("RIG_NEG", 0.01, -2.6140e-2), ("RIG_NEG", 0.05, -0.499994)],
-)
-def test_energy_of_the_free_top_after_twenty_seconds(integrator, h, at_end):
-    body = free(integrator)
-    end(body, h, round(20 / h))
-    assert body.energy() / 160.002 - 1 == pytest.approx(at_end, rel=0.02)
-
-
 def test_the_implicit_integrator_keeps_the_energy_over_twenty_seconds():
     body = free("RIG_IMP")
     change = gains(body, 0.01, 2000) / 160.002
@@ -129,13 +92,6 @@ def test_the_implicit_integrator_retraces_its_way():
     end(body, 0.01, 100)
     np.testing.assert_allclose(body.q, q, atol=1e-10)
     np.testing.assert_allclose(body.u[:3], (-8, -0.02, 0), atol=1e-9)
-
-
-@pytest.mark.parametrize("integrator", EXACT)
-def test_the_spatial_momentum_of_the_free_top_stays_for_twenty_seconds(integrator, drift):
-    body = free(integrator)
-    end(body, 0.01, 2000)
-    assert drift(np.array([40, 0.2, 0]), body.angular_momentum()) < 1e-12
 
 
 def test_the_motion_of_the_free_top_follows_eulers_equations():
@@ -173,20 +129,17 @@ def test_a_top_turns_over_at_the_times_of_jacobi(integrator):
 # ---- heavy top -------------------------------------------------------------------------------------
 
 TABLE = {
-    ("RIG_POS", 0.001): (1.9931e-6, 0.0, 2.0719e-6),
     ("RIG_POS", 0.003): (3.3964e-5, 0.0, 3.4351e-5),
     ("RIG_POS", 0.009): (7.4212e-4, 0.0, 7.4212e-4),
-    ("RIG_NEG", 0.001): (-2.8085e-6, -2.9379e-6, 0.0),
     ("RIG_NEG", 0.003): (-4.4610e-5, -4.5400e-5, 0.0),
     ("RIG_NEG", 0.009): (-9.2999e-4, -9.2999e-4, 0.0),
-    ("RIG_IMP", 0.001): (-1.7471e-6, -1.8879e-6, 2.1e-10),
     ("RIG_IMP", 0.003): (-1.5957e-5, -1.7013e-5, 3.1e-11),
     ("RIG_IMP", 0.009): (-1.5411e-4, -1.5487e-4, 0.0),
 }
 """H - H0 of the heavy top over 10 s: at the end, lowest, highest."""
 
 
-@pytest.mark.parametrize("h", [*(pytest.param(h, marks=compiled) for h in (0.001, 0.003)), 0.009])
+@pytest.mark.parametrize("h", [pytest.param(0.003, marks=compiled), 0.009])
 @each_integrator
 def test_energy_of_the_heavy_top(integrator, h):
     body, energy = heavy(integrator)
@@ -194,7 +147,7 @@ def test_energy_of_the_heavy_top(integrator, h):
     vertical = body.angular_momentum()[2]
     change = gains(body, h, int(10 / h), energy)
     last, low, high = TABLE[integrator, h]
-    room = 1e-9  # rounding of H over ten thousand steps
+    room = 1e-9  # rounding of H over thousands of steps
     assert 1.05 * low - room < change.min()
     assert change.max() < 1.05 * high + room
     assert change[-1] == pytest.approx(last, rel=0.05, abs=room)
@@ -263,26 +216,7 @@ def test_the_nutating_top_follows_the_reference():
     assert abs(body.angular_momentum()[2] / vertical - 1) < 1e-12
 
 
-@pytest.mark.parametrize(("W", "angle"), [(50.0, 0.05), (25.0, 0.5)])
-@compiled
-def test_the_motion_of_the_heavy_tops_follows_eulers_equations(W, angle):
-    times = np.linspace(0, 10, 21)
-    rotations, _ = motions.top((5, 5, 1), (0, 0, W), exp([angle, 0, 0]), times, weight=20.0)
-    body, _ = heavy("RIG_IMP", W, angle)
-    for i, state in enumerate(kl.integrate(body, 1e-3, 10_000, every=500), 1):
-        assert state.time == pytest.approx(times[i], rel=1e-12)
-        np.testing.assert_allclose(state.q[6:9], rotations[i][:, 2], atol=1e-4 * (1 + i / 4))
-
-
 # ---- torques ---------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("integrator", EXACT)
-def test_a_constant_torque_in_space_adds_to_the_momentum_exactly(integrator):
-    body = free(integrator)
-    body.add(kl.Torque((3.0, -2.0, 5.0)))
-    end(body, 0.01, 50)
-    np.testing.assert_allclose(body.angular_momentum(), (41.5, -0.8, 2.5), rtol=1e-12, atol=1e-12)
 
 
 @each_integrator
