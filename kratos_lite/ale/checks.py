@@ -32,13 +32,10 @@ def wave_speeds(terms: MotionMatrices) -> tuple[float, float, float]:
 
 def rayleigh_speed(p: float, s: float) -> float:
     """Return the speed in m/s of Rayleigh waves for those of pressure and shear waves."""
-    # Root of (2 - x)² = 4 sqrt(1 - x) sqrt(1 - x s²/p²) with x = (c_R / c_s)².
-    low, high, k = 1e-6, 1.0 - 1e-12, (s / p) ** 2
-    for _ in range(200):
-        x = (low + high) / 2
-        f = (2 - x) ** 2 - 4 * np.sqrt(1 - x) * np.sqrt(1 - k * x)
-        low, high = (x, high) if f < 0 else (low, x)
-    return float(s * np.sqrt((low + high) / 2))
+    # (2 - x)² = 4 sqrt(1 - x) sqrt(1 - k x), squared and without x, with x = (c_R / c_s)² and k = s²/p².
+    k = (s / p) ** 2
+    roots = np.roots([1.0, -8.0, 24 - 16 * k, 16 * (k - 1)])
+    return float(s * np.sqrt(min(roots[np.abs(roots.imag) < 1e-9].real)))
 
 
 def critical_rate_estimate(terms: MotionMatrices) -> float:

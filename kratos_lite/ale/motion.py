@@ -17,14 +17,13 @@ its loads and a factor 2 corrected; Nackenhorst, Comput. Methods Appl. Mech. Eng
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kratos_lite.ale.boundaries import leak
-from kratos_lite.ale.moving_part import check_ties, moving_nodes
+from kratos_lite.ale.boundaries import check_ties, leak, moving_nodes
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError, ModelError
@@ -39,7 +38,7 @@ AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 LEAK = 1e-2
 """Fraction of the velocity that may pass through the boundary before a warning is given."""
 TOO_LEAKY = 0.2
-"""Share from which a body is not one of revolution, or not straight, at all."""
+"""That from which a body is not one of revolution, or not straight, at all."""
 
 
 class Motion(Attachment):
@@ -317,9 +316,12 @@ class Rate:
             self.slope = function_of(acceleration, "an acceleration")
         self.steady = not (callable(rate) or callable(acceleration) or acceleration)
         self.is_changing = callable(rate if acceleration is None else acceleration)
-        if not callable(rate) and (isinstance(acceleration, TimeSeries) or not callable(acceleration)):
-            number = not (acceleration is None or isinstance(acceleration, TimeSeries))
-            self.value = _accelerated(self.value(0.0), self.slope(0.0) if number else acceleration)
+        if not callable(rate):
+            start = self.value(0.0)
+            if isinstance(acceleration, TimeSeries):
+                self.value = lambda time: start + acceleration.integral(0.0, time)
+            elif acceleration is not None and not callable(acceleration):
+                self.value = lambda time: start + self.slope(time) * time
 
     def at(self, time: float, step: float = 0.0, steady: bool = False) -> tuple[float, float]:
         """Return rate and acceleration at a time in s, the mean over a step in s if not given."""
@@ -331,14 +333,11 @@ class Rate:
         return self.value(time), (self.value(end) - self.value(start)) / (end - start)
 
 
-def vector_rates(
-    velocity: Sequence[Factor], acceleration: Sequence[Factor] | None, what: str
-) -> tuple[Rate, Rate, Rate]:
+def vector_rates(velocity: Sequence[Factor], acceleration: Sequence[Factor] | None, what: str) -> list[Rate]:
     """Return the rates of three components, each a number, `TimeSeries` or function of time."""
     name, none = f"{what} velocity", (None,) * 3
     accelerations = none if acceleration is None else _components(acceleration, f"{what} acceleration")
-    x, y, z = (Rate(*pair, name) for pair in zip(_components(velocity, name), accelerations, strict=True))
-    return x, y, z
+    return [Rate(*pair, name) for pair in zip(_components(velocity, name), accelerations, strict=True)]
 
 
 def _components(values: Sequence[Factor], what: str) -> tuple[Factor, Factor, Factor]:
@@ -349,10 +348,3 @@ def _components(values: Sequence[Factor], what: str) -> tuple[Factor, Factor, Fa
             f"{what} has three components, each a number, TimeSeries or function of time; got {values!r:.80}"
         ) from None
     return x, y, z
-
-
-def _accelerated(start: float, acceleration: float | TimeSeries | None) -> Callable[[float], float]:
-    """Return the rate in time from its start."""
-    if isinstance(acceleration, TimeSeries):
-        return lambda time: start + acceleration.integral(0.0, time)
-    return lambda time: start + (acceleration or 0.0) * time

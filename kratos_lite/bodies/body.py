@@ -1,4 +1,4 @@
-"""Body: a body under loads and constraints, with its energies.
+"""Body: a body under loads and constraints, with its energies; Deformable: one that has a stiffness.
 
 What a kind of body defines is in `free_body`.  Everything else (loads, constraints, energies, time
 integration) builds on that.
@@ -16,9 +16,11 @@ import numpy as np
 from kratos_lite.bodies.applied_load import AppliedLoad, BodyLoad, apply_load
 from kratos_lite.bodies.constraints import Constraint
 from kratos_lite.bodies.free_body import FreeBody
+from kratos_lite.bodies.linear_algebra import Solve
 from kratos_lite.bodies.validation import Material
 from kratos_lite.errors import InputError, ModelError, nearest
 from kratos_lite.mesh import Mesh
+from kratos_lite.model.checks import check_wave_speeds
 from kratos_lite.model.loads import Load
 from kratos_lite.model.mass_properties import MassProperties
 from kratos_lite.registry import Registry
@@ -60,7 +62,6 @@ class Body(FreeBody):
 
     integrators: ClassVar[Mapping[str, str]] = {}
     """Names of the time integrators of the kind of body, the default first, and their aliases in Solfec."""
-    convertible: ClassVar[bool] = True
     mass_is_given = False
     """Whether mass properties were given in place of those of mesh and material."""
 
@@ -295,3 +296,53 @@ class Body(FreeBody):
     def __repr__(self) -> str:
         many = f"{len(self.q)} bodies, " if self.q.ndim > 1 else ""
         return f"{type(self).__name__}({many}{self.dofs} velocities, t = {self.time:g} s, {self.integrator})"
+
+
+class Deformable(Body):
+    """A body whose configurations form a linear space: q + h u is one again.
+
+    Its integrators are ``"explicit"``: momenta exact, energy bounded, steps up to `critical_step`;
+    ``"linearly_implicit"``: linear momentum exact, angular momentum to O(h⁴), not safe for stiff spinning
+    bodies; ``"energy_momentum"``: implicit, energy and both momenta exact whatever the step.  Solfec's
+    DEF_EXP and DEF_LIM, and ENERGY_MOMENTUM, are aliases.
+    """
+
+    jacobian_is_constant = True
+    integrators: ClassVar[Mapping[str, str]] = {
+        "energy_momentum": "ENERGY_MOMENTUM",
+        "linearly_implicit": "DEF_LIM",
+        "explicit": "DEF_EXP",
+    }
+
+    def warnings(self) -> list[str]:
+        """Return materials whose waves are so slow or quick that their units may be wrong."""
+        given = self.material
+        materials = given.values() if isinstance(given, Mapping) else [] if given is None else [given]
+        return check_wave_speeds(materials)
+
+    @abstractmethod
+    def solver(self, q: Array, c: float) -> Solve:
+        """Return what solves (M + c K(q)) x = b, with the tangent K of the internal force vector.
+
+        Parameters
+        ----------
+        q : configuration.
+        c : s².
+
+        Returns
+        -------
+        function of columns b (dofs, k) or (dofs,) that returns x.
+        """
+
+    @abstractmethod
+    def extent(self) -> float:
+        """Return the size of what displacements are added to: coordinates in m, or the 1 of F."""
+
+    @abstractmethod
+    def highest_frequency(self) -> float:
+        """Return an upper bound of the angular frequencies in rad/s at the configuration."""
+
+    def critical_step(self) -> float:
+        """Return the longest stable step in s of the explicit integrator: h²ω²/2 + h η ω² ≤ 2."""
+        h = 2.0 / self.highest_frequency()
+        return float(h * h / (np.hypot(h, self.damping) + self.damping))

@@ -8,8 +8,8 @@ from typing import Any, TypeVar, overload
 
 import numpy as np
 
-from kratos_lite.bodies.body import BODIES, Body
-from kratos_lite.bodies.deformable import Deformable
+from kratos_lite.bodies.body import BODIES, Body, Deformable
+from kratos_lite.bodies.rigid import FixedBody
 from kratos_lite.bodies.rotations import polar
 from kratos_lite.bodies.validation import mass_properties_of
 from kratos_lite.errors import InputError, ModelError
@@ -68,9 +68,9 @@ def convert(body: Body, kind: Any, **options: Any) -> Any:
     instance(body, "what is converted", Body, "kl.RigidBody(mesh, material)")
     if isinstance(kind, str):
         kind = BODIES[kind]
-    if not (isinstance(kind, type) and issubclass(kind, Body) and kind.convertible):
+    if not (isinstance(kind, type) and issubclass(kind, Body)) or issubclass(kind, FixedBody):
         raise InputError(f"a body becomes a RigidBody, PseudoRigidBody or FiniteElementBody; got {kind!r}")
-    if not body.convertible:
+    if isinstance(body, FixedBody):
         raise ModelError("a fixed body has no mass, so it does not become another kind; make a new body")
     if body.q.ndim > 1 or body.mesh is None or body.material is None:
         raise ModelError(f"only a single body with a mesh and a material changes its kind; got {body!r}")

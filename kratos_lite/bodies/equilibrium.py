@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.assembly.block_matrix import BlockMatrix
-from kratos_lite.bodies.body import Body
+from kratos_lite.bodies.body import Body, Deformable
 from kratos_lite.bodies.constraints import with_slices
-from kratos_lite.bodies.deformable import Deformable
 from kratos_lite.bodies.finite_element import FiniteElementBody
 from kratos_lite.bodies.formulations import Modal
 from kratos_lite.bodies.linear_algebra import Entries, sum_of
@@ -100,9 +99,9 @@ def find_equilibrium(body: Body, *, progress: Progress | None = None) -> int:
 def _increment(body: Deformable, start: Array, fraction: float, progress: Progress | None) -> int:
     """Find the equilibrium under a fraction of the loads; return the number of iterations."""
     initial, roundoff = _gap(body, start), ROUND_OFF * body.extent()
-    multipliers = np.zeros(len(initial))
+    multipliers, rest = np.zeros(len(initial)), np.zeros_like(body.u)
     for iteration in range(1, NEWTON_MAX + 1):
-        residual = fraction * _load(body) - body.internal_force(body.q)
+        residual = fraction * body.external_force(u=rest) - body.internal_force(body.q)
         gap = _gap(body, body.q) - (1 - fraction) * initial
         step, multipliers = _newton_step(body, residual, gap, _tangent(body, fraction, multipliers))
         largest = float(np.abs(step).max())
@@ -122,11 +121,6 @@ def _gap(body: Deformable, q: Array) -> Array:
     """Return by how much the constraints are violated in m."""
     gaps = [c.gaps(body, q, np.zeros_like(q), body.time, 2.0) for c in body.constraints]
     return np.concatenate([np.zeros(0), *gaps])
-
-
-def _load(body: Deformable) -> Array:
-    """Return the generalized load on the body at rest, (dofs,)."""
-    return body.external_force(body.q, u=np.zeros_like(body.u))
 
 
 def _tangent(body: Deformable, fraction: float, multipliers: Array) -> Entries:
@@ -156,7 +150,8 @@ def _balance(body: Deformable, fraction: float, multipliers: Array) -> None:
         constraint.set_reactions(body, body.q, multipliers[part])
     row, dof, value = _jacobian(body)
     np.add.at(reaction, dof, multipliers[row] * value)
-    load, inner = fraction * _load(body), body.internal_force(body.q)
+    load = fraction * body.external_force(u=np.zeros_like(body.u))
+    inner = body.internal_force()
     residual = np.abs(load + reaction - inner).max()
     scale = max(np.abs(load).max(), np.abs(reaction).max(), np.abs(inner).max())
     K = body.stiffness(body.q)

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.sparsity_pattern import Pattern
+from kratos_lite.bodies.body import Deformable
 from kratos_lite.bodies.constraint_projection import unconstrained_motions
-from kratos_lite.bodies.deformable import Deformable
 from kratos_lite.bodies.formulations import FORMULATIONS
 from kratos_lite.bodies.linear_algebra import Entries, Solve
 from kratos_lite.bodies.rotations import check_rotation

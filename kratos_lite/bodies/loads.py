@@ -62,12 +62,9 @@ class Force(BodyLoad):
 def _follower_tangent(body: FreeBody, X: Array, force: Array, q: Array) -> Entries:
     """Return the derivative of a force that moves with a body, whose F is linear in q."""
     dofs, H = body.jacobian(X, q)
-    zero = np.zeros_like(q)
-    columns = []
-    for dof in dofs:
-        one = zero.copy()
-        one[dof] = 1.0
-        columns.append(body.push_forward(force, X, one) - body.push_forward(force, X, zero))
+    start = body.push_forward(force, X, np.zeros_like(q))
+    units = (dofs[:, None] == np.arange(len(q))).astype(float)
+    columns = [body.push_forward(force, X, unit) - start for unit in units]
     return block_entries(dofs, dofs, H.T @ np.transpose(columns))
 
 
@@ -114,11 +111,8 @@ class Spring(BodyLoad):
         length: float | None = None,
     ) -> None:
         self.point, self.anchor = one_point(point), one_point(anchor)
-        self.stiffness = (
-            stiffness
-            if callable(stiffness)
-            else number(stiffness, "the stiffness of a spring", least=0, unit="N/m")
-        )
+        what = "the stiffness of a spring"
+        self.stiffness = stiffness if callable(stiffness) else number(stiffness, what, least=0, unit="N/m")
         self.damping = number(damping, "the damping of a spring", least=0, unit="N s/m")
         self.length = None if length is None else number(length, "the length of a spring", least=0, unit="m")
 
@@ -155,19 +149,14 @@ class Spring(BodyLoad):
             return block_entries(dofs, dofs, H.T @ push @ H)
 
         def potential(q: Array) -> Array:
-            if callable(self.stiffness):
-                return no_potential(q)
+            assert not callable(self.stiffness)
             stretch = np.linalg.norm(body.position(X, q) - anchor) - L
             return np.asarray(self.stiffness * stretch**2 / 2)
 
-        damped = callable(self.stiffness) or self.damping > 0
-        return AppliedLoad(
-            generalized,
-            tangent=tangent,
-            potential_energy=potential,
-            follows_velocity=damped,
-            ends=(X, anchor),
-        )
+        damped, ends = callable(self.stiffness) or self.damping > 0, (X, anchor)
+        applied = AppliedLoad(generalized, tangent=tangent, follows_velocity=damped, ends=ends)
+        applied.potential_energy = no_potential if callable(self.stiffness) else potential
+        return applied
 
     def _stiffness(self, elongation: float, rate: float, distance: float) -> tuple[float, float]:
         """Return the derivative of the pull along the spring, and across it, at rest, in N/m."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite.bodies.affine import AffineBody
-from kratos_lite.bodies.deformable import Deformable
+from kratos_lite.bodies.body import Deformable
 from kratos_lite.bodies.linear_algebra import Entries, Solve, apply, block_entries, transposed
 from kratos_lite.bodies.rotations import axial, hat
 from kratos_lite.bodies.validation import Material, mass_properties_of

@@ -175,7 +175,6 @@ class FixedBody(RigidBody):
 
     kind = "fixed"
     integrators: ClassVar[Mapping[str, str]] = {"uniform": ""}
-    convertible = False
 
     def __init__(self, mesh: Mesh, material: Material | None = None) -> None:
         shape = mass_properties_of(mesh, material or Isotropic3D(1.0, 0.0, 1.0))

@@ -8,8 +8,7 @@ from typing import TypeAlias
 import numpy as np
 
 from kratos_lite.analysis.stepping import integrate
-from kratos_lite.bodies.body import Body
-from kratos_lite.bodies.deformable import Deformable
+from kratos_lite.bodies.body import Body, Deformable
 from kratos_lite.bodies.rotations import exp
 from kratos_lite.errors import InputError
 from kratos_lite.materials.isotropic3d import Isotropic3D

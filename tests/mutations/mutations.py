@@ -647,7 +647,7 @@ MUTATIONS = [
         "squares",
         "tests/solvers/test_hard_cases.py -k constant_curvature",
     ),
-    Mutation("ale/moving_part.py", "ALONG = 1e-6", "ALONG = 0.5", "tests/ale/test_parts.py -k glue"),
+    Mutation("ale/boundaries.py", "ALONG = 1e-6", "ALONG = 0.5", "tests/ale/test_parts.py -k glue"),
     Mutation("solvers/plate_level.py", "or constrained > 0.5", "or constrained > 0.9", PLATE),
     Mutation("solvers/plate_level.py", "along <= 0.5", "along <= 0.9", PLATE),
     Mutation(

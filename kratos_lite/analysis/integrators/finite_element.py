@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.analysis.integrators.base import BodyIntegrator
+from kratos_lite.bodies.body import Deformable
 from kratos_lite.bodies.constraint_projection import Step, constrained_step
-from kratos_lite.bodies.deformable import Deformable
 from kratos_lite.bodies.finite_element import FiniteElementBody
 from kratos_lite.bodies.formulations import Iterated
 from kratos_lite.bodies.linear_algebra import Solve

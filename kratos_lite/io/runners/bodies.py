@@ -11,7 +11,7 @@ import numpy as np
 from kratos_lite.analysis.state import State
 from kratos_lite.analysis.stepping import integrate
 from kratos_lite.bodies import Body
-from kratos_lite.bodies.deformable import Deformable
+from kratos_lite.bodies.body import Deformable
 from kratos_lite.io.case import Case
 from kratos_lite.io.runners.in_time import follow, placed, restart
 from kratos_lite.io.runners.outcome import Outcome
