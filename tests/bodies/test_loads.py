@@ -192,16 +192,6 @@ def test_loads_of_models_have_the_resultant_of_their_nodal_forces(kind, load):
     np.testing.assert_allclose(torque, np.cross(arms, f).sum(axis=0), rtol=1e-10, atol=1e-11)
 
 
-@soft_kind
-@pytest.mark.parametrize("load", MODEL_LOADS, ids=lambda load: type(load).__name__)
-def test_loads_of_models_do_the_work_of_their_nodal_forces(kind, load):
-    body = stirred(kind)
-    f = load.forces(body.mesh, block(kl.FiniteElementBody).groups)
-    body.add(load)
-    power = (f * body.velocity(body.mesh.points)).sum()
-    assert body.external_force() @ body.u == pytest.approx(power, rel=1e-11)
-
-
 # ---- pressure --------------------------------------------------------------------------------------
 
 FACES = ("x-", "x+", "y-", "y+", "z-", "z+")
