@@ -105,7 +105,7 @@ class State:
             return
         check_state_of_body(self, subject)
         q, u = self.values["q"], self.values["u"]
-        subject.q[...], subject.u[...] = q, u  # bodies that advance together share these arrays
+        subject.q[...], subject.u[...] = q, u  # bodies of a batch share these arrays
         subject.time, subject.step = self.time, self.step
         subject.integrated_velocity = u.copy() if self.step else None
         subject.external_work[...] = self.values["external_work"]

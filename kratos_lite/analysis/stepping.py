@@ -65,7 +65,7 @@ def integrate(
         An argument is wrong, a step is longer than the critical one of an explicit integrator, or a
         constraint is not met at the start.
     ModelError
-        The model has changed since the transient analysis was created, or bodies cannot advance together.
+        The model has changed since the transient analysis was created, or bodies do not form a batch.
     SolveError
         A step has no solution, or the motion grows without bound.
 
@@ -147,7 +147,7 @@ class BodyStepper:
 
     def __init__(self, body: Body | Sequence[Body]) -> None:
         if isinstance(body, Body):
-            body.clock = replace(body.clock)  # it may have advanced together with others before
+            body.clock = replace(body.clock)  # it may have been in a batch before
         self.body = body if isinstance(body, Body) else batch(body)
         self.integrator = body_integrator(self.body)
         self.parts, self._free = 1, False
