@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import logging
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -20,21 +20,15 @@ from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.direct import one_thread
 from kratos_lite.solvers.linear_solver import LinearSolver
+from kratos_lite.solvers.newton import SMALLEST_PART, forcing, in_parts, newton
 from kratos_lite.solvers.plan import Plan, stepped
 from kratos_lite.typing import Array, Progress
 from kratos_lite.validation import number, whole_number
 
-_log = logging.getLogger("kratos_lite")
-SMALLEST_PART = 1 / 1024
-"""Fraction of a step below which it is not cut further."""
-EASY = 6
-"""Iterations of a part of a step after which the next part is twice as long."""
-GROWN = 1e4
-"""Growth of the residual from which an iteration has diverged."""
+Response: TypeAlias = tuple[Array, BlockMatrix, States]
+"""Internal forces (3a,), tangent and states at some displacements."""
 SLACK, SEARCHES = 0.8, 6
 """Line search: fraction of the work of the residual that a full correction may leave, and most trials."""
-FORCING = 1e-3
-"""Largest relative residual to which corrections are solved where multigrid solves them."""
 
 
 @dataclass(frozen=True)
@@ -192,74 +186,55 @@ class QuasiStaticAnalysis:
         """Come to the loads of a time, in parts where one step does not converge."""
         start, loads = self.time, (self.load, self.applied(end))
         fields = self.prescribed.part(self.u), self.prescribed(end)
-        done, part = 0.0, 1.0
-        while done < 1.0:
-            fraction = min(done + part, 1.0)
+
+        def advance(done: float, fraction: float) -> int:
             load, field = ((1 - fraction) * a + fraction * b for a, b in (loads, fields))
-            try:
-                with one_thread():
-                    u, states, internal, residuals = self._newton(
-                        load, field, (fraction - done) * (end - start)
-                    )
-            except SolveError as error:
-                part /= 2
-                if part < SMALLEST_PART:
-                    reached = start + done * (end - start)
-                    raise SolveError(
-                        f"the step from t = {start:g} s to {end:g} s converges up to t = {reached:g} s "
-                        f"only, cut to {part:.1e} of its length: {error}; the load may be beyond the limit "
-                        "load, or the law may soften: prescribe displacements in place of loads, or take "
-                        "smaller steps"
-                    ) from None
-                _log.info("a step is cut to %g of its length: %s", part, error)
-                continue
+            with one_thread():
+                u, (internal, _, states), residuals = self._newton(
+                    load, field, (fraction - done) * (end - start)
+                )
             self.work += float((internal + self.internal) @ (u - self.u)) / 2
             self.u, self.states, self.load, self.internal = u, states, load, internal
-            done, self.time = fraction, start + fraction * (end - start)
+            self.time = start + fraction * (end - start)
             self.reports.append(StepReport(self.time, tuple(residuals)))
-            part = min(part * (2 if len(residuals) <= EASY else 1), 1.0 - done) or part
+            return len(residuals) - 1
 
-    def _newton(self, load: Array, field: Array, dt: float) -> tuple[Array, States, Array, list[float]]:
-        """Return displacements, states, internal forces (3a,) and residuals under a load and a field."""
-        reduce, u = self.system.constraint_map.reduce, self.u
-        jump: Array | None = field - self.prescribed.part(u)
-        if not jump.any():  # type: ignore[union-attr]
-            jump = None
-        internal, K, states = self._evaluate(u, dt)
-        residuals: list[float] = []
-        for _ in range(self.iterations + 1):
-            r = reduce(load - internal)
-            scale = max(float(np.linalg.norm(v)) for v in (load, internal))
-            residuals.append(float(np.linalg.norm(r)) / (scale or 1.0))
-            if jump is None and residuals[-1] <= self.tolerance:
-                return u, states, internal, residuals
-            if not residuals[-1] <= GROWN * max(residuals[0], 1.0):
-                raise SolveError("the iteration diverges")
-            du = self._correction(K, load - internal, jump, residuals)
-            if jump is None and self.line_search:
-                du = self._shortened(u, du, r, load, dt)
-            u = u + du
+        error = in_parts(advance)[1]
+        if error:
+            raise SolveError(
+                f"the step from t = {start:g} s to {end:g} s converges up to t = {self.time:g} s only, cut "
+                f"to {SMALLEST_PART / 2:.1e} of its length: {error}; the load may be beyond the limit load, "
+                "or the law may soften: prescribe displacements in place of loads, or take smaller steps"
+            )
+
+    def _newton(self, load: Array, field: Array, dt: float) -> tuple[Array, Response, list[float]]:
+        """Return displacements, what the law says there, and residuals under a load and a field."""
+        reduce, before = self.system.constraint_map.reduce, self.u
+        jump = field - self.prescribed.part(before)
+
+        def evaluate(u: Array) -> tuple[float, Response]:
             internal, K, states = self._evaluate(u, dt)
-            jump = None
-        last = ", ".join(f"{value:.1e}" for value in residuals[-3:])
-        raise SolveError(f"no convergence in {self.iterations} iterations: relative residuals … {last}")
+            scale = max(float(np.linalg.norm(v)) for v in (load, internal))
+            return float(np.linalg.norm(reduce(load - internal))) / (scale or 1.0), (internal, K, states)
 
-    def _evaluate(self, u: Array, dt: float) -> tuple[Array, BlockMatrix, States]:
+        def correction(u: Array, known: Response, residuals: list[float]) -> Array:
+            first, forces = len(residuals) == 1, load - known[0]
+            du = self._correction(known[1], forces, jump if first else 0.0 * jump, residuals)
+            moved = first and jump.any()
+            return du if moved or not self.line_search else self._shortened(u, du, reduce(forces), load, dt)
+
+        return newton(before, evaluate, correction, self.tolerance, self.iterations, int(jump.any()))
+
+    def _evaluate(self, u: Array, dt: float) -> Response:
         forces, K, states = self.law.evaluate(self._strained(u), self.states, dt)
         assert K is not None
         return forces.ravel(), K, states
 
-    def _correction(self, K: BlockMatrix, forces: Array, jump: Array | None, residuals: list[float]) -> Array:
-        """Return K⁻¹ of forces (3a,) with a jump of what is prescribed.
-
-        Source of the tolerance: Eisenstat & Walker, SIAM J. Sci. Comput. 17 (1996) 16-32.
-        """
+    def _correction(self, K: BlockMatrix, forces: Array, jump: Array, residuals: list[float]) -> Array:
+        """Return K⁻¹ of forces (3a,) with a jump (3a,) of what is prescribed."""
         plan = self._plan if self._symmetric else Plan("direct", "the tangent of a law is not symmetric")
         solver = LinearSolver(K, self.system.constraint_map, self.system.points, plan, self._symmetric)
-        ratio = residuals[-1] / residuals[-2] if len(residuals) > 1 and residuals[-2] else 1.0
-        tolerance = max(min(FORCING, ratio**2), 0.1 * self.tolerance / max(residuals[-1], self.tolerance))
-        prescribed = np.zeros_like(forces) if jump is None else jump
-        return solver.solve(forces, tolerance, None, prescribed, prescribed).x
+        return solver.solve(forces, forcing(residuals, self.tolerance), None, jump, jump).x
 
     def _shortened(self, u: Array, du: Array, r: Array, load: Array, dt: float) -> Array:
         """Return a correction, shortened until the residual does little work over it.

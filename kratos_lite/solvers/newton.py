@@ -1,0 +1,80 @@
+"""Newton's method, and the cut of a step that it does not find: one for laws, transients and bodies."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from typing import TypeVar
+
+from kratos_lite.errors import SolveError
+from kratos_lite.typing import Array
+
+_log = logging.getLogger("kratos_lite")
+SMALLEST_PART = 1 / 1024
+"""Fraction of a step below which it is not cut further."""
+EASY = 6
+"""Iterations of a part of a step after which the next part is twice as long."""
+GROWN = 1e4
+"""Growth of the residual from which an iteration has diverged."""
+FORCING = 1e-3
+"""Largest relative residual to which corrections are solved where multigrid solves them."""
+Known = TypeVar("Known")
+
+
+def newton(
+    x: Array,
+    evaluate: Callable[[Array], tuple[float, Known]],
+    correction: Callable[[Array, Known, list[float]], Array],
+    tolerance: float,
+    iterations: int,
+    least: int = 0,
+) -> tuple[Array, Known, list[float]]:
+    """Correct x until a relative residual is small; return x, what is known there, and the residuals.
+
+    `evaluate` returns the relative residual at x and what `correction`, which has the residuals, too, needs.
+    At least so many corrections are made, at most `iterations`.
+    """
+    residuals: list[float] = []
+    while True:
+        residual, known = evaluate(x)
+        residuals.append(residual)
+        count = len(residuals) - 1
+        if count >= least and residual <= tolerance:
+            return x, known, residuals
+        if not residual <= GROWN * max(residuals[0], 1.0):
+            raise SolveError("the iteration diverges")
+        if count == iterations:
+            last = ", ".join(f"{value:.1e}" for value in residuals[-3:])
+            raise SolveError(f"no convergence in {iterations} iterations: relative residuals … {last}")
+        x = x + correction(x, known, residuals)
+
+
+def forcing(residuals: list[float], tolerance: float) -> float:
+    """Return the relative residual to which a correction is worth being solved.
+
+    Source: Eisenstat & Walker, SIAM J. Sci. Comput. 17 (1996) 16-32.
+    """
+    ratio = residuals[-1] / residuals[-2] if len(residuals) > 1 and residuals[-2] else 1.0
+    return max(min(FORCING, ratio**2), 0.1 * tolerance / max(residuals[-1], tolerance))
+
+
+def in_parts(advance: Callable[[float, float], int]) -> tuple[float, SolveError | None]:
+    """Advance from the fraction 0 of a step to 1, in parts where that does not converge.
+
+    `advance` goes from one fraction to another and returns the iterations.  What is returned is the fraction
+    that was reached, and why no more was.
+    """
+    done, part = 0.0, 1.0
+    while done < 1.0:
+        fraction = min(done + part, 1.0)
+        try:
+            iterations = advance(done, fraction)
+        except SolveError as error:
+            part /= 2
+            if part < SMALLEST_PART:
+                return done, error
+            _log.info("a step is cut to %g of its length: %s", part, error)
+            continue
+        done = fraction
+        part *= 2 if iterations < EASY else 1
+    return done, None
