@@ -65,22 +65,24 @@ class Constitutive:
         inside out; MaterialError says where a law fails.
         """
         K, at_rest = self._linear_part
-        forces, data = at_rest + (K @ u.ravel()).reshape(-1, 3), K.data
+        forces = at_rest + (K @ u.ravel()).reshape(-1, 3)
+        data = K.data.copy() if tangent else None
         if any(map(len, self._lagrange)):
+            for number in np.flatnonzero([len(group) for group in self._lagrange]):
+                Window(self, int(number), slice(None), u, None).strain()  # which looks for inverted elements
             forces += finite_strain.internal_load(self.points, self._lagrange, u)
-        if tangent:
-            large = finite_strain.stiffness(self.points, self._lagrange, self.pattern, u)
-            data = np.add(data, large.data, out=large.data)
+            if data is not None:
+                data += finite_strain.stiffness(self.points, self._lagrange, self.pattern, u).data
         new: States = []
         for number, (group, state) in enumerate(zip(self.groups, states, strict=True)):
             parts = []
             for window in group.chunks(WINDOW_BYTES) if state is not None else ():
-                part = Window(self, number, window, u, data if tangent else None)
+                part = Window(self, number, window, u, data)
                 before = state.take(window)  # type: ignore[union-attr]
                 add = part.add if before.modes is None else part.add_enhanced
                 parts.append(add(forces, before, dt))
             new.append(_joined(parts) if parts else None)
-        return forces, BlockMatrix(data, K.indices, K.indptr) if tangent else None, new
+        return forces, None if data is None else BlockMatrix(data, K.indices, K.indptr), new
 
 
 def _only(groups: Sequence[ElementGroup], wanted: Callable[[ElementGroup], bool]) -> list[ElementGroup]:
@@ -161,7 +163,7 @@ class Window:
 
     def _respond(self, state: PointStates, dt: float) -> tuple[Array, Array, dict[str, Array]]:
         """Return stresses (m, g, 6), tangents and internal variables, a few elements at a time."""
-        strain, tangent = self._strain() + initial_strain(self.group), self.data is not None
+        strain, tangent = self.strain() + initial_strain(self.group), self.data is not None
         m, g = strain.shape[:2]
         stress, D = np.empty_like(strain), np.empty((m, g, 6, 6) if tangent else 0)
         variables = {name: np.empty_like(values) for name, values in state.variables.items()}
@@ -185,8 +187,8 @@ class Window:
             where = f"[element, point] of the elements in rows {rows[0]} … {rows[-1]}"
             raise MaterialError(f"{error}; {where}") from None
 
-    def _strain(self) -> Array:
-        """Return ε = B u, or Green's strain, (m, g, 6)."""
+    def strain(self) -> Array:
+        """Return ε = B u, or Green's strain, (m, g, 6); SolveError for elements turned inside out."""
         group = self.group
         if not group.element.finite:
             if module := compiled("gauss", group.element):

@@ -185,6 +185,18 @@ def test_prestress_and_linear_parts_beside_a_law():
     assert np.abs(linear.solve().stress("element") - stress).max() < 1e-6 * Y  # nothing has yielded
 
 
+@pytest.mark.parametrize("law", [kl.NeoHookean3D(1e6, 0.3), kl.SaintVenantKirchhoff3D(1e6, 0.3)])
+def test_an_element_turned_inside_out_is_named(law):
+    model = bar(law, "Element3D8N")
+    model.fix("z+", "z", -2.5)
+    with pytest.raises(SolveError, match=r"inside out|no convergence|diverges"):
+        model.solve()
+    u = np.zeros_like(model.mesh.points)
+    u[:, 2] = -1.25 * model.mesh.points[:, 2]
+    with pytest.raises(SolveError, match=r"row 0 is turned inside out at Gauss point 1"):
+        model.quasi_static().law.evaluate(u, model.quasi_static().states, 1.0)
+
+
 def test_refusals():
     with pytest.raises(ModelError, match="total_lagrangian"):
         bar(kl.NeoHookean3D(1e6, 0.3), "KinematicLinear3D8N").element_groups()
