@@ -68,8 +68,8 @@ class Constitutive:
         forces = at_rest + (K @ u.ravel()).reshape(-1, 3)
         data = K.data.copy() if tangent else None
         if any(map(len, self._lagrange)):
-            for number in np.flatnonzero([len(group) for group in self._lagrange]):
-                Window(self, int(number), slice(None), u, None).strain()  # which looks for inverted elements
+            for place in np.flatnonzero([len(group) for group in self._lagrange]):
+                Window(self, int(place), slice(None), u, None).strain()  # which looks for inverted elements
             forces += finite_strain.internal_load(self.points, self._lagrange, u)
             if data is not None:
                 data += finite_strain.stiffness(self.points, self._lagrange, self.pattern, u).data
