@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
+from itertools import chain
 
 import numpy as np
 
-from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.assembly.element_groups import ElementGroup, add_nodal
 from kratos_lite.assembly.gauss_point_fields import internal_load
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.checks import check_carried
 from kratos_lite.model.loads import Load, TimeDependentLoad
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Ints
 
 
 def external_loads(mesh: Mesh, groups: Sequence[ElementGroup], loads: Sequence[Load]) -> Array:
@@ -57,6 +58,19 @@ class AppliedLoads:
         for history in self._histories:
             total += history(time)
         return total
+
+    def following(self, time: float, u: Array) -> tuple[Array, list[tuple[Ints, Array]]]:
+        """Return what displacements u (3a,) change of the loads at a time in s, and its tangent.
+
+        Forces (3a,) in N, and for some nodes (m, k) of the equations the derivatives (m, k, 3, k, 3) in N/m.
+        """
+        mesh, changes = self.model.mesh, list[tuple[Ints, Array]]()
+        x, total = mesh.points + self.system.scatter(u), np.zeros_like(mesh.points)
+        for factor, load in chain.from_iterable(load.acting(time) for load in self.model.loads):
+            for nodes, forces, tangent in load.follow(mesh, x):
+                add_nodal(total, nodes, factor * forces)
+                changes.append((np.searchsorted(self.system.nodes, nodes), factor * tangent))
+        return self.system.gather(total), changes
 
     def _forces_of(self, load: Load) -> Array:
         used = np.zeros(self.system.n_nodes, dtype=bool)

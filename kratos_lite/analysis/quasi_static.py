@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
@@ -22,11 +23,15 @@ from kratos_lite.solvers.direct import one_thread
 from kratos_lite.solvers.linear_solver import LinearSolver
 from kratos_lite.solvers.newton import SMALLEST_PART, forcing, in_parts, newton
 from kratos_lite.solvers.plan import Plan, stepped
-from kratos_lite.typing import Array, Progress
+from kratos_lite.typing import Array, Ints, Progress
 from kratos_lite.validation import number, whole_number
 
-Response: TypeAlias = tuple[Array, BlockMatrix, States]
-"""Internal forces (3a,), tangent and states at some displacements."""
+Changes: TypeAlias = list[tuple[Ints, Array]]
+"""Tangent of a load: for nodes (m, k) the derivatives (m, k, 3, k, 3) of their forces."""
+Load: TypeAlias = tuple[Array, Changes]
+"""Nodal forces (3a,) at some displacements, and their tangent."""
+Response: TypeAlias = tuple[Array, Array, BlockMatrix, Changes, States]
+"""Internal forces and load (3a,), tangents of both, and states at some displacements."""
 SLACK, SEARCHES = 0.8, 6
 """Line search: fraction of the work of the residual that a full correction may leave, and most trials."""
 
@@ -184,17 +189,22 @@ class QuasiStaticAnalysis:
 
     def _advance_to(self, end: float) -> None:
         """Come to the loads of a time, in parts where one step does not converge."""
-        start, loads = self.time, (self.load, self.applied(end))
+        start, begin, dead = self.time, self.load, self.applied(end)
         fields = self.prescribed.part(self.u), self.prescribed(end)
 
         def advance(done: float, fraction: float) -> int:
-            load, field = ((1 - fraction) * a + fraction * b for a, b in (loads, fields))
+            def load(u: Array) -> Load:
+                more, tangent = self.applied.following(end, u)
+                now = (1 - fraction) * begin + fraction * (dead + more)
+                return now, [(nodes, fraction * k) for nodes, k in tangent]
+
+            field = (1 - fraction) * fields[0] + fraction * fields[1]
             with one_thread():
-                u, (internal, _, states), residuals = self._newton(
+                u, (internal, force, _, _, states), residuals = self._newton(
                     load, field, (fraction - done) * (end - start)
                 )
             self.work += float((internal + self.internal) @ (u - self.u)) / 2
-            self.u, self.states, self.load, self.internal = u, states, load, internal
+            self.u, self.states, self.load, self.internal = u, states, force, internal
             self.time = start + fraction * (end - start)
             self.reports.append(StepReport(self.time, tuple(residuals)))
             return len(residuals) - 1
@@ -207,36 +217,55 @@ class QuasiStaticAnalysis:
                 "or the law may soften: prescribe displacements in place of loads, or take smaller steps"
             )
 
-    def _newton(self, load: Array, field: Array, dt: float) -> tuple[Array, Response, list[float]]:
+    def _newton(
+        self, load: Callable[[Array], Load], field: Array, dt: float
+    ) -> tuple[Array, Response, list[float]]:
         """Return displacements, what the law says there, and residuals under a load and a field."""
         reduce, before = self.system.constraint_map.reduce, self.u
         jump = field - self.prescribed.part(before)
 
         def evaluate(u: Array) -> tuple[float, Response]:
-            internal, K, states = self._evaluate(u, dt)
-            scale = max(float(np.linalg.norm(v)) for v in (load, internal))
-            return float(np.linalg.norm(reduce(load - internal))) / (scale or 1.0), (internal, K, states)
+            (internal, K, states), (force, tangent) = self._evaluate(u, dt), load(u)
+            scale = max(float(np.linalg.norm(v)) for v in (force, internal))
+            residual = float(np.linalg.norm(reduce(force - internal))) / (scale or 1.0)
+            return residual, (internal, force, K, tangent, states)
 
         def correction(u: Array, known: Response, residuals: list[float]) -> Array:
-            first, forces = len(residuals) == 1, load - known[0]
-            du = self._correction(known[1], forces, jump if first else 0.0 * jump, residuals)
+            internal, force, K, tangent, _ = known
+            first, forces = len(residuals) == 1, force - internal
+            du = self._correction(K, tangent, forces, jump if first else 0.0 * jump, residuals)
             moved = first and jump.any()
             return du if moved or not self.line_search else self._shortened(u, du, reduce(forces), load, dt)
 
         return newton(before, evaluate, correction, self.tolerance, self.iterations, int(jump.any()))
 
-    def _evaluate(self, u: Array, dt: float) -> Response:
+    def _evaluate(self, u: Array, dt: float) -> tuple[Array, BlockMatrix, States]:
         forces, K, states = self.law.evaluate(self._strained(u), self.states, dt)
         assert K is not None
         return forces.ravel(), K, states
 
-    def _correction(self, K: BlockMatrix, forces: Array, jump: Array, residuals: list[float]) -> Array:
-        """Return K⁻¹ of forces (3a,) with a jump (3a,) of what is prescribed."""
-        plan = self._plan if self._symmetric else Plan("direct", "the tangent of a law is not symmetric")
-        solver = LinearSolver(K, self.system.constraint_map, self.system.points, plan, self._symmetric)
+    def _correction(
+        self, K: BlockMatrix, tangent: Changes, forces: Array, jump: Array, residuals: list[float]
+    ) -> Array:
+        """Return (K - tangent)⁻¹ of forces (3a,) with a jump (3a,) of what is prescribed."""
+        symmetric, where = self._symmetric, (self.system.constraint_map, self.system.points)
+        plan = self._plan if symmetric else Plan("direct", "the tangent of a law is not symmetric")
+        near = None
+        if tangent:
+            half = [(nodes, (k + k.transpose(0, 3, 4, 1, 2)) / 2) for nodes, k in tangent]
+            near = LinearSolver(self._less(K, half), *where, plan) if plan.iterates else None
+            K, symmetric = self._less(K, tangent), False
+        solver = LinearSolver(K, *where, plan, symmetric, near)
         return solver.solve(forces, forcing(residuals, self.tolerance), None, jump, jump).x
 
-    def _shortened(self, u: Array, du: Array, r: Array, load: Array, dt: float) -> Array:
+    def _less(self, K: BlockMatrix, tangent: Changes) -> BlockMatrix:
+        """Return K - tangent."""
+        data = K.data.copy()
+        for nodes, k in tangent:
+            self.system.pattern.add_at(data, nodes.astype(np.int32), -k.transpose(0, 1, 3, 2, 4))
+        return BlockMatrix(data, K.indices, K.indptr)
+
+    def _shortened(self, u: Array, du: Array, r: Array, load: Callable[[Array], Load], dt: float) -> Array:
         """Return a correction, shortened until the residual does little work over it.
 
         Source: Crisfield, Non-linear Finite Element Analysis, vol. 1 (1991), section 9.2.
@@ -246,7 +275,7 @@ class QuasiStaticAnalysis:
         before = float(q @ r)
         for _ in range(SEARCHES):
             forces = self.law.evaluate(self._strained(u + s * du), self.states, dt, tangent=False)[0]
-            after = float(q @ constraints.reduce(load - forces.ravel()))
+            after = float(q @ constraints.reduce(load(u + s * du)[0] - forces.ravel()))
             if after * before >= 0 or abs(after) <= SLACK * abs(before):
                 break
             s *= float(np.clip(before / (before - after), 0.1, 0.5))

@@ -42,11 +42,15 @@ class Pattern:
 
     def add(self, data: Array, number: int, window: slice, matrices: Array) -> None:
         """Add matrices of some elements of a number: (m, k, k, 3, 3) to (nnz, 3, 3), (m, k, k) to (nnz,)."""
+        self.add_at(data, self.connectivity[number][window], matrices)
+
+    def add_at(self, data: Array, nodes: Rows, matrices: Array) -> None:
+        """Add matrices to nodes (m, k) that are each of one element."""
         if module := kernels("stiffness"):
             matrices = np.ascontiguousarray(matrices)
-            module.add_matrices(self.connectivity[number][window], matrices, self.indptr, self.indices, data)
+            module.add_matrices(nodes, matrices, self.indptr, self.indices, data)
         else:
-            n = self.connectivity[number][window].astype(np.int64)
+            n = nodes.astype(np.int64)
             places = np.searchsorted(self._keys, n[:, :, None] * self.n_nodes + n[:, None, :])
             _add_blocks(data, places, matrices)
 

@@ -72,17 +72,36 @@ def surface_mass(shape: type[Shape], X: ArrayLike) -> Array:
     return (N.T * measure[..., None, :]) @ N
 
 
-def surface_pressure_tangent(shape: type[Shape], X: ArrayLike, pressure: ArrayLike) -> Array:
-    """Return the derivative (..., k, 3, k, 3) in N/m of `surface_pressure` by the nodes."""
+def _area_vectors_tangent(shape: type[Shape], X: Array, rule: Rule) -> Array:
+    """Return the derivative (..., g, b, i, c) of the area vectors by axis i of node b."""
     # With tangents t1, t2: d(t1 × t2) = t1 × dt2 - t2 × dt1.
-    X, p = np.asarray(X, dtype=float), np.asarray(pressure, dtype=float)
-    rule = face_rule(shape)
-    N, dN = tabulate(shape, rule)
-    tangents = _tangents(shape, X, rule)
+    dN, tangents = tabulate(shape, rule)[1] * rule.weights[:, None, None], _tangents(shape, X, rule)
     across = np.cross(tangents[..., None, :], np.eye(3))  # (t × e_i) in row i
     change = np.einsum("...gic,gb->...gbic", across[..., 0, :, :], dN[..., 1])
-    change -= np.einsum("...gic,gb->...gbic", across[..., 1, :, :], dN[..., 0])
-    return -p[..., None, None, None, None] * np.einsum("g,ga,...gbic->...acbi", rule.weights, N, change)
+    return change - np.einsum("...gic,gb->...gbic", across[..., 1, :, :], dN[..., 0])
+
+
+def surface_pressure_tangent(shape: type[Shape], X: ArrayLike, pressure: ArrayLike) -> Array:
+    """Return the derivative (..., k, 3, k, 3) in N/m of `surface_pressure` by the nodes."""
+    X, rule = np.asarray(X, dtype=float), face_rule(shape)
+    N = tabulate(shape, rule)[0]
+    change = _area_vectors_tangent(shape, X, rule)
+    return -np.einsum("...ga,...gbic->...acbi", _at_points(pressure, X, N)[..., None] * N, change)
+
+
+def surface_load_tangent(shape: type[Shape], X: ArrayLike, traction: ArrayLike) -> Array:
+    """Return the derivative (..., k, 3, k, 3) in N/m of `surface_load` of a nodal traction by the nodes."""
+    X, rule = np.asarray(X, dtype=float), face_rule(shape)
+    N, dN = tabulate(shape, rule)
+    if shape.cell == "line":
+        along = _tangents(shape, X, rule)[..., 0, :]
+        along /= np.linalg.norm(along, axis=-1, keepdims=True)
+        change = np.einsum("g,...gi,gb->...gbi", rule.weights, along, dN[..., 0])
+    else:
+        normal = area_vectors(shape, X, rule)
+        normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+        change = np.einsum("...gbic,...gc->...gbi", _area_vectors_tangent(shape, X, rule), normal)
+    return np.einsum("ga,...gc,...gbi->...acbi", N, N @ np.asarray(traction, dtype=float), change)
 
 
 def surface_pressure(
@@ -96,9 +115,13 @@ def surface_pressure(
     rule = face_rule(shape, factors if callable(pressure) else 2)
     N, _ = tabulate(shape, rule)
     if callable(pressure):
-        at_points = pressure(N @ X)[..., None]
-    elif (p := np.asarray(pressure, dtype=float)).ndim and p.shape == X.shape[:-1]:
-        at_points = (p @ N.T)[..., None]
+        at_points = pressure(N @ X)
     else:
-        at_points = p[..., None, None]
-    return -N.T @ (area_vectors(shape, X, rule) * at_points)
+        at_points = _at_points(pressure, X, N)
+    return -N.T @ (area_vectors(shape, X, rule) * at_points[..., None])
+
+
+def _at_points(pressure: ArrayLike, X: Array, N: Array) -> Array:
+    """Return a pressure, one, (...) per face or (..., k) nodal, at Gauss points, (..., g) or (..., 1)."""
+    p = np.asarray(pressure, dtype=float)
+    return p @ N.T if p.ndim and p.shape == X.shape[:-1] else p[..., None]

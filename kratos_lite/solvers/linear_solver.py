@@ -220,8 +220,8 @@ class LinearSolver:
         q, failed = gmres(A, b, rtol=tolerance, atol=0.0, restart=RESTART, maxiter=MAX_RESTARTS, M=M)
         if failed:
             raise SolveError(
-                f"the equations of a motion were not solved to {tolerance:g} in {iterations} iterations; "
-                "take smaller steps"
+                f"equations that are not symmetric are not solved to {tolerance:g} in {iterations} "
+                "iterations; take smaller steps"
             )
         return q, iterations
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from copy import copy
 from functools import lru_cache
 from types import FunctionType
@@ -15,7 +15,7 @@ from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh
 from kratos_lite.time_series import Factor, TimeSeries, function_of
-from kratos_lite.typing import Array, ArrayLike
+from kratos_lite.typing import Array, ArrayLike, Rows
 from kratos_lite.validation import finite, short, takes
 
 if TYPE_CHECKING:
@@ -55,6 +55,26 @@ class Load(ABC):
         InputError, ModelError
             The load does not fit the mesh.
         """
+
+    def acting(self, time: float) -> Sequence[tuple[float, Load]]:
+        """Return the loads that this one is at a time in s, each with a factor."""
+        return [(1.0, self)]
+
+    def follow(self, mesh: Mesh, x: Array) -> Iterator[tuple[Rows, Array, Array]]:
+        """Yield what the load changes on a body that is deformed, and no small displacements are assumed.
+
+        Parameters
+        ----------
+        mesh : undeformed.
+        x : (n, 3) m, where its nodes are.
+
+        Yields
+        ------
+        nodes : (m, k).
+        forces : (m, k, 3) in N, what they have beyond those of `forces`.
+        tangent : (m, k, 3, k, 3) in N/m, the derivative of these by x.
+        """
+        yield from ()
 
     def check(self, mesh: Mesh) -> None:
         """Raise MeshError if `where` of the load names no part or node; `Structure.add` asks for it."""
@@ -173,6 +193,11 @@ class TimeDependentLoad(Load):
             )
         return load
 
+    def acting(self, time: float) -> Sequence[tuple[float, Load]]:
+        """Return the load at a time in s with the factor 1; nothing where nothing acts."""
+        load = self.at(time)
+        return [] if load is None else [(1.0, load)]
+
     def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
         """Return the nodal forces (n, 3) in N at the time 0."""
         return self.history(lambda load: load.forces(mesh, groups))(0.0) + np.zeros_like(mesh.points)
@@ -238,6 +263,10 @@ class ScaledLoad(TimeDependentLoad):
     def refined(self, finer: RefinedMesh) -> Load:
         """Return the load on a finer mesh, with the same amplitude."""
         return ScaledLoad(self.load.refined(finer), self.amplitude)
+
+    def acting(self, time: float) -> Sequence[tuple[float, Load]]:
+        """Return the load with its amplitude at a time in s."""
+        return [(self.amplitude(time), self.load)]
 
     def history(self, forces_of: Callable[[Load], Array]) -> Callable[[float], Array | float]:
         """Return the nodal forces (n, 3) in N as a function of time."""

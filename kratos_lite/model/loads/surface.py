@@ -9,14 +9,22 @@ from typing import Any, ClassVar
 import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup, add_nodal
-from kratos_lite.elements.surface import FUNCTION, area_vectors, face_rule, surface_load, surface_pressure
+from kratos_lite.elements.surface import (
+    FUNCTION,
+    area_vectors,
+    face_rule,
+    surface_load,
+    surface_load_tangent,
+    surface_pressure,
+    surface_pressure_tangent,
+)
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Block, Mesh, Where, outward_signs, with_rows
 from kratos_lite.mesh.refined_mesh import RefinedMesh
 from kratos_lite.model.loads.base import DistributedLoad, Load, OfPlace, at_places, vectors
-from kratos_lite.typing import Array, ArrayLike
-from kratos_lite.validation import finite, number
+from kratos_lite.typing import Array, ArrayLike, Rows
+from kratos_lite.validation import finite, flag, number
 
 SURFACES = ("triangle", "quadrilateral")
 
@@ -87,20 +95,31 @@ class Pressure(FaceLoad):
         returns (m,), taken at quadrature points.
     normal : ``"outward"`` takes the outward normal of the body; ``"nodes"`` the normal about which
         the nodes of each condition run counter-clockwise, as Kratos does.
+    follower : whether it acts on the deformed faces where displacements are large.
 
     Raises
     ------
     InputError
-        The normal is neither, or the pressure no number.
+        The normal is neither, the pressure no number, or a follower is a function of places.
     """
 
     what = "a pressure"
     nodal = "pressure", 1
 
-    def __init__(self, where: Where, pressure: ArrayLike | OfPlace, normal: str = "outward") -> None:
+    def __init__(
+        self,
+        where: Where,
+        pressure: ArrayLike | OfPlace,
+        normal: str = "outward",
+        follower: bool = False,
+    ) -> None:
         if normal not in ("outward", "nodes"):
             raise InputError(f"normal must be 'outward' or 'nodes'; got {normal!r}")
-        if not callable(pressure):
+        self.follower = flag(follower, "follower")
+        if callable(pressure):
+            if follower:
+                raise InputError("a follower pressure is a number or (n,) in Pa; got a function of places")
+        else:
             pressure = finite(pressure, "a pressure")
             if pressure.ndim > 1:
                 raise InputError(f"a pressure must be one number or (n,) in Pa; got shape {pressure.shape}")
@@ -115,6 +134,14 @@ class Pressure(FaceLoad):
             if self.normal == "outward":
                 forces *= outward(mesh, block)[:, None, None]
             yield forces
+
+    def follow(self, mesh: Mesh, x: Array) -> Iterator[tuple[Rows, Array, Array]]:
+        """Yield what deformed faces change, if the pressure follows them."""
+        for block in _faces(mesh, self.where, self.what) if self.follower else ():
+            p = np.asarray(_on(block, self.pressure, mesh, self.what, ())) + np.zeros(block.nodes.shape)
+            if self.normal == "outward":
+                p = p * outward(mesh, block)[:, None]
+            yield _pressed(block, mesh, x, p)
 
 
 class Resultant(FaceLoad):
@@ -196,11 +223,28 @@ class ConditionLoads(Load):
     nodal_pressure : (n,) per node, Pa.
     """
 
+    following: ClassVar[tuple[str, ...]] = ("SurfaceLoadCondition", "LineLoadCondition")
+    """Starts of the names of conditions whose loads act on deformed faces and lines, as in Kratos."""
+
     def __init__(
         self, force: Array, nodal_force: dict[str, Array], pressure: Array, nodal_pressure: Array
     ) -> None:
         self.force, self.nodal_force = force, nodal_force
         self.pressure, self.nodal_pressure = pressure, nodal_pressure
+
+    def follow(self, mesh: Mesh, x: Array) -> Iterator[tuple[Rows, Array, Array]]:
+        """Yield what deformed faces and lines change; a force per area keeps its direction."""
+        for block, at in with_rows(mesh.conditions):
+            if not len(block) or not block.name.startswith(self.following) or block.shape is None:
+                continue
+            X, deformed = mesh.points[block.nodes], x[block.nodes]
+            t = self.force[at, None, :] + self.nodal_force[block.shape.cell][block.nodes]
+            if t.any():
+                more = surface_load(block.shape, deformed, t) - surface_load(block.shape, X, t)
+                yield block.nodes, more, surface_load_tangent(block.shape, deformed, t)
+            pressure = self.pressure[at, None] + self.nodal_pressure[block.nodes]
+            if block.shape.cell in SURFACES and pressure.any():
+                yield _pressed(block, mesh, x, pressure)
 
     def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
         """Return the nodal forces (n, 3) in N."""
@@ -230,6 +274,13 @@ class ConditionLoads(Load):
             self.pressure[finer.conditions],
             finer.interpolate(self.nodal_pressure),
         )
+
+
+def _pressed(block: Block, mesh: Mesh, x: Array, p: Array) -> tuple[Rows, Array, Array]:
+    """Return what pressures (m, k) on deformed faces have beyond those on undeformed ones."""
+    shape, nodes = block.known_shape, block.nodes
+    more = surface_pressure(shape, x[nodes], p) - surface_pressure(shape, mesh.points[nodes], p)
+    return nodes, more, surface_pressure_tangent(shape, x[nodes], p)
 
 
 def _points_of(mesh: Mesh, faces: Sequence[Block], factors: int) -> Iterator[tuple[Array, Array]]:
