@@ -123,8 +123,8 @@ MUTATIONS = [
     ),
     Mutation(
         "elements/surface.py",
-        "return -p[..., None, None, None, None]",
-        "return p[..., None, None, None, None]",
+        'return -np.einsum("...ga,...gbic->...acbi"',
+        'return np.einsum("...ga,...gbic->...acbi"',
         "tests/elements/test_surface.py",
     ),
     Mutation(
