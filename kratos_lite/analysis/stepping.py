@@ -6,6 +6,7 @@ import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from math import ceil, inf
+from typing import Any, TypeAlias, overload
 
 import numpy as np
 
@@ -13,10 +14,10 @@ from kratos_lite.analysis.integrators import body_integrator
 from kratos_lite.analysis.quasi_static import QuasiStaticAnalysis
 from kratos_lite.analysis.state import State, state_of_body
 from kratos_lite.analysis.transient import TransientAnalysis
-from kratos_lite.bodies.batched import batch
+from kratos_lite.bodies.batched import batch, forms_batch, groups_of
 from kratos_lite.bodies.body import Body
 from kratos_lite.bodies.constraint_projection import project_velocity
-from kratos_lite.errors import InputError, SolveError
+from kratos_lite.errors import InputError, KratosLiteError, SolveError
 from kratos_lite.typing import Array, Progress
 from kratos_lite.validation import function_or_none, positive_step, short, takes, whole_number
 from kratos_lite.view.progress import watched
@@ -26,25 +27,48 @@ SAFETY = 0.95  # fraction of the critical step that automatic substeps take
 MOST_SUBSTEPS = 1_000_000  # parts of one step; more would take the time of a whole run until the first state
 
 
+@overload
 def integrate(
-    subject: Body | Sequence[Body] | TransientAnalysis | QuasiStaticAnalysis,
+    subject: Body | TransientAnalysis | QuasiStaticAnalysis,
+    dt: float,
+    steps: int | None = ...,
+    *,
+    every: int = ...,
+    substeps: int | str = ...,
+    until: Callable[[State], bool] | None = ...,
+    progress: Progress | None = ...,
+) -> Iterator[State]: ...
+@overload
+def integrate(
+    subject: Sequence[Body],
+    dt: float,
+    steps: int | None = ...,
+    *,
+    every: int = ...,
+    substeps: int | str = ...,
+    until: Callable[[Any], bool] | None = ...,
+    progress: Progress | None = ...,
+) -> Iterator[Any]: ...
+def integrate(
+    subject: Any,
     dt: float,
     steps: int | None = None,
     *,
     every: int = 1,
     substeps: int | str = 1,
-    until: Callable[[State], bool] | None = None,
+    until: Callable[[Any], bool] | None = None,
     progress: Progress | None = None,
-) -> Iterator[State]:
+) -> Iterator[Any]:
     """Advance bodies or a model in time, and yield their states.
 
     The subject itself is advanced: after the loop, or after leaving it early, also by Ctrl-C, it is in the
-    state after its last step; a second call continues from there, possibly with another step.
+    state after its last step (bodies of a list in the states yielded last, unless they are one batch); a
+    second call continues from there, possibly with another step.
 
     Parameters
     ----------
-    subject : one body; one object that holds a batch of bodies; a sequence of rigid or
-        pseudo-rigid bodies, advanced together on arrays; or a model in time, `Model.transient()` or
+    subject : one body; one object that holds a batch of bodies; a list of bodies of any kinds, those that
+        are alike advanced together on arrays; or a model in time, `Model.transient()` or
         `Model.quasi_static()`.
     dt : step in s, > 0.
     steps : number of steps; if not given, until the loop is left or `until` returns true.
@@ -57,7 +81,8 @@ def integrate(
     Yields
     ------
     State
-        Copies of the state of the subject.
+        Copies of the state of the subject.  Of a list whose bodies are one batch, it has a row for each; of
+        another list, a list of the states of its bodies is yielded, in their order.
 
     Raises
     ------
@@ -65,7 +90,7 @@ def integrate(
         An argument is wrong, a step is longer than the critical one of an explicit integrator, or a
         constraint is not met at the start.
     ModelError
-        The model has changed since the transient analysis was created, or bodies do not form a batch.
+        The model has changed since the transient analysis was created.
     SolveError
         A step has no solution, or the motion grows without bound.
 
@@ -83,9 +108,7 @@ def integrate(
     if until is not None and not takes(until, 1):
         raise InputError(f"until must be a function of a state; got {short(until)}")
     function_or_none(progress, "progress must be a function of a phase and a fraction")
-    stepper = (
-        subject if isinstance(subject, (TransientAnalysis, QuasiStaticAnalysis)) else BodyStepper(subject)
-    )
+    stepper = _stepper(subject)
     parts = 1 if substeps == "auto" else whole_number(substeps, "substeps", ", or 'auto'")
     if substeps == "auto":
         critical = stepper.critical_step()
@@ -100,21 +123,32 @@ def integrate(
     return _states(stepper, h, count, every, until, progress)
 
 
+def _stepper(subject: Any) -> Stepper:
+    if isinstance(subject, (TransientAnalysis, QuasiStaticAnalysis)):
+        return subject
+    if isinstance(subject, Body):
+        return BodyStepper(subject)
+    groups = groups_of(subject)
+    if len(groups) == 1 and forms_batch(subject[0]):
+        return BodyStepper(subject)
+    return ListStepper(subject, groups)
+
+
 def _states(
-    stepper: BodyStepper | TransientAnalysis | QuasiStaticAnalysis,
+    stepper: Stepper,
     h: float,
     count: int | None,
     every: int,
-    until: Callable[[State], bool] | None,
+    until: Callable[[Any], bool] | None,
     progress: Progress | None,
-) -> Iterator[State]:
+) -> Iterator[Any]:
     done = 0
     with watched(progress, "integrate") as shown:
         while count is None or done < count:
             chunk = every if count is None else min(every, count - done)
             stepper.advance(h, chunk)
             done += chunk
-            if stepper.diverged():
+            if not isinstance(stepper, ListStepper) and stepper.diverged():
                 raise _divergence(stepper, h)
             if shown and count:
                 shown("integrate", done / count)
@@ -143,7 +177,7 @@ CHECKED = 100  # steps after which the critical step is found anew, as the tange
 
 
 class BodyStepper:
-    """A body, or many of one class as one, with a clock of its own."""
+    """A body, or a batch of them as one, with a clock of its own."""
 
     def __init__(self, body: Body | Sequence[Body]) -> None:
         if isinstance(body, Body):
@@ -212,3 +246,56 @@ class BodyStepper:
     def state(self) -> State:
         """Return the state of now."""
         return state_of_body(self.body, self.parts)
+
+
+class ListStepper:
+    """Bodies of any kinds, each batch among them as one; if one fails, all stay in the states before."""
+
+    def __init__(self, bodies: Sequence[Body], groups: list[list[Body]]) -> None:
+        self.bodies, self.parts = bodies, 1
+        self.steppers = {
+            ", ".join(str(bodies.index(body)) for body in group): BodyStepper(
+                group if group[1:] else group[0]
+            )
+            for group in groups
+        }
+
+    def critical_step(self) -> float:
+        """Return the longest step in s that is stable for all."""
+        return min(stepper.critical_step() for stepper in self.steppers.values())
+
+    def prepare(self, h: float, parts: int) -> None:
+        """Check steps of h s in so many parts."""
+        self.parts = parts
+        self._each(lambda stepper: stepper.prepare(h, parts))
+
+    def advance(self, h: float, count: int) -> None:
+        """Take steps of h s."""
+
+        def advance(stepper: BodyStepper) -> None:
+            stepper.advance(h, count)
+            if stepper.diverged():
+                raise _divergence(stepper, h)
+
+        before = self.state()
+        try:
+            self._each(advance)
+        except BaseException:  # Ctrl-C, too
+            for body, state in zip(self.bodies, before, strict=True):
+                state.restore(body)
+            raise
+
+    def _each(self, act: Callable[[BodyStepper], None]) -> None:
+        """Do something with each stepper; an error gets the rows of its bodies."""
+        for rows, stepper in self.steppers.items():
+            try:
+                act(stepper)
+            except KratosLiteError as error:
+                raise type(error)(f"body {rows} of the list: {error}") from error
+
+    def state(self) -> list[State]:
+        """Return the states of now."""
+        return [state_of_body(body, self.parts) for body in self.bodies]
+
+
+Stepper: TypeAlias = BodyStepper | ListStepper | TransientAnalysis | QuasiStaticAnalysis

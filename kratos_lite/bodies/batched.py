@@ -15,15 +15,18 @@ from kratos_lite.bodies.rigid import RigidBody
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model.mass_properties import MassProperties
 from kratos_lite.typing import Array
+from kratos_lite.validation import short
 
 
 def batch(bodies: Sequence[Body]) -> Body:
-    """Return bodies of one kind as one object; q and u of each become rows of those of the batch."""
-    if not isinstance(bodies, Sequence):
-        raise InputError(
-            f"a body or a sequence of bodies is needed; got {type(bodies).__name__}; of a model: transient()"
+    """Return bodies that form one batch as one object; q and u of each become rows of those of the batch."""
+    groups, first = groups_of(bodies), bodies[0]
+    if len(groups) > 1 or not forms_batch(first):
+        raise ModelError(
+            f"body {bodies.index(groups[-1][0])} does not form a batch with the others: a batch has rigid or "
+            "pseudo-rigid bodies of one kind, integrator, damping and tolerance, without constraints, and "
+            "with loads that change neither with the time nor as they turn; kl.integrate takes any list"
         )
-    first = _alike(bodies)
     whole = copy(first)
     vars(whole).pop("_inverse", None)  # of the inertia of the first
     whole.mesh, whole.clock = None, Clock(first.time, first.step)
@@ -39,31 +42,38 @@ def batch(bodies: Sequence[Body]) -> Body:
     return whole
 
 
-def _alike(bodies: Sequence[Body]) -> Body:
-    """Return the first body; raise unless all others can advance with it."""
+def groups_of(bodies: Sequence[Body]) -> list[list[Body]]:
+    """Return the bodies of a list in groups: those that form a batch together, any other alone."""
+    if not isinstance(bodies, Sequence) or isinstance(bodies, str):
+        raise InputError(
+            f"a body or a sequence of bodies is needed; got {type(bodies).__name__}; of a model: transient()"
+        )
     if not bodies:
         raise InputError("there is no body to advance")
-    first = bodies[0]
+    groups: dict[object, list[Body]] = {}
     for row, body in enumerate(bodies):
-        if not isinstance(body, (RigidBody, PseudoRigidBody)) or body.q.ndim != 1:
-            raise ModelError(
-                f"body {row} is {body!r}: only single rigid and pseudo-rigid bodies form a batch"
+        if not isinstance(body, Body):
+            raise InputError(f"a list to advance holds bodies alone; body {row} is {short(body)}")
+        if (body.time, body.step) != (bodies[0].time, bodies[0].step):
+            raise InputError(
+                f"bodies of a list need the same time and number of steps: body 0 is at {bodies[0].time:g} s "
+                f"after {bodies[0].step}, body {row} at {body.time:g} s after {body.step}"
             )
-        for what in ("kind", "integrator", "damping", "time", "step"):
-            if getattr(body, what) != getattr(first, what):
-                raise InputError(
-                    f"bodies of a batch need the same {what}: body 0 has {getattr(first, what)!r}, "
-                    f"body {row} {getattr(body, what)!r}"
-                )
-        if body.constraints or not all(load.is_constant for load in body.loads):
-            raise ModelError(
-                f"body {row} has constraints or loads that change with the time, or as it turns, as the "
-                "moment of a spatial force off the mass center does; only bodies with constant loads form a "
-                "batch: integrate it alone"
-            )
+        settings = (type(body), body.integrator, body.damping, getattr(body, "tolerance", None))
+        groups.setdefault(settings if forms_batch(body) else row, []).append(body)
     if len({id(body) for body in bodies}) < len(bodies):
-        raise InputError("a body occurs twice in a batch")
-    return first
+        raise InputError("a body occurs twice in a list")
+    return list(groups.values())
+
+
+def forms_batch(body: Body) -> bool:
+    """Return whether others that are alike can advance with a body on common arrays."""
+    return (
+        isinstance(body, (RigidBody, PseudoRigidBody))
+        and body.q.ndim == 1
+        and not body.constraints
+        and all(load.is_constant for load in body.loads)
+    )
 
 
 def _loads(bodies: Sequence[Body]) -> list[AppliedLoad]:

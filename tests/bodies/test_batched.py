@@ -5,6 +5,7 @@ import pytest
 from motions import end
 
 import kratos_lite as kl
+from kratos_lite.bodies.batched import batch, groups_of
 
 INTEGRATORS = [
     *((kl.RigidBody, integrator) for integrator in ("RIG_POS", "RIG_NEG", "RIG_IMP")),
@@ -75,45 +76,126 @@ def test_one_object_holds_many():
     np.testing.assert_allclose(many.q[1], single.q, rtol=1e-13, atol=1e-13)
 
 
+STIFF = kl.Isotropic3D(E=1e12, nu=0.3, density=800.0)
+SOFT = kl.Isotropic3D(E=1e5, nu=0.3, density=800.0)
+POINT = (0.5, 0.5, 0.5)
+
+
+def mixed():
+    """Return bodies of all kinds: two batches, and others alone."""
+    brick = kl.box((0.5, 0.6, 0.7))
+    bodies = [
+        kl.RigidBody(brick, SOFT),
+        kl.FiniteElementBody(brick, SOFT, damping=1e-4),
+        kl.PseudoRigidBody(brick, SOFT, integrator="explicit"),
+        kl.RigidBody(brick, SOFT),
+        kl.FixedBody(brick),
+        kl.FiniteElementBody(brick, SOFT, formulation="corotational"),
+        kl.PseudoRigidBody(brick, SOFT, integrator="explicit"),
+        kl.RigidBody(brick, SOFT),
+        kl.PseudoRigidBody(brick, SOFT),
+    ]
+    for i, body in enumerate(bodies):
+        body.set_velocity((i, 0, 1.0), (0, 1.0, 0.1 * i))
+        if not isinstance(body, kl.FixedBody):
+            body.add(kl.Gravity((0, 0, -9.81)))
+    bodies[3].add(kl.Spring(bodies[3].center, POINT, 100.0))
+    bodies[7].set_velocity((0, 0, 0))
+    bodies[7].constrain(kl.FixPoint(bodies[7].center))
+    return bodies
+
+
+def test_bodies_of_any_kinds_move_as_if_they_were_alone():
+    bodies, alone, h = mixed(), mixed(), 1e-3
+    runs = [*kl.integrate(bodies, h, 5, every=2), *kl.integrate(bodies, h, 4, every=4, substeps="auto")]
+    assert [[state.step for state in states] for states in runs] == [[i] * 9 for i in (2, 4, 5, 9)]
+    for body, single, state in zip(bodies, alone, runs[-1], strict=True):
+        end(single, h, 9)
+        assert (state.kind, state.time) == (single.kind, single.time)
+        for name in ("q", "u", "external_work"):
+            np.testing.assert_array_equal(getattr(state, name), getattr(body, name))
+            np.testing.assert_allclose(getattr(body, name), getattr(single, name), rtol=1e-12, atol=1e-12)
+
+
+def test_a_list_goes_on_from_states():
+    bodies, others = mixed(), mixed()
+    *_, half = kl.integrate(bodies, 1e-3, 4)
+    for state, body in zip(half, others, strict=True):
+        state.restore(body)
+    ends = [
+        list(kl.integrate(some, 1e-3, 3, until=lambda states: states[0].step == 6))
+        for some in (bodies, others)
+    ]
+    assert len(ends[0]) == 2
+    for one, other in zip(ends[0][-1], ends[1][-1], strict=True):
+        assert (one.step, one.q.tolist(), one.u.tolist()) == (6, other.q.tolist(), other.u.tolist())
+
+
+@pytest.mark.parametrize("stop", [KeyboardInterrupt, kl.SolveError])
+def test_a_list_that_is_stopped_stays_together(stop):
+    """All bodies are in the states yielded last, and go on from there."""
+    bodies, whole = mixed(), mixed()
+    runs = kl.integrate(bodies, 1e-3, 6, every=2)
+    first = next(runs)
+
+    def fail(*_):
+        raise stop("stopped")
+
+    bodies[5].external_force = fail
+    with pytest.raises(
+        stop, match="stopped" if stop is KeyboardInterrupt else "^body 5 of the list: stopped"
+    ):
+        next(runs)
+    del bodies[5].external_force
+    for body, state in zip(bodies, first, strict=True):
+        assert (body.time, body.step, body.q.tolist()) == (state.time, 2, state.q.tolist())
+    for some, steps in ((bodies, 4), (whole, 6)):
+        *_, last = kl.integrate(some, 1e-3, steps, every=2)
+    for body, state in zip(bodies, last, strict=True):
+        assert body.q.tolist() == state.q.tolist()
+
+
 @pytest.mark.parametrize(
     ("change", "error", "words"),
     [
         (lambda bodies: bodies.clear(), kl.InputError, "there is no body to advance"),
-        (lambda bodies: bodies.append(bodies[0]), kl.InputError, "a body occurs twice in a batch"),
+        (lambda bodies: bodies.append(bodies[0]), kl.InputError, "a body occurs twice in a list"),
         (
-            lambda b: setattr(b[1], "integrator", "RIG_IMP"),
+            lambda b: setattr(b[1], "time", 3.0),
             kl.InputError,
-            "same integrator.*body 1 'implicit'",
+            "same time and number of steps: body 0 is at 0 s after 0, body 1 at 3 s after 0",
         ),
-        (lambda b: setattr(b[1], "time", 3.0), kl.InputError, "need the same time"),
-        (lambda b: b[1].constrain(kl.FixPoint(b[1].center)), kl.ModelError, "body 1 has constraints"),
+        (lambda b: b.append("body"), kl.InputError, "bodies alone; body 2 is 'body'"),
         (
-            lambda b: b[1].add(kl.Gravity((0, 0, 1.0)), amplitude=kl.TimeSeries([0, 1], [0, 1])),
-            kl.ModelError,
-            "body 1 has constraints or loads that change",
-        ),
-        (
-            lambda b: b[1].add(kl.Force((0.1, 0.1, 0.1), (0, 0, 1.0))),
-            kl.ModelError,
-            "or as it turns, as the moment of a spatial force off the mass center does",
-        ),
-        (
-            lambda b: b.append(kl.FiniteElementBody(kl.box(), kl.Isotropic3D(1.0, 0.0, 1.0))),
-            kl.ModelError,
-            "only single rigid and pseudo-rigid bodies form a batch",
-        ),
-        (
-            lambda b: b.append(kl.PseudoRigidBody(kl.box(), kl.Isotropic3D(1.0, 0.0, 1.0))),
+            lambda b: b.append(kl.PseudoRigidBody(kl.box(), STIFF, integrator="explicit")),
             kl.InputError,
-            "need the same kind",
+            "body 2 of the list: the explicit integrator is not stable",
         ),
-        (lambda b: b.append("body"), kl.ModelError, "only single rigid and pseudo-rigid bodies form a batch"),
     ],
 )
-def test_bodies_that_cannot_advance_together(change, error, words):
+def test_lists_that_are_refused(change, error, words):
     bodies = herd(kl.RigidBody, "RIG_NEG", count=2)
     change(bodies)
     before = [body.q.tolist() for body in bodies if isinstance(body, kl.Body)]
     with pytest.raises(error, match=words):
         list(kl.integrate(bodies, 1e-3, 3))
     assert [body.q.tolist() for body in bodies if isinstance(body, kl.Body)] == before
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda b: setattr(b[1], "integrator", "RIG_IMP"),
+        lambda b: b[1].constrain(kl.FixPoint(b[1].center)),
+        lambda b: b[1].add(kl.Gravity((0, 0, 1.0)), amplitude=kl.TimeSeries([0, 1], [0, 1])),
+        lambda b: b[1].add(kl.Force((0.1, 0.1, 0.1), (0, 0, 1.0))),
+        lambda b: b.__setitem__(1, kl.FiniteElementBody(kl.box(), SOFT)),
+        lambda b: b.__setitem__(1, kl.PseudoRigidBody(kl.box(), SOFT)),
+    ],
+)
+def test_what_is_no_batch(change):
+    bodies = herd(kl.RigidBody, "RIG_NEG", count=2)
+    change(bodies)
+    assert len(groups_of(bodies)) == 2
+    with pytest.raises(kl.ModelError, match="body 1 does not form a batch with the others"):
+        batch(bodies)
