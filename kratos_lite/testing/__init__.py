@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.errors import InputError
-from kratos_lite.materials import LinearMaterial
+from kratos_lite.materials import Material
 from kratos_lite.shapes import Shape
 from kratos_lite.testing.elements import check_element
 from kratos_lite.testing.files import run_file
@@ -37,7 +37,7 @@ __all__ = [
 ]
 
 
-def check(subject: type[KinematicLinear] | type[Shape] | LinearMaterial) -> tuple[str, list[Finding]]:
+def check(subject: type[KinematicLinear] | type[Shape] | Material) -> tuple[str, list[Finding]]:
     """Check an element class, a shape class or a material instance.
 
     Parameters
@@ -54,7 +54,7 @@ def check(subject: type[KinematicLinear] | type[Shape] | LinearMaterial) -> tupl
     InputError
         If the subject is not one of these.
     """
-    if isinstance(subject, LinearMaterial):
+    if isinstance(subject, Material):
         return type(subject).__name__, check_material(subject)
     if isinstance(subject, type) and issubclass(subject, KinematicLinear):
         return subject.__name__, check_element(subject)
@@ -63,7 +63,7 @@ def check(subject: type[KinematicLinear] | type[Shape] | LinearMaterial) -> tupl
     raise InputError(f"check an element class, a shape class or a material instance; got {subject!r}")
 
 
-def assert_conforms(subject: type[KinematicLinear] | type[Shape] | LinearMaterial) -> None:
+def assert_conforms(subject: type[KinematicLinear] | type[Shape] | Material) -> None:
     """Raise ConformanceError with every failed check unless the subject passes all that can run.
 
     Parameters

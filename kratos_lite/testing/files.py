@@ -15,7 +15,7 @@ from typing import Any
 
 from kratos_lite.elements import ELEMENTS, KinematicLinear
 from kratos_lite.errors import InputError
-from kratos_lite.materials import MATERIALS, LinearMaterial
+from kratos_lite.materials import MATERIALS, LinearMaterial, Material
 from kratos_lite.shapes import SHAPES, Shape
 from kratos_lite.testing.elements import check_element
 from kratos_lite.testing.materials import check_material
@@ -27,6 +27,7 @@ REGISTRIES = (ELEMENTS, SHAPES, MATERIALS)
 BASES: dict[tuple[str, ...], type] = {
     ("compliance",): LinearMaterial,
     ("elasticity",): LinearMaterial,
+    ("response",): Material,
     ("N", "dN"): Shape,
     ("shape", "rule"): KinematicLinear,
 }
@@ -69,7 +70,7 @@ def run_file(path: str | Path) -> list[tuple[str, list[Finding]]]:
                 results.append((kind.__name__, extra))
     if not results:
         raise InputError(
-            f"{path}: nothing to check; a file defines a subclass of KinematicLinear, Shape or LinearMaterial"
+            f"{path}: nothing to check; a file defines a subclass of KinematicLinear, Shape or Material"
         )
     return results
 
@@ -77,13 +78,13 @@ def run_file(path: str | Path) -> list[tuple[str, list[Finding]]]:
 def _check_all(defined: dict[str, Any], kinds: list[type]) -> list[tuple[str, list[Finding]]]:
     """Check elements, the shapes that none of them uses, and materials by their instances."""
     used = {getattr(kind, "shape", None) for kind in kinds}
-    materials = {name: v for name, v in defined.items() if isinstance(v, LinearMaterial)}
+    materials = {name: v for name, v in defined.items() if isinstance(v, Material)}
     made = {type(v) for v in materials.values()}
     results = [(kind.__name__, check_element(kind)) for kind in kinds if issubclass(kind, KinematicLinear)]
     results += [(k.__name__, check_shape(k)) for k in kinds if issubclass(k, Shape) and k not in used]
     results += [(f"{name} ({type(v).__name__})", check_material(v)) for name, v in materials.items()]
     for kind in kinds:
-        if issubclass(kind, LinearMaterial) and kind not in made:
+        if issubclass(kind, Material) and kind not in made:
             text = "a material is checked as an instance: make one at the top level of the file, for example "
             text += f"soil = {kind.__name__}(…) with its constants"
             results.append((kind.__name__, [Finding("instance", False, nan, nan, text, skipped=True)]))
@@ -153,7 +154,7 @@ def _lacks_decorator(kind: type) -> bool:
     """Return whether a material lists constants of its own but is not made a dataclass of them."""
     own = [a for a in get_annotations(kind).values() if "ClassVar" not in str(a)]
     is_own = is_dataclass(kind) and "__dataclass_fields__" in vars(kind)
-    return issubclass(kind, LinearMaterial) and bool(own) and not is_own
+    return issubclass(kind, Material) and bool(own) and not is_own
 
 
 def _cure(error: BaseException, defined: dict[str, Any]) -> str:

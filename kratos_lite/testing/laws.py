@@ -1,4 +1,4 @@
-"""Checks of any constitutive law: its contract, its tangent, and what thermodynamics demands."""
+"""Checks of laws that are not linear: their contract, tangent, and what thermodynamics demands."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from kratos_lite import voigt
 from kratos_lite.materials import Material
 from kratos_lite.materials.material import GaussState
-from kratos_lite.testing.report import Finding, Measured, difference, largest, run, run_after
+from kratos_lite.testing.report import Measured, difference, largest
 from kratos_lite.typing import Array
 
 POINTS = 12
@@ -21,22 +21,6 @@ SMALLEST, GREATEST = 1e-7, {"small": 0.3, "finite": 0.1}
 """Strains between which a law is looked at."""
 BEYOND = (0.3, 0.97, 1.05, 3.0)
 """Strains, in parts of that where the law ceases to be elastic."""
-
-
-def check_law(law: Material) -> list[Finding]:
-    """Check a law: shapes, states, tangent, elastic limit, dissipation, steps, rate, isotropy where claimed.
-
-    Parameters
-    ----------
-    law : an instance.  ``symmetric_tangent``, ``rate_dependent`` and ``isotropic = True`` in its class are
-        what it claims.
-
-    Returns
-    -------
-    list of Finding
-    """
-    first = run([contract], law)
-    return first + run_after(first, CHECKS, law)
 
 
 def start(law: Material, *shape: int) -> GaussState:

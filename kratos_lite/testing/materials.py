@@ -1,4 +1,4 @@
-"""Checks of a linear elastic material: C against theory."""
+"""Checks of a material: C against theory, and a law that is not linear by `laws`."""
 
 from __future__ import annotations
 
@@ -8,23 +8,36 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite import voigt
-from kratos_lite.materials import LinearMaterial
+from kratos_lite.materials import LinearMaterial, Material
 from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.model.checks import HARD, HEAVY, SOFTEST, STIFFEST, young_moduli
-from kratos_lite.testing.report import ConformanceError, Finding, Measured, difference, largest, run
+from kratos_lite.testing import laws
+from kratos_lite.testing.report import (
+    ConformanceError,
+    Finding,
+    Measured,
+    difference,
+    largest,
+    run,
+    run_after,
+)
 from kratos_lite.typing import Array
 
 STRAIN = 1e-3 * np.array([1.0, -0.7, 0.4, 0.9, -0.3, 0.6])
 """A strain whose components are told apart by size and sign."""
 
 
-def check_material(material: LinearMaterial) -> list[Finding]:
-    """Check a material: symmetry, stability, isotropy where claimed, magnitude, density.
+def check_material(material: Material) -> list[Finding]:
+    """Check a material: stability, isotropy where claimed, magnitude, density; of a linear one symmetry.
+
+    A law that is not linear is driven along random paths: shapes, states, tangent, elastic limit, steps,
+    rate and dissipation.
 
     Parameters
     ----------
     material : an instance.  It claims isotropy if it is an Isotropic3D or if its class says
-        ``isotropic = True``, about one axis if it says ``transversely_isotropic = (0, 0, 1)``.
+        ``isotropic = True``, about one axis if it says ``transversely_isotropic = (0, 0, 1)``.  Of a law
+        ``symmetric_tangent`` and ``rate_dependent`` are claims, too.
 
     Returns
     -------
@@ -36,10 +49,13 @@ def check_material(material: LinearMaterial) -> list[Finding]:
     >>> all(finding.passed for finding in check_material(Isotropic3D(E=210e9, nu=0.3)))
     True
     """
-    return run(CHECKS, material)
+    if isinstance(material, LinearMaterial):
+        return run(CHECKS, material)
+    first = run([laws.contract], material)
+    return first + run_after(first, (*laws.CHECKS, positive_definite, magnitude, density), material)
 
 
-def _C(material: LinearMaterial) -> Array:
+def _C(material: Material) -> Array:
     C = np.asarray(material.C, dtype=float)
     if C.shape != (6, 6) or not np.isfinite(C).all():
         raise ConformanceError(f"C must be (6, 6) and finite; its shape is {C.shape}")
@@ -53,7 +69,7 @@ def symmetry(material: LinearMaterial) -> Measured:
     return Measured(difference(C, C.T), 1e-14, f"C[{i}, {j}] = {C[i, j]:.10g}, C[{j}, {i}] = {C[j, i]:.10g}")
 
 
-def positive_definite(material: LinearMaterial) -> Measured:
+def positive_definite(material: Material) -> Measured:
     """Check that every strain costs energy."""
     C = _C(material)
     scale = np.sqrt(np.abs(np.diag(C)).clip(min=1e-300))
@@ -99,7 +115,7 @@ def _turned(material: LinearMaterial, turns: Mapping[str, Array]) -> Measured:
     return largest(errors, 1e-13)
 
 
-def magnitude(material: LinearMaterial) -> Measured | str:
+def magnitude(material: Material) -> Measured | str:
     """Check that Young's moduli along the axes are those of a body in Pa, not a compliance or in MPa."""
     if not positive_definite(material).value == 0:
         return "C is not positive definite"
@@ -111,7 +127,7 @@ def magnitude(material: LinearMaterial) -> Measured | str:
     return Measured(float(is_soft), 0, f"{text}too soft for {material.density:g} kg/m³: are they in MPa?")
 
 
-def density(material: LinearMaterial) -> Measured:
+def density(material: Material) -> Measured:
     """Check that the density is a finite number ≥ 0."""
     rho = float(material.density)
     return Measured(

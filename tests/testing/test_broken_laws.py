@@ -8,8 +8,7 @@ import pytest
 
 import kratos_lite as kl
 from kratos_lite.materials import MATERIALS
-from kratos_lite.testing.laws import check_law
-from kratos_lite.testing.report import failures
+from kratos_lite.testing import check_material, failures
 
 
 @pytest.fixture(autouse=True)
@@ -91,7 +90,7 @@ def yield_forgotten_in_pressure(law, strain, state, s, D, new):
     ids=lambda v: getattr(v, "__name__", ""),
 )
 def test_the_kit_names_the_mistake(change, check, says):
-    found = {finding.check: finding for finding in failures(check_law(steel(change)))}
+    found = {finding.check: finding for finding in failures(check_material(steel(change)))}
     assert check in found
     assert says in found[check].detail
 
@@ -139,6 +138,6 @@ class Grained(kl.NeoHookean3D):
     ids=lambda v: type(v).__name__ if isinstance(v, kl.Material) else "",
 )
 def test_laws_against_what_they_claim(law, check, says):
-    found = {finding.check: finding for finding in failures(check_law(law))}
+    found = {finding.check: finding for finding in failures(check_material(law))}
     assert check in found
     assert says in found[check].detail

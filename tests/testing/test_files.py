@@ -76,6 +76,38 @@ class Transverse(LinearMaterial):
 '''
 
 
+STEEL = '''
+"""Perfect plasticity."""
+from dataclasses import dataclass
+import numpy as np
+import kratos_lite as kl
+
+
+@dataclass(frozen=True)
+class Perfect(kl.Material):
+    E: float
+    nu: float
+    yield_stress: float
+    density: float = 0.0
+
+    internal_variables = {"plastic_strain": 6}
+
+    def response(self, strain, state, dt):
+        elastic = kl.Isotropic3D(self.E, self.nu)
+        stress = (strain - state["plastic_strain"]) @ elastic.C
+        s = stress.copy()
+        s[..., :3] -= stress[..., :3].mean(axis=-1, keepdims=True)
+        q = np.sqrt(1.5 * (s**2 @ [1, 1, 1, 2, 2, 2]))
+        excess = np.maximum(1 - self.yield_stress / np.maximum(q, 1.0), 0.0)[..., None]
+        flow = excess * s / (2 * elastic.lame[1])
+        new = state["plastic_strain"] + flow * [1, 1, 1, 2, 2, 2]
+        return stress - excess * s, None, {"plastic_strain": new}
+
+
+steel = Perfect(E=200e9, nu=0.3, yield_stress=250e6)
+'''
+
+
 @pytest.fixture
 def checked(tmp_path):
     def run(text, name="mine.py"):
@@ -134,6 +166,14 @@ def test_a_material_is_checked_as_the_instance_that_the_file_makes(checked):
     ((name, findings),) = checked(LAW + "\nslate = Transverse(9e9, 5e9, 0.2, 0.15, 2e9)\n")
     assert name == "slate (Transverse)"
     assert not failures(findings)
+    assert [f.check for f in findings if f.skipped] == ["isotropy"]
+
+
+def test_a_law_that_is_not_linear_is_checked_as_one(checked):
+    ((name, findings),) = checked(STEEL)
+    assert name == "steel (Perfect)"
+    assert not failures(findings)
+    assert len(findings) == 13
     assert [f.check for f in findings if f.skipped] == ["isotropy"]
 
 

@@ -20,21 +20,19 @@ from kratos_lite.testing import (
     failures,
     report,
 )
+from tests.materials.test_laws import LAWS
 
 ORTHOTROPIC = Orthotropic3D(11e9, 0.9e9, 0.5e9, 0.45, 0.31, 0.37, 0.7e9, 0.05e9, 0.65e9, 450.0)
-EXAMPLES = {
-    "Isotropic3D": [
-        Isotropic3D(E=210e9, nu=0.3, density=7850.0),
-        Isotropic3D(E=1.0, nu=0.0),
-        Isotropic3D(E=10.0, nu=-0.9),
-        Isotropic3D(E=1e12, nu=0.4999),
-    ],
-    "Orthotropic3D": [ORTHOTROPIC, Orthotropic3D(1.0, 2.0, 3.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)],
-}
-LINEAR = {
-    "KinematicLinear3D4N", "KinematicLinear3D5N", "KinematicLinear3D6N", "KinematicLinear3D8N",
-    "BBar3D8N", "EnhancedStrain3D8N",
-}  # fmt: skip
+MATERIALS_TO_CHECK = [
+    Isotropic3D(E=210e9, nu=0.3, density=7850.0),
+    Isotropic3D(E=1.0, nu=0.0),
+    Isotropic3D(E=10.0, nu=-0.9),
+    Isotropic3D(E=1e12, nu=0.4999),
+    ORTHOTROPIC,
+    Orthotropic3D(1.0, 2.0, 3.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6),
+    *(law for law, _ in LAWS),
+]
+LINEAR = {name for name in ELEMENTS if name.endswith(("3D4N", "3D5N", "3D6N", "3D8N"))}
 OWN_STRAIN = {name for name in ELEMENTS if name.startswith(("BBar", "Enhanced"))}
 
 
@@ -70,20 +68,30 @@ def test_each_element_conforms(name):
     assert skipped(findings) == expected | ({"quadratic patch"} if name in LINEAR | OWN_STRAIN else set())
 
 
-def test_there_are_seventeen_elements_and_seventeen_shapes():
-    assert len(ELEMENTS.values()) == 17
+def test_each_element_and_shape_is_registered():
+    assert len(ELEMENTS.values()) == 26
     assert len(SHAPES.values()) == 17
 
 
-@pytest.mark.parametrize("name", list(MATERIALS))
-def test_each_material_conforms(name):
-    for material in EXAMPLES[name]:
-        findings = check_material(material)
-        show(f"{material}", findings)
-        assert skipped(findings) == (set() if name == "Isotropic3D" else {"isotropy"})
+@pytest.mark.parametrize("material", MATERIALS_TO_CHECK, ids=lambda material: type(material).__name__)
+def test_each_material_conforms(material):
+    findings = check_material(material)
+    show(f"{material}", findings)
+    if material.is_linear:
+        expected = set() if isinstance(material, Isotropic3D) else {"isotropy"}
+    else:
+        expected = set() if "plastic_strain" in material.internal_variables else {"elastic strain"}
+        expected |= set() if material.symmetric_tangent else {"symmetric tangent"}
+        expected |= {"staying", "one step or two"} if material.rate_dependent else set()
+    assert skipped(findings) == expected
 
 
-@pytest.mark.parametrize("subject", [ELEMENTS["KinematicLinear3D15N"], Hexahedron8, ORTHOTROPIC])
+def test_each_material_is_checked():
+    shipped = {law for law in MATERIALS.values() if law.__module__.startswith("kratos_lite")}
+    assert {type(material) for material in MATERIALS_TO_CHECK} == shipped
+
+
+@pytest.mark.parametrize("subject", [ELEMENTS["KinematicLinear3D15N"], Hexahedron8, ORTHOTROPIC, LAWS[0][0]])
 def test_assert_conforms_takes_elements_shapes_and_materials(subject):
     assert_conforms(subject)
     name, findings = check(subject)
