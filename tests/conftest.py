@@ -1,7 +1,11 @@
 """Fixtures shared by all tests."""
 
+import os
 import signal
 from pathlib import Path
+
+if "PYTEST_XDIST_WORKER" in os.environ:  # workers share the processors: dense algebra of two would compete
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import pytest
 from malformed import write_malformed
@@ -26,8 +30,16 @@ def shared() -> Path:
     return SHARED
 
 
+LONGEST = ("test_table.py", "test_over_ranks.py", "test_command.py", "test_examples.py", "test_notebooks.py")
+"""Files whose tests come first, so that no worker begins one of them when the others are done."""
+
+
 def pytest_collection_modifyitems(items):
-    """Leave out tests of real files where these are absent: others show the same with `fixtures`."""
+    """Put the longest tests first; leave out those of real files where these are absent.
+
+    Others show the same with `fixtures`.
+    """
+    items.sort(key=lambda item: item.path.name not in LONGEST)
     if "shared" not in SOURCES:
         items[:] = [item for item in items if "shared" not in getattr(item, "fixturenames", ())]
 
