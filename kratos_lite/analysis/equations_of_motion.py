@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cached_property, partial
 from typing import Any, TypeAlias
@@ -14,6 +14,7 @@ from kratos_lite.ale.checks import check_materials
 from kratos_lite.analysis.nodal_loads import AppliedLoads
 from kratos_lite.analysis.prescribed_motion import PrescribedMotion
 from kratos_lite.assembly.block_matrix import BlockMatrix
+from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model.free_motions import FreeMotions
 from kratos_lite.model.structure import Structure
@@ -57,6 +58,11 @@ class EquationsOfMotion:
         self.step = 0.0  # s, over which an acceleration is taken from the rate; 0 for its slope
         self.rayleigh = _checked_rayleigh(rayleigh)
         self.groups, self.warnings = model.checked()  # elements on all nodes of the mesh
+        if model.motion is not None and model.is_nonlinear:
+            raise ModelError(
+                "a motion of the material takes linear laws and small displacements; got "
+                f"{', '.join(sorted({_law(g) for g in self.groups if not g.is_linear}))}"
+            )
         if not free:
             self.free_motions.check((), moving=False)
         for group in self.groups:
@@ -74,7 +80,7 @@ class EquationsOfMotion:
             patterns=model.patterns,
             progress=progress,
         )
-        self.applied = AppliedLoads(model, self.system, self.groups)
+        self.applied = AppliedLoads(model, self.system, self.groups, initial=not model.is_nonlinear)
         self.prescribed = PrescribedMotion(model.supports, self.system)
         placed = self.system.points, self.system.groups, self.system.pattern
         self.mass = Mass(*placed, lumped)
@@ -224,13 +230,41 @@ class EquationsOfMotion:
             A.add_scalar(mass * self.mass.data)
         return A
 
-    def solver(self, time: float, m: float, c: float, k: float) -> Solve:
-        """Return what solves (m M + c C + k K) u = f + reactions; kept as long as the matrix is the same."""
+    def solver(self, time: float, m: float, c: float, k: float, h: float) -> Solve:
+        """Return what solves (m M + c C + k K) u = f + reactions, u of a step of h s.
+
+        It is kept as long as the matrix is the same.
+        """
         key = m, c, k, *self.rates(time)
         if self._kept is None or self._kept[0] != key:
             near = None if self.is_symmetric(time, c) else self._elastic(m, c, k)
             self._kept = key, self._solver(self.matrix(time, m, c, k), near, m, k)
         return self._kept[1]
+
+    # ---- what laws remember: nothing if they are linear --------------------------------------------------
+
+    history: Any = None
+
+    def commit(self, u: Array, time: float) -> None:
+        """Let the states at displacements (3a,) be those from which the next step starts."""
+
+    def history_values(self) -> dict[str, Array]:
+        """Return what states of a model hold of it, by names."""
+        return {}
+
+    def history_of(self, values: Mapping[str, Array], u: Array, time: float) -> Any:
+        """Return the history that has such values at displacements (3a,) and a time."""
+        return None
+
+    def groups_of_result(self) -> list[ElementGroup]:
+        """Return the elements with the states of their laws."""
+        return self.groups
+
+    def stored_energy(self, u: Array, time: float) -> float:
+        """Return ½ u·K u in J, K with what the motion adds, at a time."""
+        return float(u @ self.times_stiffness(u, time)) / 2
+
+    # ---- the motion --------------------------------------------------------------------------------------
 
     def rates(self, time: float) -> tuple[float, float]:
         """Return rate and acceleration of the motion at a time."""
@@ -269,6 +303,11 @@ def _solved(
 ) -> Array:
     """Return displacements (3a,); no lambda, as an analysis can be pickled."""
     return equations.solve(f, STEP_TOLERANCE, progress, prescribed, start, OF_START).x
+
+
+def _law(group: ElementGroup) -> str:
+    """Return the name of what is not linear in a group: its law, or its element."""
+    return type(group.material).__name__ if not group.material.is_linear else group.element.__name__
 
 
 def _checked_rayleigh(rayleigh: tuple[float, float]) -> tuple[float, float]:

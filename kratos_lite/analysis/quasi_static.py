@@ -14,8 +14,7 @@ from kratos_lite.analysis.report import Report
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.state import State, check_state
 from kratos_lite.assembly.block_matrix import BlockMatrix
-from kratos_lite.assembly.constitutive import Constitutive, States
-from kratos_lite.assembly.element_groups import PointStates
+from kratos_lite.assembly.constitutive import Constitutive, States, named, unnamed
 from kratos_lite.errors import InputError, ModelError, SolveError
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
@@ -291,12 +290,7 @@ class QuasiStaticAnalysis:
         """Return the model as it is now."""
         values = {"u": self._whole(self.u).copy(), "reactions": self._reactions(), "load": self.load.copy()}
         values |= {"internal": self.internal.copy(), "work": np.array(self.work)}
-        for i, states in enumerate(self.states):
-            if states is not None:
-                values[f"stress_{i}"] = states.stress.copy()
-                values |= {f"{name}_{i}": v.copy() for name, v in states.variables.items()}
-                if states.modes is not None:
-                    values[f"modes_{i}"] = states.modes.copy()
+        values |= named(self.states)
         return State("model", "quasi_static", self.time, self.step, values, self.parts)
 
     def restore(self, state: State) -> None:
@@ -318,15 +312,7 @@ class QuasiStaticAnalysis:
         get = state.values
         self.u = self.system.gather(get["u"]).copy()
         self.load, self.internal, self.work = get["load"].copy(), get["internal"].copy(), float(get["work"])
-        self.states = [
-            states
-            and PointStates(
-                get[f"stress_{i}"].copy(),
-                {name: get[f"{name}_{i}"].copy() for name in states.variables},
-                None if states.modes is None else get[f"modes_{i}"].copy(),
-            )
-            for i, states in enumerate(self.states)
-        ]
+        self.states = unnamed(get, self.states)
         self.time, self.step = float(state.time), int(state.step)
 
     def _whole(self, values: Array) -> Array:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -17,6 +19,7 @@ from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.integrators.base import INTEGRATORS, ModelIntegrator, check_stable
 from kratos_lite.analysis.integrators.generalized_alpha import Newmark
 from kratos_lite.analysis.modal import critical_rates
+from kratos_lite.analysis.nonlinear_motion import NonlinearMotion
 from kratos_lite.analysis.result import Result, result_of
 from kratos_lite.analysis.solution_checks import check_deformation
 from kratos_lite.analysis.state import MODEL_FIELDS, State, check_state
@@ -95,7 +98,8 @@ class TransientAnalysis:
         if not isinstance(self.integrator, ModelIntegrator):
             raise InputError(f"an integrator such as Newmark() or its name is needed; got {integrator!r}")
         lumped = flag(lumped, "lumped") or self.integrator.lumps_mass
-        e = EquationsOfMotion(model, lumped=lumped, rayleigh=rayleigh, progress=progress)
+        kind = NonlinearMotion if model.is_nonlinear else EquationsOfMotion
+        e = kind(model, lumped=lumped, rayleigh=rayleigh, progress=progress)
         self.equations = e
         e.warnings += equal_loads(model.loads, model.named_loads)
         self.integrator.check(e)
@@ -122,6 +126,7 @@ class TransientAnalysis:
         """Take over what is prescribed at the start, and find the first acceleration."""
         replace = self.equations.prescribed.replace
         self.u, self.v = replace(self.u, u), replace(self.v, v)
+        self.equations.commit(self.u, self.time)
         self.a = self._balanced(a)
 
     def _check_supports(self, u: Array, prescribed: Array, what: str) -> None:
@@ -192,12 +197,18 @@ class TransientAnalysis:
             The model has changed.
         """
         self._check_unchanged()
-        part = h / self.parts
+        e, part = self.equations, h / self.parts
         for _ in range(count):
-            now = self.u, self.v, self.a
-            with one_thread(), np.errstate(over="ignore", invalid="ignore"):
-                for k in range(self.parts):
-                    now = self.integrator.step(self.equations, now, self.time + k * part, part)
+            now, before = (self.u, self.v, self.a), e.history
+            try:
+                with one_thread(), np.errstate(over="ignore", invalid="ignore"):
+                    for k in range(self.parts):
+                        start = self.time + k * part
+                        now = self.integrator.step(e, now, start, part)
+                        e.commit(now[0], start + part)
+            except BaseException:
+                e.history = before  # the step is not taken
+                raise
             self._monitor.check(self.time + h)
             self.u, self.v, self.a = now
             self.time += h  # one after the other, so that a restart comes to the same times
@@ -222,6 +233,7 @@ class TransientAnalysis:
         values = {name: self._whole(getattr(self, name)).copy() for name in "uva"}
         values["reactions"] = self.equations.model.supports.supported(self._whole(residual))
         values["imbalance"] = np.array(imbalance)
+        values |= self.equations.history_values()
         return State("model", str(self.integrator), self.time, self.step, values, self.parts)
 
     def restore(self, state: State) -> None:
@@ -239,9 +251,10 @@ class TransientAnalysis:
         """
         self.check_state(state)
         u, v, a = (self.equations.system.gather(getattr(state, name)).copy() for name in "uva")
-        time, step = float(state.time), state.step
+        time, step, e = float(state.time), state.step, self.equations
         self._check_supports(u, self.equations.prescribed(time), f"at t = {time:g} s the state")
         self.u, self.v, self.a, self.time, self.step = u, v, a, time, int(step)
+        e.history = e.history_of(state.values, u, time)
         self._restored = state
 
     def check_state(self, state: object) -> State:
@@ -261,7 +274,9 @@ class TransientAnalysis:
             It is another one, is not finite, or no state.
         """
         shape = (self.equations.system.n_nodes, 3)
-        return check_state(state, "model", {**dict.fromkeys(MODEL_FIELDS[:4], shape), "imbalance": ()})
+        history = {name: values.shape for name, values in self.equations.history_values().items()}
+        fields = dict.fromkeys(MODEL_FIELDS[:4], shape)
+        return check_state(state, "model", {**fields, "imbalance": (), **history})
 
     def _settle(self, state: State) -> None:
         """Balance the acceleration of a state of another integrator, or of another load."""
@@ -272,8 +287,9 @@ class TransientAnalysis:
 
     def _residual(self, state: State | None = None) -> tuple[Array, float, float]:
         """Return M a + C v + K u - f (3a,), its largest free component and the largest of its terms, in N."""
-        e, (u, v, a, time) = self.equations, self._at(state)
-        terms = e.mass.times(a), e.times_damping(v, time), e.times_stiffness(u, time), -e.load(time)
+        e = self.equations
+        with self._at(state) as (u, v, a, time):
+            terms = e.mass.times(a), e.times_damping(v, time), e.times_stiffness(u, time), -e.load(time)
         residual = np.asarray(sum(terms))
         roundoff = 1e-10 * float(np.abs(e.K.data).max() * np.abs(u).max(initial=0.0))  # of K u
         largest = max(roundoff, *(float(np.abs(term).max(initial=0.0)) for term in terms))
@@ -299,14 +315,15 @@ class TransientAnalysis:
             _, free, largest = self._residual(at)
             residual = free / largest if largest else 0.0
         solution = Solution(at.u, str(self.integrator), f"step {at.step}, t = {at.time:g} s", 0, 0.0)
-        warnings = [*e.warnings, *check_deformation(model, e.groups, at.u)]
+        warnings = [*e.warnings, *([] if model.is_nonlinear else check_deformation(model, e.groups, at.u))]
         told: dict[str, Any] = {
             "unknowns": len(e.system.constraint_map.free),
             "seconds": {},
             "warnings": warnings,
         }
         fields = at.u.copy(), at.reactions.copy(), loads
-        result = result_of(Result, None, model, e.groups, fields, solution, **told)
+        with self._at(at):
+            result = result_of(Result, None, model, e.groups_of_result(), fields, solution, **told)
         result.report.backward_error = residual
         if e.terms is not None:
             result.report.motion = motion_summary(e, result, self._monitor.of_mesh, at.time)
@@ -319,6 +336,8 @@ class TransientAnalysis:
     def energy(self, state: State | None = None) -> float:
         """Return ½ v·M v + ½ u·K u, K with what the motion adds: constant without loads and damping.
 
+        With laws that are not linear, what they store takes the place of ½ u·K u.
+
         Parameters
         ----------
         state : of this model; that of now if not given.
@@ -327,8 +346,8 @@ class TransientAnalysis:
         -------
         float, J.
         """
-        e, (u, v, _, time) = self.equations, self._at(state)
-        return float(v @ e.mass.times(v) + u @ e.times_stiffness(u, time)) / 2
+        with self._at(state) as (u, v, _, time):
+            return float(v @ self.equations.mass.times(v)) / 2 + self.equations.stored_energy(u, time)
 
     def material_velocity(self, state: State | None = None) -> Array:
         """Return the velocity of the material in space; see `kratos_lite.material_velocity`.
@@ -341,8 +360,8 @@ class TransientAnalysis:
         -------
         (n, 3) float, m/s.
         """
-        u, v, _, time = self._at(state)
-        return self._whole(velocity_of_material(self.equations, u, v, time))
+        with self._at(state) as (u, v, _, time):
+            return self._whole(velocity_of_material(self.equations, u, v, time))
 
     def material_acceleration(self, state: State | None = None) -> Array:
         """Return the acceleration of the material in space; see `kratos_lite.material_acceleration`.
@@ -355,15 +374,23 @@ class TransientAnalysis:
         -------
         (n, 3) float, m/s².
         """
-        return self._whole(acceleration_of_material(self.equations, *self._at(state)))
+        with self._at(state) as at:
+            return self._whole(acceleration_of_material(self.equations, *at))
 
-    def _at(self, state: State | None) -> tuple[Array, Array, Array, float]:
-        """Return u, v, a (3a,) and the time, of now or of a state."""
+    @contextmanager
+    def _at(self, state: State | None) -> Iterator[tuple[Array, Array, Array, float]]:
+        """Yield u, v, a (3a,) and the time, of now or of a state, to which laws go back meanwhile."""
+        e, history = self.equations, self.equations.history
         if state is None:
-            return self.u, self.v, self.a, self.time
-        local = self.equations.system.gather
+            yield self.u, self.v, self.a, self.time
+            return
         self.check_state(state)
-        return local(state.u), local(state.v), local(state.a), state.time
+        u, v, a = (e.system.gather(values) for values in (state.u, state.v, state.a))
+        e.history = e.history_of(state.values, u, state.time)
+        try:
+            yield u, v, a, state.time
+        finally:
+            e.history = history
 
     def _whole(self, x: Array) -> Array:
         """Return vectors (3a,) as (n, 3) of all nodes."""

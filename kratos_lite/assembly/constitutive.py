@@ -10,7 +10,7 @@ points alone, so that they serve every law.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import Any, TypeAlias
 
@@ -258,6 +258,31 @@ def _joined(parts: Sequence[PointStates]) -> PointStates:
     variables = {name: np.concatenate([part.variables[name] for part in parts]) for name in names}
     modes: Any = None if parts[0].modes is None else np.concatenate([part.modes for part in parts])
     return PointStates(np.concatenate([part.stress for part in parts]), variables, modes)
+
+
+def named(states: States) -> dict[str, Array]:
+    """Return copies of states by names with the numbers of their groups."""
+    values: dict[str, Array] = {}
+    for i, state in enumerate(states):
+        if state is not None:
+            values[f"stress_{i}"] = state.stress.copy()
+            values |= {f"{name}_{i}": value.copy() for name, value in state.variables.items()}
+            if state.modes is not None:
+                values[f"modes_{i}"] = state.modes.copy()
+    return values
+
+
+def unnamed(values: Mapping[str, Array], like: States) -> States:
+    """Return the states that `named` gave, of groups as those of other states."""
+    return [
+        state
+        and PointStates(
+            values[f"stress_{i}"].copy(),
+            {name: values[f"{name}_{i}"].copy() for name in state.variables},
+            None if state.modes is None else values[f"modes_{i}"].copy(),
+        )
+        for i, state in enumerate(like)
+    ]
 
 
 def initial_strain(group: ElementGroup) -> Array | float:

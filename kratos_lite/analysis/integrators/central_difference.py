@@ -53,7 +53,7 @@ class CentralDifference(ModelIntegrator):
         u = u + h * half
         prescribed = e.prescribed.at_end(start + h, h)
         u[constrained] = prescribed[0][constrained]
-        force = e.load(start + h) - e.times_damping(half, start) - e.times_stiffness(u, start)
+        force = e.load(start + h) - e.times_damping(half, start) - e.times_stiffness(u, start + h)
         a = e.mass.solve(force) / (1 + e.rayleigh[0] * h / 2)  # v = half + h/2 a
         a[constrained] = prescribed[2][constrained]
         v = half + h / 2 * a

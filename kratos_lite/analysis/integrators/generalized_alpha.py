@@ -68,7 +68,7 @@ class _Implicit(ModelIntegrator):
             force -= e.times_stiffness(u, start) + e.times_damping(v, start)
         else:
             force += e.mass.times(-(1 - s.alpha_m) * a_new - s.alpha_m * a)
-        solve = e.solver(middle, (1 - s.alpha_m) / (s.beta * h * h), f * s.gamma / (s.beta * h), f)
+        solve = e.solver(middle, (1 - s.alpha_m) / (s.beta * h * h), f * s.gamma / (s.beta * h), f, h)
         du = solve(force, e.prescribed(end) - at_start, h * v + h * h / 2 * a)
         return u + du, s.gamma / (s.beta * h) * du + v_new, du / (s.beta * h * h) + a_new
 
