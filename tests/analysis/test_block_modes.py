@@ -181,7 +181,7 @@ def test_the_linear_level_of_a_step_has_mass():
     f = np.random.default_rng(0).standard_normal(transient.u.size)
     iterations = []
     for kept in (True, False):
-        solve = transient.equations.solver(0.0, 4 / h**2, 0.0, 1.0)
+        solve = transient.equations.solver(0.0, 4 / h**2, 0.0, 1.0, h)
         equations = solve.args[0]
         if not kept:
             equations.with_mass = None

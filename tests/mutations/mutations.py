@@ -280,8 +280,8 @@ MUTATIONS = [
     ),
     Mutation(
         "analysis/transient.py",
-        "return float(v @ e.mass.times(v) + u @ e.times_stiffness(u, time)) / 2",
-        "return float(v @ e.mass.times(v) - u @ e.times_stiffness(u, time)) / 2",
+        "mass.times(v)) / 2 + self.equations.stored",
+        "mass.times(v)) / 2 - self.equations.stored",
         TRANSIENT,
     ),
     # ---- material that moves through the mesh
