@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kratos_lite.analysis.fields import FIELDS, QUANTITIES, GaussPoints
+from kratos_lite.analysis.fields import QUANTITIES, Field, GaussPoints, known
 from kratos_lite.assembly.element_groups import ElementGroup, group_of_element
 from kratos_lite.assembly.gauss_point_fields import at_gauss, in_order, totals
 from kratos_lite.errors import InputError
@@ -203,7 +203,8 @@ class ElementFields:
         ----------
         name : such as ``"stress"``, ``"von_mises"`` or ``"strain_energy_density"``.
         at : as for `strain`, where the field has values there.  In an element a density is the mean over its
-            volume, an invariant is that of the mean stress.
+            volume, an invariant is that of the mean stress.  Internal variables of laws have their own names,
+            such as ``"plastic_strain"``; at nodes they are means of what is extrapolated from Gauss points.
 
         Returns
         -------
@@ -223,19 +224,58 @@ class ElementFields:
         >>> bar.solve().field("strain_energy_density", "element").round(9).tolist()  # σ² / 2E in J/m³
         [2.0]
         """
-        field = FIELDS[choice(name, "a field", FIELDS)]
-        if name in ("strain", "stress"):
-            return self._field(at, stress=name == "stress")
-        if field.of:
-            tensor = self.field(field.of, at)
-            return [field.function(t) for t in tensor] if isinstance(tensor, list) else field.function(tensor)
+        fields = known(self.groups)
+        field = fields[choice(name, "a field", fields)]
+        if name in ("strain", "stress") or field.of:
+            tensor = self._field(at, stress=(field.of or name) == "stress")
+            of = field.function if field.of else np.asarray
+            return [of(t) for t in tensor] if isinstance(tensor, list) else of(tensor)
         place = choice(at, f"the place of the field {name}", field.where)
-        if "gauss" not in field.where or place == "node":
+        if "gauss" not in field.where or (place == "node" and not field.sampled):
             return self.u if name == "displacement" else field.at(self)
         placed = [GaussPoints(self.mesh.points, group, self.u, self._strained) for group in self.groups]
-        if place == "gauss":
-            return in_order(self.groups, [field.at(values) for values in placed])
-        return in_order(self.groups, [values.mean(field.at(values)) for values in placed])
+        values = [field.at(points) for points in placed]
+        if place in ("raw", "averaged", "node"):
+            return self._extrapolated(values, place)
+        if place == "element":
+            values = [points.mean(value) for points, value in zip(placed, values, strict=True)]
+        return in_order(self.groups, values)
+
+    def _extrapolated(self, values: list[Array], place: str) -> Any:
+        """Return values (m, g, ...) of the groups at nodes of elements, or averaged there."""
+        from kratos_lite.assembly.nodal_values import averaged, extrapolation  # as for the recovery
+
+        tail = values[0].shape[2:]
+        flat = [value.reshape(*value.shape[:2], -1) for value in values]
+        if place != "raw":
+            return averaged(self.groups, flat, self.mesh.n_nodes).reshape(-1, *tail)
+        raw = [extrapolation(g.element, g.rule) @ v for g, v in zip(self.groups, flat, strict=True)]
+        return in_order(self.groups, [value.reshape(*value.shape[:2], *tail) for value in raw])
+
+    def sampled_at(self, field: Field, located: Located) -> Array:
+        """Return a field of Gauss points at points, extrapolated in the element that holds each.
+
+        Parameters
+        ----------
+        field : that Gauss points have.
+        located : points (...) of this mesh.
+
+        Returns
+        -------
+        (..., parts)
+        """
+        from kratos_lite.assembly.nodal_values import extrapolated_at  # as for the recovery
+
+        tail: tuple[int, ...] = ()
+
+        def values(group: ElementGroup) -> Array:
+            nonlocal tail
+            value = field.at(GaussPoints(self.mesh.points, group, self.u, self._strained))
+            tail = value.shape[2:]
+            return value.reshape(*value.shape[:2], -1)
+
+        flat = extrapolated_at(self.groups, located, values)
+        return flat.reshape(*located.rows.shape, *tail)
 
     def von_mises(self, at: str = "gauss") -> Any:
         """Return von Mises stresses.
@@ -303,8 +343,9 @@ class ElementFields:
     def at_integration_points(self, name: str, element: int | None = None) -> Any:
         """Return a quantity at the integration points by its name in Kratos.
 
-        It is what ``CalculateOnIntegrationPoints`` of KinematicLinear or SmallDisplacementElement returns.
-        Strains are small: the Green-Lagrange strain is the linear one, and all stress measures agree.
+        It is what ``CalculateOnIntegrationPoints`` of KinematicLinear, SmallDisplacementElement or
+        TotalLagrangianElement returns.  Where strains are small, the Green-Lagrange strain is the linear one,
+        and all stress measures agree.
 
         Parameters
         ----------
@@ -313,8 +354,11 @@ class ElementFields:
             - ``CAUCHY_STRESS_VECTOR``, ``PK2_STRESS_VECTOR``, ``STRESSES`` (6,), ``CAUCHY_STRESS_TENSOR``,
               ``PK2_STRESS_TENSOR`` (3, 3), ``VON_MISES_STRESS``: Pa, with the prestress;
             - ``GREEN_LAGRANGE_STRAIN_VECTOR``, ``STRAIN`` (6,), ``GREEN_LAGRANGE_STRAIN_TENSOR`` (3, 3);
-            - ``STRAIN_ENERGY``: ½ ε:C:ε in J/m³;
-            - ``CONSTITUTIVE_MATRIX``: C (6, 6) in Pa;
+            - ``DEFORMATION_GRADIENT``: F (3, 3), of small strains 1 + ε;
+            - ``PLASTIC_STRAIN_VECTOR``, ``ACCUMULATED_PLASTIC_STRAIN``, ``DAMAGE``, …: the internal variables
+              of the laws, those without a name in Kratos by their own;
+            - ``STRAIN_ENERGY``: ½ ε:C:ε in J/m³, or the stored energy of a law that is not linear;
+            - ``CONSTITUTIVE_MATRIX``: C (6, 6) in Pa, the tangent at rest;
             - ``STRAIN_INTERPOLATION_OPERATOR``: B (6, 3k) in 1/m of k nodes;
             - ``JACOBIAN``, ``JACOBIAN_0``: det J in m³, ``INTEGRATION_WEIGHT``: weight times det J in m³;
             - ``INTEGRATION_COORDINATES``, ``INTEGRATION_POINT_GLOBAL``: X (3,) in m,
@@ -350,7 +394,8 @@ class ElementFields:
         >>> bool(abs(energy / result.energy() - 1) < 1e-12)
         True
         """
-        quantity = QUANTITIES[choice(name, "a quantity at integration points", QUANTITIES)]
+        known_here = QUANTITIES | {f.kratos: f.at for f in known(self.groups).values() if f.sampled}
+        quantity = known_here[choice(name, "a quantity at integration points", known_here)]
         groups = self.groups if element is None else [group_of_element(self.mesh, self.groups, element)]
         made = [quantity(GaussPoints(self.mesh.points, g, self.u, self._strained)) for g in groups]
         return in_order(groups, made) if element is None else made[0][0]

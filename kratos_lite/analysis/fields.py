@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
-from operator import attrgetter
+from operator import attrgetter, methodcaller
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from kratos_lite import voigt
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.assembly.gauss_point_fields import at_gauss, volumes
+from kratos_lite.assembly.gauss_point_fields import (
+    at_gauss,
+    deformation_gradient,
+    energy_density,
+    of_law,
+    volumes,
+)
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.errors import KratosLiteError
 from kratos_lite.mesh import Mesh
@@ -50,6 +56,13 @@ class Field:
     symbol: str = ""  # before the names of its parts, as in ``sxx``; pictures show no parts without it
     listed: bool = True  # whether files and tables hold it
     log: bool = False  # whether pictures show it on a logarithmic scale
+    sampled: bool = False  # known at Gauss points alone: elsewhere extrapolated from there, at nodes averaged
+    needs: str = ""  # files hold it only of ``linear`` laws and strains, or where one of them is ``finite``
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """Names of its parts; a kind that is a number has that many."""
+        return PARTS[self.kind] if self.kind in PARTS else tuple(str(i + 1) for i in range(int(self.kind)))
 
     @property
     def nodal_place(self) -> str:
@@ -67,15 +80,15 @@ class Field:
         >>> list(FIELDS["displacement"].columns(np.zeros((1, 3))))
         ['displacement x [m]', 'displacement y [m]', 'displacement z [m]']
         """
-        parts, unit = PARTS[self.kind], self.unit.replace("³", "3")
-        if not parts:
-            return {f"{self.name} [{unit}]": values.ravel()}
+        parts, unit = self.parts or ("",), f"[{self.unit.replace('³', '3')}]" if self.unit else ""
         flat = values.reshape(-1, len(parts))
-        return {f"{self.name} {part} [{unit}]".lstrip(): flat[:, i] for i, part in enumerate(parts)}
+        return {" ".join(f"{self.name} {part} {unit}".split()): flat[:, i] for i, part in enumerate(parts)}
 
 
 def _strain_energy_density(at: Any) -> Array:
-    """Return ½ ε:C:ε: no part of it is the work of the prestress."""
+    """Return ½ ε:C:ε, without the work of a prestress; or the energy of a law that is not linear."""
+    if isinstance(at, GaussPoints) and not at.group.is_linear:
+        return energy_density(at.points, at.group, at.strained)
     strain, stress = at.elastic
     return (strain * stress).sum(axis=-1) / 2
 
@@ -111,11 +124,27 @@ FIELDS: dict[str, Field] = {
     ),
     "error": Field(
         "estimated error", "ENERGY_NORM_ERROR", "√J", "scalar", ELEMENTS, 
-        lambda result: result.error().per_element, log=True,
+        lambda result: result.error().per_element, log=True, needs="linear",
+    ),
+    "pk2_stress": Field(
+        "second Piola-Kirchhoff stress", "PK2_STRESS_VECTOR", "Pa", "tensor", EVERYWHERE, attrgetter("pk2"),
+        sampled=True, needs="finite",
+    ),
+    "deformation_gradient": Field(
+        "deformation gradient", "DEFORMATION_GRADIENT", "", "axes", EVERYWHERE, attrgetter("F"),
+        sampled=True, needs="finite", listed=False,
     ),
     "velocity": Field("velocity", "VELOCITY", "m/s", "vector", STATES, attrgetter("v")),
     "acceleration": Field("acceleration", "ACCELERATION", "m/s²", "vector", STATES, attrgetter("a")),
 }  # fmt: skip
+VARIABLES = {
+    "plastic_strain": ("PLASTIC_STRAIN_VECTOR", ""),
+    "accumulated_plastic_strain": ("ACCUMULATED_PLASTIC_STRAIN", ""),
+    "back_stress": ("BACK_STRESS_VECTOR", "Pa"),
+    "damage": ("DAMAGE", ""),
+    "element_length": ("element_length", "m"),
+}
+"""Kratos's names and units of internal variables; others have their own name, and Pa if they are stresses."""
 PLACE = Field("", "", "m", "vector", INTERPOLATED, attrgetter("points"))
 
 
@@ -144,15 +173,48 @@ class Fields(Protocol):
         """Return strain energy, largest von Mises stress of Gauss points and the index of its element."""
 
 
-def listed(place: str) -> dict[str, Field]:
-    """Return the fields of a place that files and tables hold."""
-    return {name: field for name, field in FIELDS.items() if field.listed and place in field.where}
+def variable(name: str, size: int) -> Field:
+    """Return an internal variable of a law, of so many numbers, as a field."""
+    kratos, unit = VARIABLES.get(name, (name, "Pa" if "stress" in name else ""))
+    kind = {1: "scalar", 3: "vector", 6: "tensor"}.get(size, str(size))
+    text, symbol = name.replace("_", " "), f"{name}_"
+    get = methodcaller("variable", name, size)
+    return Field(text, kratos, unit, kind, EVERYWHERE, get, symbol=symbol, sampled=True)
+
+
+def known(groups: Sequence[ElementGroup]) -> dict[str, Field]:
+    """Return the fields of a result of groups: those of the table, and the internal variables of its laws."""
+    if all(group.is_linear for group in groups):
+        return FIELDS
+    energy = replace(FIELDS["strain_energy_density"], where=EVERYWHERE, sampled=True)
+    laws = dict.fromkeys(type(group.material) for group in groups if group.states is not None)
+    sizes = [(law, name, size) for law in laws for name, size in law.internal_variables.items()]
+    found = FIELDS | {"strain_energy_density": energy}
+    for law, name, size in sizes:
+        field = variable(name, size)
+        known_as = found.get(name, field)
+        key = name if (known_as.name, known_as.kind) == (field.name, field.kind) else f"{law.__name__}_{name}"
+        found[key] = field
+    return found
+
+
+def listed(place: str, groups: Sequence[ElementGroup] = ()) -> dict[str, Field]:
+    """Return the fields of a place that files and tables of a result of groups hold."""
+    has = {
+        "": True,
+        "linear": all(group.is_linear for group in groups),
+        "finite": any(group.element.finite for group in groups),
+    }
+    fields = known(groups).items()
+    return {
+        name: field for name, field in fields if field.listed and place in field.where and has[field.needs]
+    }
 
 
 def fields(result: Fields) -> tuple[dict[str, Numbers], dict[str, Numbers]]:
     """Return point data and cell data of a result by Kratos's names, as files and viewers hold them."""
     points, cells = (
-        {field.kratos: result.field(name, place) for name, field in listed(place).items() if field.kratos}
+        {f.kratos: result.field(name, place) for name, f in listed(place, result.groups).items() if f.kratos}
         | ids
         for place, ids in zip(("node", "element"), mesh_fields(result.mesh), strict=True)
     )
@@ -162,7 +224,7 @@ def fields(result: Fields) -> tuple[dict[str, Numbers], dict[str, Numbers]]:
 def nodal_columns(result: Fields) -> dict[str, Numbers]:
     """Return ids, places and the fields of the nodes."""
     columns = {"node": result.mesh.node_ids, **PLACE.columns(result.mesh.points)}
-    for name, field in listed("node").items():
+    for name, field in listed("node", result.groups).items():
         columns |= field.columns(result.field(name, "node"))
     return columns
 
@@ -204,6 +266,23 @@ class GaussPoints:
         return at_gauss(self.points, self.group, self.strained)
 
     @property
+    def pk2(self) -> Array:
+        """S (m, g, 6) in Pa, which is σ at small strains."""
+        return self.stress if self.group.is_linear else of_law(self.points, self.group, self.strained)[1]
+
+    @property
+    def F(self) -> Array:
+        """F (m, g, 3, 3), 1 + ε at small strains."""
+        return deformation_gradient(self.points, self.group, self.strained)
+
+    def variable(self, name: str, size: int) -> Array:
+        """Return an internal variable (m, g, size), or (m, g) of one number; 0 where the law has none."""
+        states, none = self.group.states, np.zeros((len(self.group), len(self.group.rule), size))
+        values = none if states is None else states.variables.get(name, none)
+        values = values if values.shape == none.shape else none
+        return values[..., 0] if size == 1 else values
+
+    @property
     def elastic(self) -> tuple[Array, Array]:
         """ε and the stress (m, g, 6) in Pa without prestress."""
         strain = self.strain
@@ -223,8 +302,7 @@ class GaussPoints:
 QUANTITIES: dict[str, Callable[[GaussPoints], Array]] = {
     **{field.kratos: field.at for field in FIELDS.values() if field.kratos and "gauss" in field.where},
     "CAUCHY_STRESS_TENSOR": lambda at: voigt.tensor(at.stress),
-    "PK2_STRESS_VECTOR": FIELDS["stress"].at,
-    "PK2_STRESS_TENSOR": lambda at: voigt.tensor(at.stress),
+    "PK2_STRESS_TENSOR": lambda at: voigt.tensor(at.pk2),
     "STRESSES": FIELDS["stress"].at,
     "GREEN_LAGRANGE_STRAIN_TENSOR": lambda at: voigt.tensor(at.strain * voigt.HALF_SHEAR),
     "STRAIN": FIELDS["strain"].at,
@@ -237,7 +315,7 @@ QUANTITIES: dict[str, Callable[[GaussPoints], Array]] = {
     "INTEGRATION_POINT_LOCAL": lambda at: np.tile(at.group.rule.points, (len(at.group), 1, 1)),
     "STRAIN_INTERPOLATION_OPERATOR": lambda at: at.element._operator(at.group.material.C),
 }
-"""What is known at Gauss points by Kratos's names; strains are small, so that all stress measures agree.
+"""What is known at Gauss points by Kratos's names, beside internal variables.
 
 Names are those of KinematicLinear and SmallDisplacementElement.
 """

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.analysis.element_fields import ElementFields
-from kratos_lite.analysis.fields import COMPONENTS, FIELDS, PLACE, data_frame, listed
+from kratos_lite.analysis.fields import COMPONENTS, PLACE, Field, data_frame, known, listed
 from kratos_lite.errors import nearest
 from kratos_lite.mesh.crossings import crossings
 from kratos_lite.mesh.locate import Located
@@ -22,7 +22,8 @@ class PointValues:
     """Values of a result at points (...) of its mesh, each computed when it is first asked for.
 
     Beside the attributes below, it has every field that the table of fields knows at points: ``von_mises``,
-    ``tresca``, ``principal_stresses``, ``principal_directions``, ``strain_energy_density``, …
+    ``tresca``, ``principal_stresses``, ``principal_directions``, ``strain_energy_density``, …, and internal
+    variables of laws, such as ``plastic_strain``.
 
     Those of a face between elements, where strains jump, are of the element in the lowest row.
 
@@ -73,12 +74,23 @@ class PointValues:
         return strain, stress
 
     def __getattr__(self, name: str) -> Array:
-        if name not in FIELDS or "point" not in FIELDS[name].where:
-            raise AttributeError(f"{type(self).__name__} has no field {name!r}.{nearest(name, FIELDS, 1)}")
-        return FIELDS[name].at(self)
+        if name.startswith("_"):
+            raise AttributeError(name)
+        fields = self._known
+        if name not in fields:
+            raise AttributeError(f"{type(self).__name__} has no field {name!r}.{nearest(name, fields, 1)}")
+        return self._at(fields[name])
 
     def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *FIELDS]
+        return [*super().__dir__(), *self._known]
+
+    @property
+    def _known(self) -> dict[str, Field]:
+        """The fields that there are at points."""
+        return {name: field for name, field in known(self._fields.groups).items() if "point" in field.where}
+
+    def _at(self, field: Field) -> Array:
+        return self._fields.sampled_at(field, self._located) if field.sampled else field.at(self)
 
     def columns(self) -> dict[str, Numbers]:
         """Return coordinates and fields of the points in a row, with units in the headers.
@@ -89,8 +101,8 @@ class PointValues:
             ``kl.write("values.csv", values)`` writes them.
         """
         columns = PLACE.columns(self.points)
-        for field in listed("point").values():
-            columns |= field.columns(field.at(self))
+        for field in listed("point", self._fields.groups).values():
+            columns |= field.columns(self._at(field))
         return columns
 
     def to_dataframe(self) -> Any:
@@ -215,12 +227,12 @@ class LineValues(PointValues):
         KratosLiteError
             matplotlib is missing.
         """
-        from kratos_lite.analysis.subjects import NAMES, named_values  # pictures alone need these
+        from kratos_lite.analysis.subjects import named_values, names_of_parts  # pictures alone need these
         from kratos_lite.view.canvas import checked_size, save
         from kratos_lite.view.curves import line_figure
 
-        choice(values, "values", [n for n, (field, _) in NAMES.items() if "point" in FIELDS[field].where])
-        shown = named_values(values, lambda name: getattr(self, name))
+        names = names_of_parts(self._known)
+        shown = named_values(names[choice(values, "values", names)], lambda name: getattr(self, name))
         curves = {shown.title: shown.numbers}
         if shown.unit == "Pa":
             seen = np.abs(shown.numbers) > ZERO * np.abs(self.stress).max()

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from kratos_lite.analysis.fields import FIELDS, PARTS, Fields
+from kratos_lite.analysis.fields import FIELDS, Field, Fields, known
 from kratos_lite.analysis.peak import peak
 from kratos_lite.analysis.state import InTime, State
 from kratos_lite.errors import InputError, nearest
@@ -132,7 +132,7 @@ def _values(result: Fields | None, mesh: Mesh, u: Array | None, given: dict[str,
         name = DEFAULT if values is None else values
         if u is not None and name in MOTIONS:
             shape = u
-            named = named_values(name, lambda _: shape)
+            named = named_values(MOTIONS[name], lambda _: shape)
         elif result is None:
             raise InputError(f"a mesh or a model has no field {name!r}; solve it, or give an array")
         else:
@@ -231,34 +231,40 @@ def _zoom(zoom: Any) -> Any:
     return np.minimum(low, high), np.maximum(low, high)
 
 
-def _names() -> Iterator[tuple[str, tuple[str, int | None]]]:
-    for key, field in FIELDS.items():
+Part: TypeAlias = "tuple[str, Field, int | None]"
+"""A field, its name, and the number of its part; a vector itself is shown by its length."""
+
+
+def names_of_parts(fields: Mapping[str, Field]) -> dict[str, Part]:
+    """Return what pictures show of fields, by the names of these and of their parts."""
+    names = dict[str, Part]()
+    for key, field in fields.items():
         if field.kind in ("scalar", "vector") and "state" not in field.where:
-            yield key, (key, None)
-        for i, part in enumerate(PARTS[field.kind]):
-            if field.symbol:
-                yield field.symbol + part, (key, i)
+            names[key] = key, field, None
+        if field.symbol:
+            names |= {field.symbol + part: (key, field, i) for i, part in enumerate(field.parts)}
+    return names
 
 
-NAMES = dict(_names())  # field and number of its part by each name; a vector itself is shown by its length
-MOTIONS = tuple(name for name, (field, _) in NAMES.items() if field == "displacement")
-"""Those that need nothing but displacements."""
+MOTIONS = names_of_parts({"displacement": FIELDS["displacement"]})
+"""What needs nothing but displacements."""
 
 
 def nodal_values(result: Fields, name: str) -> Values:
-    """Return the values of nodes, or else of elements, by a name of `NAMES`; InputError for another."""
-    if name not in NAMES:
-        raise InputError(f"unknown field {name!r}; there are {', '.join(NAMES)}.{nearest(name, NAMES, 1)}")
-    return named_values(name, lambda field: result.field(field, FIELDS[field].nodal_place))
+    """Return the values of nodes, or else of elements, by the name of a part; InputError for another."""
+    names = names_of_parts(known(result.groups))
+    if name not in names:
+        raise InputError(f"unknown field {name!r}; there are {', '.join(names)}.{nearest(name, names, 1)}")
+    return named_values(names[name], lambda key: result.field(key, names[name][1].nodal_place))
 
 
-def named_values(name: str, values: Callable[[str], Array]) -> Values:
-    """Return what a name of `NAMES` shows of the values of its field."""
-    key, part = NAMES[name]
-    field, numbers = FIELDS[key], values(key)
+def named_values(shown: Part, values: Callable[[str], Array]) -> Values:
+    """Return what is shown of the values of a field by its name."""
+    key, field, part = shown
+    numbers = values(key)
     if part is not None:
         numbers = numbers[:, part]
     elif field.kind == "vector":
         numbers = np.linalg.norm(numbers, axis=1)
-    title = field.name if part is None else f"{field.name} {PARTS[field.kind][part]}"
+    title = field.name if part is None else f"{field.name} {field.parts[part]}"
     return Values(numbers, title, field.unit, field.log)

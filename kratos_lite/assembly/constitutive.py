@@ -19,7 +19,7 @@ import numpy as np
 from kratos_lite.assembly import finite_strain
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup, PointStates, add_nodal, as_double, compiled
-from kratos_lite.assembly.gauss_point_fields import displaced, internal_load, volumes
+from kratos_lite.assembly.gauss_point_fields import displaced, initial_strain, internal_load, volumes
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import assemble_stiffness
 from kratos_lite.elements import tables
@@ -266,7 +266,7 @@ def named(states: States) -> dict[str, Array]:
     for i, state in enumerate(states):
         if state is not None:
             values[f"stress_{i}"] = state.stress.copy()
-            values |= {f"{name}_{i}": value.copy() for name, value in state.variables.items()}
+            values |= {f"{name}_of_{i}": value.copy() for name, value in state.variables.items()}
             if state.modes is not None:
                 values[f"modes_{i}"] = state.modes.copy()
     return values
@@ -278,14 +278,8 @@ def unnamed(values: Mapping[str, Array], like: States) -> States:
         state
         and PointStates(
             values[f"stress_{i}"].copy(),
-            {name: values[f"{name}_{i}"].copy() for name in state.variables},
+            {name: values[f"{name}_of_{i}"].copy() for name in state.variables},
             None if state.modes is None else values[f"modes_{i}"].copy(),
         )
         for i, state in enumerate(like)
     ]
-
-
-def initial_strain(group: ElementGroup) -> Array | float:
-    """Return the elastic strain (m, 1, 6) of the prestress, or 0."""
-    stress = group.initial_stress(slice(None))
-    return stress @ np.linalg.inv(group.material.C) if isinstance(stress, np.ndarray) else 0.0

@@ -89,7 +89,8 @@ def body_force_by_function(
 def at_gauss(points: Array, group: ElementGroup, u: Array, *, stress: bool = True) -> Array:
     """Return stresses in Pa with prestress, or strains, (m, g, 6) of displacements u (n, 3) in m."""
     if not group.is_linear:
-        return strain_and_stress(points, group, u)[stress]
+        strain, found = of_law(points, group, u)
+        return cauchy(points, group, u, found) if stress else strain
     if module := compiled("gauss", group.element):
         return module.stress(*displaced(points, group, u, stress))
     parts = [value_at(group.at(points, chunk), group, u, chunk, stress) for chunk in group.chunks()]
@@ -184,30 +185,61 @@ def _totals(points: Array, group: ElementGroup, u: Array, chunk: slice) -> tuple
 # ---- laws and strains that are not linear -----------------------------------------------------------------
 
 
-def strain_and_stress(points: Array, group: ElementGroup, u: Array) -> tuple[Array, Array]:
-    """Return strains and Cauchy stresses (m, g, 6) of a group with states, at the u (n, 3) of its result."""
-    strains, stresses = np.zeros((2, len(group), len(group.rule), 6))
+def initial_strain(group: ElementGroup) -> Array | float:
+    """Return the elastic strain (m, 1, 6) of the prestress, or 0."""
+    stress = group.initial_stress(slice(None))
+    return stress @ np.linalg.inv(group.material.C) if isinstance(stress, np.ndarray) else 0.0
+
+
+def of_law(points: Array, group: ElementGroup, u: Array) -> tuple[Array, Array]:
+    """Return strains and stresses (m, g, 6) of a law, Green's and S of finite strains, at u (n, 3).
+
+    The stresses of a group with states are these.
+    """
+    strains, states = np.zeros((len(group), len(group.rule), 6)), group.states
     for chunk in group.chunks():
         element, q, C = group.at(points, chunk), u[group.nodes[chunk]], group.material.C
-        large = element.finite
-        strain = lagrange.green_strain(element, q) if large else element.strain(q, C)
-        if group.states is not None:
-            stress = group.states.stress[chunk]
+        if states is not None and states.modes is not None:
+            B = tables.strain_rows(element._gauss[1])
+            G = element._modes(element.rule.points)  # type: ignore[attr-defined]
+            alpha = states.modes[chunk, None, :, None]
+            strains[chunk] = (B @ q.reshape(len(q), 1, -1, 1) + G @ alpha)[..., 0]
         else:
-            stress = strain @ C.T + group.initial_stress(chunk)
-        strains[chunk], stresses[chunk] = strain, stress
-        if large:
-            F = np.eye(3) + lagrange.displacement_gradient(element, q)
-            J = tables.determinant(F)[..., None, None]
-            stresses[chunk] = voigt.vector(F @ voigt.tensor(stress) @ np.swapaxes(F, -1, -2) / J)
-    return strains, stresses
+            strains[chunk] = lagrange.green_strain(element, q) if element.finite else element.strain(q, C)
+    if states is not None:
+        return strains, states.stress
+    return strains, strains @ group.material.C.T + group.initial_stress(slice(None))
+
+
+def deformation_gradient(points: Array, group: ElementGroup, u: Array) -> Array:
+    """Return F (m, g, 3, 3) at displacements u (n, 3); 1 + ε of small strains."""
+    if not group.element.finite:
+        return np.eye(3) + voigt.tensor(at_gauss(points, group, u, stress=False) * voigt.HALF_SHEAR)
+    chunks = group.chunks()
+    H = [lagrange.displacement_gradient(group.at(points, c), u[group.nodes[c]]) for c in chunks]
+    return np.eye(3) + np.concatenate(H)
+
+
+def cauchy(points: Array, group: ElementGroup, u: Array, stress: Array) -> Array:
+    """Return Cauchy's stress F S F^T / det F (m, g, 6) of that of a law, which it is at small strains."""
+    if not group.element.finite:
+        return stress
+    F = deformation_gradient(points, group, u)
+    J = tables.determinant(F)[..., None, None]
+    return voigt.vector(F @ voigt.tensor(stress) @ np.swapaxes(F, -1, -2) / J)
+
+
+def energy_density(points: Array, group: ElementGroup, u: Array) -> Array:
+    """Return the stored energy (m, g) in J/m³ of a law at displacements u (n, 3)."""
+    strain, stress = of_law(points, group, u)
+    law, states = group.material, group.states
+    if states is None:
+        return law.energy(strain, strain @ law.C.T, {})
+    return law.energy(strain + initial_strain(group), stress, states.variables)
 
 
 def totals_of(points: Array, group: ElementGroup, u: Array) -> tuple[float, float, int]:
     """Return stored energy in J, largest von Mises stress in Pa and its element of a group with states."""
-    strain, stress = strain_and_stress(points, group, u)
-    law, states = group.material, group.states
-    given = (strain @ law.C.T, {}) if states is None else (states.stress, states.variables)
-    mises = voigt.von_mises(stress).max(axis=1)
-    energy = float((law.energy(strain, *given) * volumes(points, group)).sum())
+    mises = voigt.von_mises(at_gauss(points, group, u)).max(axis=1)
+    energy = float((energy_density(points, group, u) * volumes(points, group)).sum())
     return energy, float(mises.max()), int(mises.argmax())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from kratos_lite.mesh.locate import Located
 from kratos_lite.quadrature import Rule
 from kratos_lite.registry import remembered
 from kratos_lite.shapes.base import at_points
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Ints
 
 
 @remembered
@@ -58,9 +58,8 @@ def _averages(points: Array, group: ElementGroup, u: Array, stress: bool) -> tup
     to_nodes = as_double(extrapolation(group.element, group.rule))
     if not group.is_linear:
         value, volume = at_gauss(points, group, u, stress=stress), volumes(points, group)
-        nodal = np.zeros((len(points), 6))
-        add_nodal(nodal, group.nodes, to_nodes @ value)
-        return nodal, np.einsum("mg,mgc->mc", volume / volume.sum(axis=1, keepdims=True), value)
+        means = np.einsum("mg,mgc->mc", volume / volume.sum(axis=1, keepdims=True), value)
+        return _sums(group, value, len(points)), means
     if module := compiled("gauss", group.element):
         nodal, mean = module.averages(*displaced(points, group, u, stress), to_nodes)
         return nodal, mean
@@ -73,33 +72,71 @@ def _averages(points: Array, group: ElementGroup, u: Array, stress: bool) -> tup
     return total, means
 
 
+def averaged(groups: Sequence[ElementGroup], values: Sequence[Array], n: int) -> Array:
+    """Return values (m, g, c) at Gauss points, extrapolated to nodes and averaged there, (n, c)."""
+    total = sum(_sums(group, value, n) for group, value in zip(groups, values, strict=True))
+    count = np.bincount(np.concatenate([group.nodes.ravel() for group in groups]), minlength=n)
+    return np.asarray(total / np.maximum(count, 1)[:, None])
+
+
+def _sums(group: ElementGroup, value: Array, n: int) -> Array:
+    """Return the sums at nodes (n, c) of values (m, g, c) extrapolated to the nodes of each element."""
+    total = np.zeros((n, value.shape[-1]))
+    add_nodal(total, group.nodes, extrapolation(group.element, group.rule) @ value)
+    return total
+
+
 # ---- at points ------------------------------------------------------------------------------------
 
 
 def at_located(groups: Sequence[ElementGroup], located: Located, u: Array, *, stress: bool = True) -> Array:
     """Return stresses in Pa with prestress, or strains, (..., 6) of displacements u (n, 3) in m at points."""
-    rows, xi = located.rows.ravel(), located.xi.reshape(-1, 3)
-    out = np.zeros((len(rows), 6))
+    xi, points = located.xi.reshape(-1, 3), located.mesh.points
+    out = np.zeros((len(xi), 6))
+    for group, at, cells in _groups_at(groups, located):
+        if not group.is_linear:
+            value = _extrapolated(group, cells, xi[at], lambda g: at_gauss(points, g, u, stress=stress))
+        else:
+            value = _strain(group, points[group.nodes[cells]], xi[at], u[group.nodes[cells]])
+            if stress:
+                value = value @ group.material.C.T
+                value = value if group.prestress is None else value + group.prestress[cells]
+        out[at] = value
+    return out.reshape(*located.rows.shape, 6)
+
+
+def extrapolated_at(
+    groups: Sequence[ElementGroup], located: Located, values: Callable[[ElementGroup], Array]
+) -> Array:
+    """Return values (m, g, c) at the Gauss points of groups at points (k,), (k, c)."""
+    xi, parts = located.xi.reshape(-1, 3), []
+    for group, at, cells in _groups_at(groups, located):
+        parts.append((at, _extrapolated(group, cells, xi[at], values)))
+    out = np.zeros((len(xi), parts[0][1].shape[1]))
+    for at, value in parts:
+        out[at] = value
+    return out
+
+
+def _groups_at(groups: Sequence[ElementGroup], located: Located) -> Iterator[tuple[ElementGroup, Ints, Ints]]:
+    """Yield the groups in which points lie, the numbers of these, and the element of the group of each."""
+    rows = located.rows.ravel()
     for group in groups:
         number = np.full(sum(map(len, located.mesh.blocks)), -1)
         number[group.rows] = np.arange(len(group))
         at = np.flatnonzero((rows >= 0) & (number[rows] >= 0))
-        if not len(at):
-            continue
-        cells = number[rows[at]]
-        X, displaced = (values[group.nodes[cells]] for values in (located.mesh.points, u))
-        if not group.is_linear:
-            chosen = group.take(np.isin(np.arange(len(group)), cells))
-            places = np.searchsorted(np.flatnonzero(np.isin(np.arange(len(group)), cells)), cells)
-            raw = extrapolated(located.mesh.points, chosen, u, stress=stress)[places]
-            out[at] = np.einsum("ck,ckj->cj", group.element.N(xi[at]), raw)
-            continue
-        value = _strain(group, X, xi[at], displaced)
-        if stress:
-            value = value @ group.material.C.T
-            value = value if group.prestress is None else value + group.prestress[cells]
-        out[at] = value
-    return out.reshape(*located.rows.shape, 6)
+        if len(at):
+            yield group, at, number[rows[at]]
+
+
+def _extrapolated(
+    group: ElementGroup, cells: Ints, xi: Array, values: Callable[[ElementGroup], Array]
+) -> Array:
+    """Return values at the Gauss points of elements, extrapolated within each to its own xi (k, 3)."""
+    chosen, places = np.unique(cells, return_inverse=True)
+    some = group.take(np.isin(np.arange(len(group)), chosen))
+    raw = (extrapolation(group.element, group.rule) @ values(some))[places]
+    return np.einsum("ck,ckj->cj", group.element.N(xi), raw)
 
 
 def _strain(group: ElementGroup, X: Array, xi: Array, u: Array) -> Array:

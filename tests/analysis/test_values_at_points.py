@@ -69,6 +69,7 @@ def by_hand(mesh, u, element, name):
             "INTEGRATION_POINT_GLOBAL": N @ mesh.points[nodes],
             "INTEGRATION_POINT_LOCAL": xi,
             "DISPLACEMENT": N @ u[nodes],
+            "DEFORMATION_GRADIENT": np.eye(3) + strain,
         }
         if name == "STRAIN_INTERPOLATION_OPERATOR":
             one = np.eye(u[nodes].size).reshape(-1, len(nodes), 3)

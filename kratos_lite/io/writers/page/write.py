@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kratos_lite.analysis.fields import FIELDS, listed
+from kratos_lite.analysis.fields import FIELDS, PARTS, listed
 from kratos_lite.atomic import refuse_nan, write_whole
 from kratos_lite.errors import InputError, SolveError
 from kratos_lite.io.writers.page.content import Content, Frame
@@ -58,8 +58,9 @@ def _refuse_large(path: str | Path, name: str, values: Array) -> None:
 
 def write_result_page(path: str | Path, result: Result) -> None:
     """Write the page of a result: its fields but for invariants, which the page makes of their tensors."""
-    shown = {name: field for place in ("node", "element") for name, field in listed(place).items()}
-    fields = {name: field for name, field in shown.items() if not field.of}
+    places = (listed(place, result.groups) for place in ("node", "element"))
+    shown = {name: field for fields in places for name, field in fields.items()}
+    fields = {name: field for name, field in shown.items() if not field.of and field.kind in PARTS}
     values = [result.field(name, field.nodal_place) for name, field in fields.items()]
     frame, start = Frame("", values), f"{list(fields).index('stress')}:von Mises"
     write_page(
