@@ -76,7 +76,7 @@ def averaged(groups: Sequence[ElementGroup], values: Sequence[Array], n: int) ->
     """Return values (m, g, c) at Gauss points, extrapolated to nodes and averaged there, (n, c)."""
     total = sum(_sums(group, value, n) for group, value in zip(groups, values, strict=True))
     count = np.bincount(np.concatenate([group.nodes.ravel() for group in groups]), minlength=n)
-    return np.asarray(total / np.maximum(count, 1)[:, None])
+    return np.asarray(total / np.maximum(count[:, None], 1))
 
 
 def _sums(group: ElementGroup, value: Array, n: int) -> Array:
