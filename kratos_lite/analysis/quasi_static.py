@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
@@ -15,13 +16,14 @@ from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.state import State, check_state
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.constitutive import Constitutive, States, named, unnamed
+from kratos_lite.assembly.stiffness import assemble_stiffness
 from kratos_lite.errors import InputError, ModelError, SolveError
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.direct import one_thread
 from kratos_lite.solvers.linear_solver import LinearSolver
 from kratos_lite.solvers.newton import SMALLEST_PART, forcing, in_parts, newton
-from kratos_lite.solvers.plan import Plan, stepped
+from kratos_lite.solvers.plan import stepped
 from kratos_lite.typing import Array, Ints, Progress
 from kratos_lite.validation import number, whole_number
 
@@ -31,6 +33,8 @@ Load: TypeAlias = tuple[Array, Changes]
 """Nodal forces (3a,) at some displacements, and their tangent."""
 Response: TypeAlias = tuple[Array, Array, BlockMatrix, Changes, States]
 """Internal forces and load (3a,), tangents of both, and states at some displacements."""
+WORN = 6.0
+"""Iterations for a digit from which a multigrid of an older tangent is made anew."""
 SLACK, SEARCHES = 0.8, 6
 """Line search: fraction of the work of the residual that a full correction may leave, and most trials."""
 
@@ -247,18 +251,34 @@ class QuasiStaticAnalysis:
         self, K: BlockMatrix, tangent: Changes, forces: Array, jump: Array, residuals: list[float]
     ) -> Array:
         """Return (K - tangent)⁻¹ of forces (3a,) with a jump (3a,) of what is prescribed."""
-        symmetric, where = self._symmetric, (self.system.constraint_map, self.system.points)
-        plan = self._plan if symmetric else Plan("direct", "the tangent of a law is not symmetric")
-        near = None
-        if tangent:
+        where, iterates = (self.system.constraint_map, self.system.points), self._plan.iterates
+        if len(residuals) == 1:
+            self._near = self._elastic  # not of the last step, which a restart does not know
+        if iterates and tangent and self._near is None:
             half = [(nodes, (k + k.transpose(0, 3, 4, 1, 2)) / 2) for nodes, k in tangent]
-            near = LinearSolver(self._less(K, half), *where, plan) if plan.iterates else None
-            K, symmetric = self._less(K, tangent), False
-        solver = LinearSolver(K, *where, plan, symmetric, near)
-        return solver.solve(forces, forcing(residuals, self.tolerance), None, jump, jump).x
+            self._near = LinearSolver(self._less(K, half), *where, self._plan)
+        symmetric = self._symmetric and not tangent
+        solver = LinearSolver(self._less(K, tangent), *where, self._plan, symmetric, self._near)
+        tolerance = forcing(residuals, self.tolerance)
+        solution = solver.solve(forces, tolerance, None, jump, jump)
+        if iterates:
+            worn = self._symmetric and solution.iterations > WORN * -np.log10(tolerance)
+            self._near = None if solver.near and worn else solver.near or solver
+        return solution.x
+
+    @cached_property
+    def _elastic(self) -> LinearSolver | None:
+        """What solves the body at rest by multigrid, with which steps begin; None with factors."""
+        if not self._plan.iterates:
+            return None
+        system = self.system
+        K = assemble_stiffness(system.points, system.groups, system.pattern)
+        return LinearSolver(K, system.constraint_map, system.points, self._plan, groups=system.groups)
 
     def _less(self, K: BlockMatrix, tangent: Changes) -> BlockMatrix:
         """Return K - tangent."""
+        if not tangent:
+            return K
         data = K.data.copy()
         for nodes, k in tangent:
             self.system.pattern.add_at(data, nodes.astype(np.int32), -k.transpose(0, 1, 3, 2, 4))

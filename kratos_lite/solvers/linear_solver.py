@@ -14,7 +14,7 @@ from kratos_lite.assembly.matrix_free import MatrixFree
 from kratos_lite.errors import SolveError
 from kratos_lite.solvers import direct
 from kratos_lite.solvers.constraints import ConstraintMap
-from kratos_lite.solvers.iteration import Monitor
+from kratos_lite.solvers.iteration import Monitor, conjugate_gradients
 from kratos_lite.solvers.plan import Plan, after, is_quick_to_factorize, tolerance_of
 from kratos_lite.typing import Array, Ints, Progress
 
@@ -50,7 +50,7 @@ class LinearSolver:
     points: Array  # (n, 3) m, from which multigrid knows the rigid modes
     plan: Plan  # how it is solved
     symmetric: bool = True  # positive definite, too
-    near: LinearSolver | None = None  # of a matrix that is, and not far from K, where K is not
+    near: LinearSolver | None = None  # of a matrix not far from K, symmetric: its multigrid serves K, too
     groups: Sequence[ElementGroup] = ()  # with `hanging`: quadratic elements, whose linear ones are a level
     hanging: HangingNodes | None = None
     with_mass: tuple[float, Array] | None = None  # k, masses of nodes (n,), where K is k K + M of the groups
@@ -195,7 +195,10 @@ class LinearSolver:
         rhs[free] = b
         aim = tolerance if continued else tolerance_of(tolerance, len(b))
         if self.near is not None:
-            return *self._minimal_residual(b, tolerance, self.near), self.plan
+            q, iterations, good = self._by_near(b, tolerance, self.near, progress)
+            if good:
+                return q, iterations, self.plan
+            self.near = None  # not near enough
         multigrid = self._prepared("_multigrid", "set up", progress)
         norm = self.norm if self._blocks is self.K else self._blocks.norm()
         monitor = Monitor(tolerance, progress, is_quick_to_factorize(len(b)))
@@ -205,16 +208,21 @@ class LinearSolver:
         monitor.finish()
         return x[free], iterations, self.plan
 
-    def _minimal_residual(self, b: Array, tolerance: float, near: LinearSolver) -> tuple[Array, int]:
-        """Solve equations that are not symmetric by GMRES, with the multigrid of a matrix near to theirs."""
-        from scipy.sparse.linalg import LinearOperator, gmres
-
+    def _by_near(
+        self, b: Array, tolerance: float, near: LinearSolver, progress: Progress | None
+    ) -> tuple[Array, int, bool]:
+        """Return q, iterations and success with the multigrid of `near`; by GMRES where K is not symmetric."""
         constraints, iterations = self.constraint_map, 0
 
         def times(q: Array) -> Array:
             nonlocal iterations
             iterations += 1
             return constraints.reduce(self.K @ constraints.transform(q))
+
+        if self.symmetric:
+            monitor = Monitor(tolerance, progress, is_quick_to_factorize(len(b)))
+            return conjugate_gradients(times, b, near.precondition, tolerance, self.norm, monitor)
+        from scipy.sparse.linalg import LinearOperator, gmres
 
         A, M = (LinearOperator((len(b), len(b)), matvec=f, dtype=float) for f in (times, near.precondition))
         q, failed = gmres(A, b, rtol=tolerance, atol=0.0, restart=RESTART, maxiter=MAX_RESTARTS, M=M)
@@ -223,7 +231,7 @@ class LinearSolver:
                 f"equations that are not symmetric are not solved to {tolerance:g} in {iterations} "
                 "iterations; take smaller steps"
             )
-        return q, iterations
+        return q, iterations, True
 
 
 def constrained(K: BlockMatrix, T: Any, free: Ints) -> BlockMatrix:
