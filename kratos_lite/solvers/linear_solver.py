@@ -211,7 +211,7 @@ class LinearSolver:
     def _by_near(
         self, b: Array, tolerance: float, near: LinearSolver, progress: Progress | None
     ) -> tuple[Array, int, bool]:
-        """Return q, iterations and success with the multigrid of `near`; by GMRES where K is not symmetric."""
+        """Return q, iterations and success with the multigrid of `near`; GMRES where K is not symmetric."""
         constraints, iterations = self.constraint_map, 0
 
         def times(q: Array) -> Array:

@@ -5,6 +5,7 @@ import pytest
 
 import kratos_lite as kl
 from kratos_lite.errors import InputError, ModelError, SolveError
+from kratos_lite.solvers.multigrid import multigrid
 
 E, H, Y = 200e9, 2e9, 200e6
 STEEL = kl.J2Plasticity3D(E, 0.3, Y, H)
@@ -208,3 +209,36 @@ def test_refusals():
     model.fix("z+", "z", 0.01)
     with pytest.raises(InputError, match="estimate of the error"):
         model.solve().error()
+
+
+@pytest.mark.parametrize(
+    "law",
+    [kl.J2Plasticity3D(E, 0.3, Y, H), kl.DruckerPrager3D(E, 0.3, Y, 20.0, 5.0), kl.NeoHookean3D(E, 0.3)],
+    ids=lambda law: type(law).__name__,
+)
+def test_one_multigrid_serves_many_tangents(law, monkeypatch):
+    made = []
+
+    def counted(*args):
+        made.append(len(args[2]))
+        return multigrid(*args)
+
+    monkeypatch.setattr("kratos_lite.solvers.multigrid.multigrid", counted)
+    size = 0.1 if law.strain_measure == "finite" else 0.004
+    ends = []
+    for limit in (10_000, 0):
+        monkeypatch.setattr("kratos_lite.solvers.plan.STEPPED_LIMIT", limit)
+        model = kl.Model(kl.box((1, 1, 2), (3, 3, 6), "Element3D8N"), law)
+        model.fix("z-")
+        model.fix("z+", "x", lambda t: size * t)
+        analysis = steps(model, 0.25, 4)
+        ends.append(analysis.u)
+        state = analysis.state()
+        again = model.quasi_static()
+        state.restore(again)
+        for one in (analysis, again):
+            list(kl.integrate(one, dt=0.25, steps=1))
+        assert (analysis.u == again.u).all()
+    corrections = sum(report.iterations for report in analysis.reports)
+    assert np.abs(ends[0] - ends[1]).max() < 1e-7 * size
+    assert 0 < len(made) < corrections / 3
