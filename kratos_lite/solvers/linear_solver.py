@@ -228,7 +228,7 @@ class LinearSolver:
         q, failed = gmres(A, b, rtol=tolerance, atol=0.0, restart=RESTART, maxiter=MAX_RESTARTS, M=M)
         if failed:
             raise SolveError(
-                f"equations that are not symmetric are not solved to {tolerance:g} in {iterations} "
+                f"equations that are not symmetric were not solved to {tolerance:g} in {iterations} "
                 "iterations; take smaller steps"
             )
         return q, iterations, True
