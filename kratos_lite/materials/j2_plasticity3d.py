@@ -119,7 +119,7 @@ class J2Plasticity3D(Material):
         """Return stress, consistent tangent and internal variables; see `Material.response`."""
         elastic = Isotropic3D(self.E, self.nu)
         C, G = elastic.C, elastic.lame[1]
-        stress = (strain - state["plastic_strain"]) @ C.T
+        stress = voigt.times(strain - state["plastic_strain"], C)
         relative = voigt.deviator(stress) - state["back_stress"]
         norm = np.sqrt(relative**2 @ voigt.SHEAR_TWICE)
         q, p = 1.5**0.5 * norm, state["accumulated_plastic_strain"][..., 0]
@@ -131,11 +131,15 @@ class J2Plasticity3D(Material):
             "accumulated_plastic_strain": (p + dp)[..., None],
             "back_stress": state["back_stress"] + 2 / 3 * self.kinematic * flow,
         }
-        beta = 3 * G * dp / np.where(q > 0, q, 1.0)
-        rate = np.where(dp > 0, 3 * G / (3 * G + self.kinematic + slope), 0.0)
-        D = C - 2 * G * beta[..., None, None] * voigt.DEVIATOR
-        D = D - (2 * G * (rate - beta))[..., None, None] * n[..., :, None] * n[..., None, :]
-        return stress - 2 * G * flow, D, new
+        stress -= 2 * G * flow
+        if not dp.any():
+            return stress, C, new
+        beta = 2 * G * 3 * G * dp / np.where(q > 0, q, 1.0)
+        rate = np.where(dp > 0, 2 * G * 3 * G / (3 * G + self.kinematic + slope), 0.0)
+        D = np.einsum("...i,...j->...ij", (beta - rate)[..., None] * n, n)
+        D += C
+        D -= beta[..., None, None] * voigt.DEVIATOR
+        return stress, D, new
 
     def _increment(self, q: Array, p: Array, G: float) -> tuple[Array, Array]:
         """Return the increment of p at which q - (3G + kinematic) Δp = σ_Y(p + Δp), and the slope of σ_Y."""

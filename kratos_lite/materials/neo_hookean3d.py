@@ -67,8 +67,9 @@ class NeoHookean3D(Material):
         lam, mu = Isotropic3D(self.E, self.nu).lame
         inverse, log_J = inverse_and_log(strain)
         stress = mu * voigt.UNIT + (lam * log_J - mu)[..., None] * inverse
-        D = lam * inverse[..., :, None] * inverse[..., None, :]
-        D += 2 * (mu - lam * log_J)[..., None, None] * symmetric_product(inverse)
+        D = symmetric_product(inverse)
+        D *= 2 * (mu - lam * log_J)[..., None, None]
+        D += np.einsum("...i,...j->...ij", lam * inverse, inverse)
         return stress, D, {}
 
     def energy(self, strain: Array, stress: Array, state: GaussState) -> Array:
@@ -87,8 +88,10 @@ def inverse_and_log(strain: Array) -> tuple[Array, Array]:
 
 def symmetric_product(a: Array) -> Array:
     """Return ½ (a_ik a_jl + a_il a_jk) (..., 6, 6) of a symmetric tensor a (..., 6)."""
-    A = voigt.tensor(a)
-    i, j = np.array(voigt.PAIRS).T
-    rows, columns = (i[:, None], j[:, None]), (i[None, :], j[None, :])
-    first = A[..., rows[0], columns[0]] * A[..., rows[1], columns[1]]
-    return np.asarray((first + A[..., rows[0], columns[1]] * A[..., rows[1], columns[0]]) / 2)
+    parts = np.ascontiguousarray(np.moveaxis(a, -1, 0))
+    A, out = [[parts[k] for k in row] for row in voigt.PLACES], np.empty((*a.shape, 6))
+    for row, (i, j) in enumerate(voigt.PAIRS):
+        for column, (k, m) in enumerate(voigt.PAIRS[: row + 1]):
+            value = (A[i][k] * A[j][m] + A[i][m] * A[j][k]) / 2
+            out[..., row, column] = out[..., column, row] = value
+    return out
