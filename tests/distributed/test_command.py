@@ -66,10 +66,9 @@ def files_of(folder):
 # ---- copies that know nothing of each other ---------------------------------------------------------
 
 
-@pytest.mark.parametrize("ranks", [2, 3])
-def test_copies_of_a_serial_command_are_refused_once(beam, ranks):
-    run = command(ranks, "solve", beam, "--json", "out.json", cwd=beam.parent)
-    assert_refused(run, f"{ranks} copies", "--backend petsc", "--backend own")
+def test_copies_of_a_serial_command_are_refused_once(beam):
+    run = command(3, "solve", beam, "--json", "out.json", cwd=beam.parent)
+    assert_refused(run, "3 copies", "--backend petsc", "--backend own")
     assert files_of(beam.parent) == ["beam.mdpa"]
 
 
@@ -94,29 +93,18 @@ def test_processes_that_another_mpi_has_started(beam):
     assert "2 processes have been started, but mpi4py sees 1" in run.stderr
 
 
-# ---- what is refused before a file is read ----------------------------------------------------------
+# ---- an error, a defect or a signal on one rank -----------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("words", "text"),
-    [
-        (["--modes", "3"], "--modes does not go with --backend petsc"),
-        (["--error", "1%"], "--error is for one process"),
-        (["--nonsense"], "--nonsense: there is no such option"),
-    ],
-)
-def test_options_that_do_not_carry_over(tmp_path, words, text):
-    """The input does not exist: nobody looks for it."""
-    run = command(2, "solve", "no.mdpa", "--backend", "petsc", *words, cwd=tmp_path)
-    assert_refused(run, text)
+def test_options_that_do_not_carry_over_are_refused_before_a_file_is_read(tmp_path):
+    run = command(2, "solve", "no.mdpa", "--backend", "petsc", "--modes", "3", cwd=tmp_path)
+    assert_refused(run, "--modes does not go with --backend petsc")
 
 
 def test_a_missing_input(tmp_path):
     run = command(2, "solve", "no.mdpa", "--backend", "petsc", cwd=tmp_path)
     assert_refused(run, "error: no.mdpa: there is no such file")
 
-
-# ---- an error, a defect or a signal on one rank -----------------------------------------------------
 
 CHANGED = """import os, sys
 from kratos_lite.cli.ranks import launched
@@ -142,7 +130,6 @@ def in_equations(what):
         ("if rank == 1: raise KeyError('odd')", "rank 1: KeyError: 'odd'"),
         ("if rank == 1: raise MemoryError", "rank 1: MemoryError"),
         ("if rank == 1: sys.exit(0)", "rank 1: SystemExit: 0"),
-        ("if rank == 1: 1 / 0", "rank 1: ZeroDivisionError"),
     ],
 )
 def test_a_defect_on_one_rank_ends_all(beam, what, text):
@@ -217,12 +204,9 @@ def test_an_inverted_element_that_one_rank_holds(beam):
         assert (run.stderr + run.stdout).count("element 1 (") == 1
 
 
-def test_a_folder_that_is_not_there_or_may_not_be_written(beam):
+def test_a_folder_that_is_not_there(beam):
     run = command(2, "solve", beam, "--backend", "petsc", "-o", "none/out.pvtu", cwd=beam.parent)
     assert_refused(run, "error: none/out.pvtu: the folder none does not exist")
-    (beam.parent / "out.pvtu").mkdir()
-    run = command(2, "solve", beam, "--backend", "petsc", "-o", "out.pvtu", cwd=beam.parent)
-    assert_refused(run, "error: out.pvtu: cannot be written: it is a folder or a device")
 
 
 # ---- part files -----------------------------------------------------------------------------------
@@ -270,40 +254,34 @@ EQUAL = ("nodes", "elements", "unknowns", "total load", "strain energy", "estima
 """Rows of the summary that are the same on any number of ranks, in the digits shown."""
 
 
-def test_the_summary_is_that_of_one_process_and_printed_once(beam):
-    serial = rows_of(command(1, "solve", beam))
-    for ranks in (2, 3):
-        run = command(ranks, "solve", beam, "--backend", "petsc")
-        shared = rows_of(run)
-        assert said(run) == []
-        assert run.stdout.count("largest displacement") == 1
-        for name in EQUAL:
-            assert shared[name] == serial[name]
-        for name in ("largest displacement", "largest von Mises"):  # at one of several nodes alike
-            assert shared[name].split()[0] == serial[name].split()[0]
-        assert list(shared) == [name for name in serial if name != "iterations" or name in shared]
-
-
-def test_files_are_those_of_one_process(beam):
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_summary_and_files_are_those_of_one_process(beam, run, ranks):
+    serial = run("solve", beam, "--json", beam.parent / "b.json").rows
     words = ["solve", beam, "--backend", "petsc", "-o", "a.vtu", "-o", "a.csv", "--json", "a.json"]
-    run = command(3, *words, cwd=beam.parent)
-    assert "written               a.vtu\nwritten               a.csv\nwritten" in run.stdout
-    assert files_of(beam.parent) == ["a.csv", "a.json", "a.vtu", "beam.mdpa"]
-    shared = json.loads((beam.parent / "a.json").read_text())
-    command(1, "solve", beam, "--json", "b.json", cwd=beam.parent)
-    serial = json.loads((beam.parent / "b.json").read_text())
-    assert set(serial) == set(shared)
+    done = command(ranks, *words, cwd=beam.parent)
+    shared = rows_of(done)
+    assert said(done) == []
+    assert done.stdout.count("largest displacement") == 1
+    assert "written               a.vtu\nwritten               a.csv\nwritten" in done.stdout
+    for name in EQUAL:
+        assert shared[name] == serial[name].strip()
+    for name in ("largest displacement", "largest von Mises"):  # at one of several nodes alike
+        assert shared[name].split()[0] == serial[name].split()[0]
+    assert list(shared) == [name for name in serial if name != "iterations" or name in shared]
+    assert files_of(beam.parent) == ["a.csv", "a.json", "a.vtu", "b.json", "beam.mdpa"]
+    one, other = (json.loads((beam.parent / name).read_text()) for name in ("a.json", "b.json"))
+    assert set(one) == set(other)
     for name in ("displacement", "reaction"):
-        found, expected = (np.array(list(one[name].values())) for one in (shared, serial))
+        found, expected = (np.array(list(values[name].values())) for values in (one, other))
         assert np.abs(found - expected).max() <= 1e-9 * np.abs(expected).max()
 
 
-def test_part_files_are_solved_as_the_whole(parts):
-    serial = rows_of(command(1, "solve", parts.parent / "beam.mdpa"))
+def test_part_files_are_solved_as_the_whole(parts, run):
+    serial = run("solve", parts.parent / "beam.mdpa").rows
     run = command(2, "solve", parts / "beam.mdpa", "--backend", "petsc", "-o", "a.pvtu", cwd=parts)
     shared = rows_of(run)
-    for name in ("nodes", "elements", "unknowns", "total load", "strain energy"):
-        assert shared[name] == serial[name]
+    for name in EQUAL[:-1]:
+        assert shared[name] == serial[name].strip()
     for name in ("largest displacement", "largest von Mises"):
         assert shared[name].split()[0] == serial[name].split()[0]
     assert files_of(parts) == ["a.pvtu", "a_0.vtu", "a_1.vtu", "beam_partitioned"]
@@ -313,16 +291,16 @@ def test_part_files_are_solved_as_the_whole(parts):
     assert_refused(run, "a.vtu: no process has the whole of a mesh in part files; write -o OUT.pvtu")
 
 
-def test_more_ranks_than_elements(tmp_path):
+def test_more_ranks_than_elements(tmp_path, run):
     model = kl.Model(kl.box((2, 1, 1), (2, 1, 1)), LAW)
     model.fix("x-")
     model.add(kl.Traction("x+", (1e6, 0, 0)))
     kl.write(tmp_path / "two.mdpa", model)
     words = ["solve", "two.mdpa", "--backend", "petsc", "--json", "two.json"]
-    serial = rows_of(command(1, "solve", "two.mdpa", cwd=tmp_path))
+    serial = run("solve", tmp_path / "two.mdpa").rows
     shared = rows_of(command(4, *words, cwd=tmp_path))
     for name in EQUAL[:-1]:  # the error is rounding
-        assert shared[name] == serial[name]
+        assert shared[name] == serial[name].strip()
 
 
 def test_one_rank_writes_as_one_process_does(beam):
@@ -341,7 +319,7 @@ def test_options_that_petsc_does_not_know(beam):
     assert run.stdout.count("pc_typo") == 1
 
 
-def test_expected_values_are_told_once_and_give_the_exit_code(tmp_path):
+def test_expected_values_are_told_once_and_give_the_exit_code(tmp_path, run):
     """A run file of Kratos with checks; the same lines as on one process."""
     (tmp_path / "box.mdpa").write_text(box_mdpa())
     write(tmp_path, materials("Structure.Body", 7850.0, 2e9, 0.3), "materials.json")
@@ -350,11 +328,11 @@ def test_expected_values_are_told_once_and_give_the_exit_code(tmp_path):
         for part, axis, value in (("Bottom", "X", 0.0), ("Bottom", "X", "0.001*x**2"), ("Top", "Z", 1.0))
     ]
     write(tmp_path, run_file([CLAMP], [GRAVITY, push(1e6)], checks=checks))
-    serial = command(1, "solve", tmp_path)
-    run = command(3, "solve", tmp_path, "--backend", "petsc")
-    assert serial.returncode == run.returncode == 3
-    said_of = [
-        [line for line in one.stdout.splitlines() if line.startswith("check ")] for one in (serial, run)
-    ]
-    assert said_of[0] == said_of[1]
-    assert [" passed " in line for line in said_of[1]] == [True, False, False]
+    serial, shared = run("solve", tmp_path), command(3, "solve", tmp_path, "--backend", "petsc")
+    assert serial.code == shared.returncode == 3
+    one, other = (
+        [line for line in out.splitlines() if line.startswith("check ")]
+        for out in (serial.out, shared.stdout)
+    )
+    assert one == other
+    assert [" passed " in line for line in other] == [True, False, False]

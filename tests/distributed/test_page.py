@@ -37,21 +37,10 @@ def test_the_scripts_run(name, files, tmp_path):
 
 @pytest.mark.parametrize("words", OPTIONS)
 def test_options_are_taken(words, tmp_path):
-    cube = ROOT / "examples" / "gravity_cube.mdpa"
-    run = mpirun(
-        2,
-        "-m",
-        "kratos_lite",
-        "solve",
-        cube,
-        "--backend",
-        "petsc",
-        *shlex.split(words),
-        seconds=120,
-        cwd=tmp_path,
-    )
+    words = ["solve", ROOT / "examples" / "gravity_cube.mdpa", "--backend", "petsc", *shlex.split(words)]
+    run = mpirun(2, "-m", "kratos_lite", *words, seconds=120, cwd=tmp_path)
     assert run.returncode == 0, run.stderr
     assert "warning" not in run.stdout + run.stderr
     for wanted in ("gamg", "hypre", "mumps"):
-        if wanted in words:
+        if wanted in " ".join(map(str, words)):
             assert wanted in run.stdout
