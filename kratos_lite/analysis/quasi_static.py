@@ -313,6 +313,24 @@ class QuasiStaticAnalysis:
         values |= named(self.states)
         return State("model", "quasi_static", self.time, self.step, values, self.parts)
 
+    def check_state(self, state: State) -> State:
+        """Return a state of this model.
+
+        Parameters
+        ----------
+        state : any.
+
+        Raises
+        ------
+        InputError
+            It is of another mesh, other elements or laws, or of no quasi-static analysis.
+        """
+        now = self.state()
+        checked = check_state(state, "model", {name: np.shape(value) for name, value in now.values.items()})
+        if checked.integrator != "quasi_static":
+            raise InputError(f"this state was made by {state.integrator}, not by a quasi-static analysis")
+        return checked
+
     def restore(self, state: State) -> None:
         """Go on from a state of this model.
 
@@ -325,11 +343,7 @@ class QuasiStaticAnalysis:
         InputError
             It is no such state.
         """
-        now = self.state()
-        check_state(state, "model", {name: np.shape(value) for name, value in now.values.items()})
-        if state.integrator != "quasi_static":
-            raise InputError(f"this state was made by {state.integrator}, not by a quasi-static analysis")
-        get = state.values
+        get = self.check_state(state).values
         self.u = self.system.gather(get["u"]).copy()
         self.load, self.internal, self.work = get["load"].copy(), get["internal"].copy(), float(get["work"])
         self.states = unnamed(get, self.states)

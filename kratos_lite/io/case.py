@@ -56,6 +56,8 @@ class TimeIntegration:
         does.
     restart : file of a state from which to go on, or None.
     place : of the step in its file, for messages.
+    quasi_static : of models: options of `Model.quasi_static`, whose steps are taken; None for a transient.
+    start : s, of quasi-static steps.
     """
 
     step: float
@@ -70,6 +72,8 @@ class TimeIntegration:
     balanced: bool = True
     restart: str | None = None
     place: str = ""
+    quasi_static: dict[str, Any] | None = None
+    start: float = 0.0
 
     def __post_init__(self) -> None:
         positive_step(self.step)
@@ -95,6 +99,7 @@ class TimeIntegration:
 
     def __str__(self) -> str:
         by = f" by {self.integrator}" if self.integrator else ""
+        by = by if self.quasi_static is None else ", quasi-static"
         return f"{self.steps} steps of {self.step:g} s{by}"
 
 
@@ -162,13 +167,13 @@ class Case:
 
     @property
     def analysis(self) -> str:
-        """The analysis: ``static``, ``steady``, ``transient``, ``modal`` or ``bodies``."""
+        """The analysis: ``static``, ``steady``, ``quasi_static``, ``transient``, ``modal`` or ``bodies``."""
         if not self.is_of_model:
             return "bodies"
         if self.modes:
             return "modal"
         if self.time is not None:
-            return "transient"
+            return "transient" if self.time.quasi_static is None else "quasi_static"
         return "static" if self.model.motion is None else "steady"
 
     @property

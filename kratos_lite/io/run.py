@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import Any
 
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.io.case import Case
+from kratos_lite.io.case import Case, TimeIntegration
 from kratos_lite.io.outputs import check_outputs
 from kratos_lite.io.runners.outcome import Outcome
 from kratos_lite.model.structure import Structure
@@ -20,6 +20,7 @@ ANALYSES = {
     "steady": "at_rest",
     "modal": "modal",
     "transient": "transient",
+    "quasi_static": "quasi_static",
     "bodies": "bodies",
 }
 """The module of `kratos_lite.io.runners` that runs each analysis."""
@@ -27,6 +28,7 @@ NOT_OF_PETSC = {
     "bodies": "a body",
     "steady": "a motion of the material",
     "transient": "an integration in time",
+    "quasi_static": "quasi-static steps",
     "modal": "natural frequencies",
 }
 """What cases are that the backend PETSc does not solve."""
@@ -92,6 +94,8 @@ def check_case(case: Case) -> None:
         if case.error is not None:
             raise InputError("backend='petsc' solves on the mesh as it is; leave the requested error out")
     if isinstance(case.subject, Structure):
+        if case.time is not None and case.analysis == "quasi_static" and _moves(case.time):
+            raise InputError("quasi-static steps have no integrator, damping and mass; leave them out")
         return
     from kratos_lite.bodies import Body  # a model at rest starts quicker without it
 
@@ -101,8 +105,12 @@ def check_case(case: Case) -> None:
         raise InputError(
             "a body needs a time integration, and has no natural frequencies: kl.Case(body, time=…)"
         )
-    if case.time.integrator is not None or any(case.time.rayleigh) or case.time.lumped:
+    if _moves(case.time):
         raise InputError("a body has its own integrator, damping and mass: set them on the body")
+
+
+def _moves(time: TimeIntegration) -> bool:
+    return time.integrator is not None or any(time.rayleigh) or time.lumped
 
 
 def prepare(case: Case, progress: Progress | None = None) -> tuple[Any, Iterator[Any]]:

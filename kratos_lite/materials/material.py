@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import MISSING, fields
 from functools import cached_property
 from sys import float_info
 from typing import Any, ClassVar, TypeAlias
@@ -264,7 +265,7 @@ class Material:
 
         Parameters
         ----------
-        values : variables by name; the density may be missing and is 0 then.
+        values : variables by name; those of constants that have a default may be missing.
 
         Returns
         -------
@@ -276,7 +277,7 @@ class Material:
             If a variable is missing or outside its bounds.
         """
         constants = {field: values[name] for field, name in cls.variables.items() if name in values}
-        needed = {name for name in names_of(cls) if name != "density"}
+        needed = {f.name for f in fields(cls) if f.default is MISSING} - {"density"}  # type: ignore[arg-type]
         absent = sorted(needed - constants.keys())
         missing = [f"{field} ({cls.variables.get(field, field)})" for field in absent]
         if missing:

@@ -125,7 +125,7 @@ def material_from(values: dict[str, Any]) -> Material:
     if name not in MATERIALS:
         known = [*MATERIALS, *(alias for m in MATERIALS for alias in MATERIALS.aliases(m))]
         raise MaterialError(
-            f"CONSTITUTIVE_LAW {name!r} is not a linear elastic law that kratos_lite has "
+            f"CONSTITUTIVE_LAW {name!r} is not a law that kratos_lite has "
             f"({', '.join(MATERIALS)} and their Kratos names);{nearest(name, known)} "
             "choose one of them, or give a material with --material"
         )
@@ -209,9 +209,11 @@ def _use_material(entry: Settings, properties: Properties, notes: list[str]) -> 
     body = entry.section("Material", required=True)
     law = body.section("constitutive_law", required=True)
     name = law.text("name").rsplit(".", 1)[-1]
-    text = f"part {part}: {name!r} is not a linear elastic law that kratos_lite has"
-    cure = "use LinearElastic3DLaw, or solve this part with Kratos"
-    law.expect(name in MATERIALS, "name", f"{text}; {cure}")
+    if name.endswith("Factory"):  # Kratos puts the name of the law together
+        name = name.removesuffix("Factory") + "3D" + law.text("yield_surface") + law.text("plastic_potential")
+    known = [*MATERIALS, *(alias for m in MATERIALS for alias in MATERIALS.aliases(m))]
+    text = f"part {part}: {name!r} is not a law that kratos_lite has;{nearest(name, known)}"
+    law.expect(name in MATERIALS, "name", f"{text} Choose one, or solve this part with Kratos")
     variables = body.section("Variables")
     values = {key.rsplit(".", 1)[-1]: _variable(variables, key) for key in variables.values}
     if body.section("Tables").values:

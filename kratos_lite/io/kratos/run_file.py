@@ -1,6 +1,6 @@
 """Kratos run files: ``ProjectParameters.json`` with its materials file and its mesh.
 
-Linear solids at rest or in time, in the style of 2019 and in the present one.
+Solids at rest, in quasi-static steps or in time, in the style of 2019 and in the present one.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from kratos_lite.io.formats.document import Document
 from kratos_lite.io.formats.part_files import part_files, read_part
 from kratos_lite.io.kratos.context import RunContext, module_of, times_of
 from kratos_lite.io.kratos.expected_values import COMPARISONS, Comparison
+from kratos_lite.io.kratos.laws import is_nonlinear, make_linear, quasi_static_of
 from kratos_lite.io.kratos.motion import add_motion
 from kratos_lite.io.kratos.processes import PROCESSES, Action, actions_of, run
 from kratos_lite.io.kratos.properties import use_materials
@@ -66,26 +67,32 @@ def read_kratos_project(
     times = times_of(settings.section("problem_data", required=True), solver)
     dynamic = solver.text("solver_type") in DYNAMIC
     notes = _check_solver(solver) + _check_root(settings)
-    if not dynamic:
-        text = "supports, loads and motion are taken at the end of the run"
-        notes.append(f"{text}: those at t = {times[-1]:g} s")
     document = _read_mesh(solver, folder, allow_outside, notes, part)
-    if not linear:
-        _check_strains(solver, document)
     root, moved = solver.text("model_part_name", "Structure"), solver.flag("move_mesh_flag", True)
     context = RunContext(document.mesh, root, folder, times, moved, allow_outside)
     _use_materials(solver, context, document, notes)
+    small = linear or solver.text("analysis_type", "non_linear") == "linear"
+    notes += make_linear(document) if small else []
+    nonlinear = is_nonlinear(document)
+    if not small and not nonlinear:
+        notes.append("analysis_type is non_linear: the linear solution is computed, on the undeformed body")
+    steps = quasi_static_of(solver, times) if nonlinear and not dynamic else None
+    in_steps = steps is not None and len(times) > 2
+    if not dynamic and not in_steps:
+        text = "supports, loads and motion are taken at the end of the run"
+        notes.append(f"{text}: those at t = {times[-1]:g} s")
     actions, checks = _read_processes(settings, context, notes)
-    in_time = ProcessesInTime(actions, context) if dynamic else None
+    in_time = ProcessesInTime(actions, context, dynamic) if dynamic or in_steps else None
     processes = partial(run, actions, context, notes) if in_time is None else in_time.prepare
-    initial_displacement = initial_displacement and not dynamic
+    initial_displacement = initial_displacement and in_time is None
     model = model_from(document, initial_displacement=initial_displacement, processes=processes)
-    add_motion(model, settings, None if dynamic else times[-1])
+    add_motion(model, settings, None if in_time else times[-1])
     model.notes += notes
     if in_time is None:
         return Case(model, expected=checks, files=settings.files)
     in_time.finish(model)
-    return Case(model, time_integration_of(settings, in_time), expected=checks, files=settings.files)
+    time = time_integration_of(settings, in_time) if dynamic else steps
+    return Case(model, time, expected=checks, files=settings.files)
 
 
 def _check_root(settings: Settings) -> list[str]:
@@ -100,7 +107,7 @@ def _check_root(settings: Settings) -> list[str]:
 
 
 def _check_solver(solver: Settings) -> list[str]:
-    """Refuse what is not a linear solid in three dimensions; note what is treated otherwise."""
+    """Refuse what is not a solid in three dimensions; note what is treated otherwise."""
     kind, analysis = solver.text("solver_type"), solver.text("analysis_type", "non_linear")
     text = f"solver_type {kind!r}: run files are solved as 'static' or 'dynamic'"
     is_solved = kind in ("Static", "static", *DYNAMIC)
@@ -114,22 +121,8 @@ def _check_solver(solver: Settings) -> list[str]:
         solver.expect(not solver.values.get(key), key, text)
     known = (*HARMLESS, *OTHER_PHYSICS, *(DYNAMIC_KEYS if kind in DYNAMIC else ()))
     notes = [f"solver setting {key!r} is not used.{nearest(key, known)}" for key in solver.unknown(known)]
-    if analysis == "non_linear":
-        notes.append("analysis_type is non_linear: the linear solution is computed, on the undeformed body")
     chosen = solver.section("linear_solver_settings").text("solver_type", "")
     return notes + ([f"linear solver {chosen}: kratos_lite chooses its own"] if chosen else [])
-
-
-def _check_strains(solver: Settings, document: Document) -> None:
-    """Refuse elements of large strains in a nonlinear analysis: their linear solution is another one."""
-    large = ("TotalLagrangian", "UpdatedLagrangian")
-    names = [block.name for block in document.mesh.blocks if len(block) and block.name.startswith(large)]
-    text = (
-        f"elements {', '.join(names)} with 'non_linear' have large deformations, which are not here yet; for "
-        "the linear solution set 'linear', or give linear=True (--linear)"
-    )
-    is_linear = solver.text("analysis_type", "non_linear") == "linear"
-    solver.expect(is_linear or not names, "analysis_type", text)
 
 
 def part_files_of(run_file: Path) -> dict[int, Path]:

@@ -1,7 +1,7 @@
 """Kratos run files in time: integrator, damping and steps; what processes fix, set and load on the way.
 
 Kratos runs all processes before every time step, in order; values stay until they are set again.  It starts
-with the acceleration 0, as if nothing acted at the start: so loads act here from the first step on.
+motions with the acceleration 0, as if nothing acted at the start: so loads act here from the first step on.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ UNPRESCRIBED = ("VELOCITY", "ACCELERATION")
 
 
 class ProcessesInTime:
-    """The processes of a run file as supports, loads and initial state of a transient."""
+    """The processes of a run file as supports, loads and initial state of a transient, or of static steps."""
 
-    def __init__(self, actions: Sequence[Action], context: RunContext) -> None:
-        self.context = context
+    def __init__(self, actions: Sequence[Action], context: RunContext, dynamic: bool = True) -> None:
+        self.context, self.dynamic = context, dynamic
         self.notes = notes_of(actions, context)
         self.actions = [action for action in actions if action.steps and len(action.indices)]
         self._later: list[Load] = []
@@ -49,7 +49,8 @@ class ProcessesInTime:
     def prepare(self, values: Variables) -> None:
         """Bring values and supports to what stays in time, and keep what changes for `finish`."""
         self._check(values)
-        self._begin(values)
+        if self.dynamic:
+            self._begin(values)
         base, times = values.copy(), self.context.times
         set_values(self.actions, times, values)
         for action in self.actions:
@@ -62,20 +63,22 @@ class ProcessesInTime:
             actions = [action for action in self.actions if action.component in group]
             if any(action.mentions("t") or not self._acts_always(action) for action in actions):
                 if group is SURFACE:
-                    values.note_idle(self.notes)
+                    values.note_idle(self.notes, follows=not self.dynamic)
                 values.drop(group)
                 self._later.append(TimeDependentLoad(_load_in_time(actions, times, base, load_of)))
         values.drop({f"{name}_{axis}" for name in UNPRESCRIBED for axis in "XYZ"})
 
     def finish(self, model: Model) -> None:
         """Give a model the loads and supports that change, and let all loads begin with the first step."""
-        loads: list[Load] = [ScaledLoad(load, lambda time: float(time > 0)) for load in model.loads]
+        loads: list[Load] = list(model.loads)
+        if self.dynamic:
+            loads = [ScaledLoad(load, lambda time: float(time > 0)) for load in loads]
         model.loads[:] = [*loads, *self._later]
         for indices, axis, motion in self._moving:
             model.fix(indices, axis, motion, override=True)
-        if model.loads:
+        if self.dynamic and model.loads:
             model.notes.append("as in Kratos, the acceleration at the start is 0: loads act after t = 0")
-        if self._moving:
+        if self.dynamic and self._moving:
             text = "supports that move have the velocity of their function"
             model.notes.append(f"{text}; Kratos takes Newmark's formulas")
         model.notes += self.notes
@@ -89,14 +92,15 @@ class ProcessesInTime:
                 f"{name} cannot be fixed; prescribe DISPLACEMENT as a function of t, or give "
                 '"constrained": false and "interval": [0.0, 0.0] for an initial value'
             )
-            expect(not (action.fixed and name.startswith(UNPRESCRIBED)), "variable_name", text)
+            prescribed = self.dynamic and action.fixed and name.startswith(UNPRESCRIBED)
+            expect(not prescribed, "variable_name", text)
             text = (
                 f"{name} is fixed in a part of the run only; fix it from start to end, "
                 '"interval": [0.0, "End"], or give "constrained": false for an initial value'
             )
             is_support = action.fixed and name.startswith("DISPLACEMENT")
             expect(not is_support or self._acts_always(action), "interval", text)
-        for name, fixed in values.fixed.items():
+        for name, fixed in values.fixed.items() if self.dynamic else ():
             if name.startswith(UNPRESCRIBED) and fixed.any():
                 raise InputError(f"{values.mesh.source}: {name} is fixed; only DISPLACEMENT can be")
 
@@ -165,7 +169,7 @@ def _load_in_time(
         return load_of(values)
 
     def at(time: float) -> Load | None:
-        if not time > 0:
+        if not time > times[0]:
             return None
         last = [_last_time(action, times, float(time)) for action in actions]
         acting = sorted((when, i) for i, when in enumerate(last) if when is not None)

@@ -115,7 +115,7 @@ class Variables:
         for load in (self.gravity(), self.condition_loads()):
             if load is not None:
                 model.add(load)
-        self.note_idle(model.notes)
+        self.note_idle(model.notes, follows=model.is_nonlinear)
         for name in sorted({*self.nodal, *self.conditional} - LOADING):
             if self.nodal.scalar(name).any() or self.conditional.scalar(name).any():
                 model.notes.append(f"{name} is set in the file; a static linear solution does not use it")
@@ -146,15 +146,15 @@ class Variables:
         is_loaded = len(carriers) > 0 and any(value.any() for value in values)
         return ConditionLoads(force, nodal_force, pressure, nodal_pressure) if is_loaded else None
 
-    def note_idle(self, notes: list[str]) -> None:
-        """Note loads where nothing carries them, and pressures that follow the deformed faces in Kratos.
+    def note_idle(self, notes: list[str], *, follows: bool = False) -> None:
+        """Note loads where nothing carries them, and pressures that follow the deformed faces in Kratos only.
 
         Kratos adds the stiffness of such a pressure to K even in a linear analysis; its small-displacement
         conditions do not.
         """
         self._note_uncarried(notes)
         loads = self.condition_loads()
-        if loads is not None and (loads.pressure.any() or loads.nodal_pressure.any()):
+        if not follows and loads is not None and (loads.pressure.any() or loads.nodal_pressure.any()):
             kinds = {block.name for block in self.mesh.conditions if len(block)}
             for name in sorted(kind for kind in kinds if kind.startswith("SurfaceLoadCondition")):
                 how = f"acts on the undeformed body, as that of SmallDisplacement{name} in Kratos"

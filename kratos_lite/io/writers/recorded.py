@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from kratos_lite.analysis.fields import FIELDS, fields, listed
+from kratos_lite.analysis.quasi_static import QuasiStaticAnalysis
 from kratos_lite.analysis.state import State, at, check_state_of_body
 from kratos_lite.analysis.transient import TransientAnalysis
 from kratos_lite.bodies import Body
@@ -85,7 +86,7 @@ class RecordedModel:
     columns: tuple[str, ...] = OF_MODELS
     names: tuple[str, ...] = ("time", "step", "u", "v", "a", "reactions")
 
-    def __init__(self, transient: TransientAnalysis) -> None:
+    def __init__(self, transient: Any) -> None:
         self.transient = transient
 
     def now(self) -> Any:
@@ -94,11 +95,13 @@ class RecordedModel:
 
     def checked(self, state: Any) -> State:
         """Return a state of the model; InputError for another."""
-        return self.transient.check_state(state)
+        checked: State = self.transient.check_state(state)
+        return checked
 
     def mesh(self) -> Mesh:
         """Return the mesh of the model."""
-        return self.transient.equations.model.mesh
+        mesh: Mesh = self.transient.equations.model.mesh
+        return mesh
 
     def fields(self, state: Any) -> tuple[dict[str, Array], dict[str, Array]]:
         """Return DISPLACEMENT, VELOCITY, ACCELERATION, REACTION and stresses."""
@@ -116,14 +119,37 @@ class RecordedModel:
         return {}
 
 
+class RecordedSteps(RecordedModel):
+    """Quasi-static steps of a model."""
+
+    columns: tuple[str, ...] = ("time [s]", "work [J]", *OF_MODELS[2:])
+    names: tuple[str, ...] = ("time", "step", "u", "reactions", "work")
+
+    def mesh(self) -> Mesh:
+        """Return the mesh of the model."""
+        mesh: Mesh = self.transient.model.mesh
+        return mesh
+
+    def fields(self, state: Any) -> tuple[dict[str, Array], dict[str, Array]]:
+        """Return DISPLACEMENT, REACTION and stresses."""
+        return fields(self.transient.result(state))
+
+    def row(self, state: Any) -> Array:
+        """Return time, work of loads and supports, largest displacement and total reaction."""
+        largest = np.linalg.norm(state.u, axis=1).max()
+        return np.array([state.time, state.work, largest, *state.reactions.sum(axis=0)])
+
+
 Recorded: TypeAlias = "RecordedBody | RecordedModel"
 """What is recorded of a subject in time; its `names` of arrays are attributes of a state."""
 
 
-def recorded(subject: Body | TransientAnalysis, path: str | Path) -> Recorded:
-    """Return what a subject offers; InputError for one that is no body and no transient."""
+def recorded(subject: Body | TransientAnalysis | QuasiStaticAnalysis, path: str | Path) -> Recorded:
+    """Return what a subject offers; InputError for one that is no body and no model in time."""
     if isinstance(subject, TransientAnalysis):
         return RecordedModel(subject)
+    if isinstance(subject, QuasiStaticAnalysis):
+        return RecordedSteps(subject)
     if isinstance(subject, Body):
         return RecordedBody(subject, path)
     raise InputError(

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from kratos_lite.analysis.quasi_static import QuasiStaticAnalysis
 from kratos_lite.analysis.transient import TransientAnalysis
 from kratos_lite.atomic import refuse_nan, write_arrays
 from kratos_lite.bodies import Body
@@ -105,7 +106,8 @@ class SeriesWriter:
     - ``.csv``: a table with a line for each state: time, energies, mass center, momenta; of a transient time,
       energy, largest displacement, total reaction.
     - ``.npz``: arrays with a row for each state: ``time``, ``step``, and ``q``, ``u``, ``external_work`` of a
-      body, or ``u``, ``v``, ``a``, ``reactions`` of a transient.
+      body, or ``u``, ``v``, ``a``, ``reactions`` of a transient, or ``u``,
+      ``reactions``, ``work`` of quasi-static steps.
 
     The folder is made if it is missing.  Every file is written as a whole or not at all.  Index, page, table
     and arrays come at the end, also when the loop ends early or by an error: then they hold the states up to
@@ -114,7 +116,7 @@ class SeriesWriter:
     Parameters
     ----------
     path : the file to write.
-    owner : the body whose states come, many at once only as ``.npz``; or the transient.
+    owner : the body whose states come, many at once only as ``.npz``; the transient or quasi-static analysis.
     mode : of ``.vtu`` files: ``binary``, ``compressed`` or ``ascii``.
 
     Raises
@@ -139,7 +141,9 @@ class SeriesWriter:
     ['spin.pvd', 'spin_00000.vtu', 'spin_00001.vtu', 'spin_00002.vtu']
     """
 
-    def __init__(self, path: str | Path, owner: Body | TransientAnalysis, *, mode: str = "binary") -> None:
+    def __init__(
+        self, path: str | Path, owner: Body | TransientAnalysis | QuasiStaticAnalysis, *, mode: str = "binary"
+    ) -> None:
         path = path_of(path)
         check_series(path)
         self.count = 0

@@ -1,0 +1,89 @@
+"""Laws and strains of Kratos run files: what is solved in quasi-static steps, and what is made linear."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from kratos_lite.elements import ELEMENTS
+from kratos_lite.errors import KratosLiteError, ModelError
+from kratos_lite.io.case import TimeIntegration
+from kratos_lite.io.formats.document import Document, Properties
+from kratos_lite.io.kratos.properties import material_from, names_material
+from kratos_lite.io.settings import Settings
+from kratos_lite.materials import Material
+from kratos_lite.mesh import distinct
+
+CRITERIA = ("residual_criterion", "displacement_criterion", "and_criterion", "or_criterion")
+STRATEGIES = ("newton_raphson", "line_search", "linear")
+LOOSEST, TIGHTEST = 1e-8, 1e-10
+"""Relative residuals between which that of a file is taken: a looser one would miss what it stands for."""
+ITERATIONS = 25
+"""Corrections of a step that are allowed at least, as residuals are smaller than those of files."""
+
+
+def is_nonlinear(document: Document) -> bool:
+    """Return whether an element of a document has large displacements, or a law that is not linear."""
+    blocks = (block.name for block in document.mesh.blocks if len(block))
+    if any(name in ELEMENTS and ELEMENTS[name].finite for name in blocks):
+        return True
+    return any(not _is_linear(material) for _, material in _materials(document))
+
+
+def make_linear(document: Document) -> list[str]:
+    """Give a document elements and laws of small strains, with their elasticity at rest; return notes."""
+    notes, blocks = list[str](), list(document.mesh.blocks)
+    for i, block in enumerate(blocks):
+        if len(block) and block.name in ELEMENTS and ELEMENTS[block.name].finite:
+            name = ELEMENTS[block.name].__mro__[1].__name__
+            blocks[i] = replace(block, name=name)
+            notes.append(f"{block.name} is solved as {name} with small displacements")
+    document.mesh = document.mesh.replace(blocks=blocks)
+    for properties, material in _materials(document):
+        if not _is_linear(material):
+            law, number = properties.values["CONSTITUTIVE_LAW"], properties.id
+            if not getattr(material, "isotropic", False) or "YOUNG_MODULUS" not in properties.values:
+                raise ModelError(f"Properties {number}: {law} has no linear solution; set 'non_linear'")
+            properties.values["CONSTITUTIVE_LAW"] = "LinearElastic3DLaw"
+            notes.append(f"Properties {number}: {law} is solved with its elasticity at rest")
+    return notes
+
+
+def _materials(document: Document) -> Iterator[tuple[Properties, Material]]:
+    """Yield the properties of elements that state a material, with it."""
+    used = {int(number) for block in document.mesh.blocks for number in distinct(block.properties)}
+    for number in sorted(used & document.properties.keys()):
+        properties = document.properties[number]
+        if not names_material(properties.values):
+            continue
+        try:
+            material = material_from(properties.values)
+        except KratosLiteError:
+            continue  # `model_from` says where
+        yield properties, material
+
+
+def _is_linear(material: Material) -> bool:
+    return material.is_linear and material.strain_measure == "small"
+
+
+def quasi_static_of(solver: Settings, times: Sequence[float]) -> TimeIntegration:
+    """Return the steps of a static run file; InputError with the place of what is wrong."""
+    criterion = solver.text("convergence_criterion", "residual_criterion")
+    text = f"convergence_criterion {criterion!r} is not supported; take one of {', '.join(CRITERIA)}"
+    solver.expect(criterion in CRITERIA, "convergence_criterion", text)
+    strategy = solver.section("solving_strategy_settings")
+    kind = strategy.text("type", "newton_raphson")
+    text = f"the strategy {kind!r} is not supported; take one of {', '.join(STRATEGIES)}"
+    strategy.expect(kind in STRATEGIES, "type", text)
+    relative = solver.number("residual_relative_tolerance", 1e-4)
+    most = solver.integer("max_iteration", 10)
+    for key, value in (("residual_relative_tolerance", relative), ("max_iteration", most)):
+        solver.expect(value > 0, key, f"must be > 0; got {value:g}")
+    options = {
+        "tolerance": min(max(relative, TIGHTEST), LOOSEST),
+        "iterations": max(most, ITERATIONS),
+        "line_search": solver.flag("line_search", False) or kind == "line_search",
+    }
+    step = solver.section("time_stepping").number("time_step")
+    return TimeIntegration(step, len(times) - 1, quasi_static=options, start=times[0])
