@@ -26,11 +26,16 @@ WAITING: ContextVar[list[tuple[Path, Path]] | None] = ContextVar("waiting", defa
 """Written files, and those whose places they take together at the end of `all_or_none`."""
 
 
-def read_arrays(path: str | Path, names: Sequence[str], what: str) -> dict[str, Numbers]:
-    """Return arrays of an .npz file by name; InputError if it is damaged or not `what` it should be."""
+def read_arrays(
+    path: str | Path, names: Sequence[str], what: str, others: bool = False
+) -> dict[str, Numbers]:
+    """Return arrays of an .npz file by name, and all others there are if wanted.
+
+    InputError if it is damaged or not `what` it should be.
+    """
     try:
         with np.load(io.BytesIO(Path(path).read_bytes()), allow_pickle=False) as file:
-            return {name: np.asarray(file[name]) for name in names}
+            return {name: np.asarray(file[name]) for name in (*names, *(file.files if others else ()))}
     except FileNotFoundError:
         raise InputError(f"{path}: there is no such file") from None
     except Exception as error:  # whatever NumPy and zipfile raise for a damaged file

@@ -320,6 +320,10 @@ class QuasiStaticAnalysis:
         ----------
         state : any.
 
+        Returns
+        -------
+        State
+
         Raises
         ------
         InputError

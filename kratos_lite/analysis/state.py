@@ -17,6 +17,7 @@ from kratos_lite.validation import finite, number, short, whole_number
 
 BODY_FIELDS = ("q", "u", "external_work")
 MODEL_FIELDS = ("u", "v", "a", "reactions", "imbalance")
+STEP_FIELDS = ("u", "reactions", "load", "internal", "work")
 
 
 @runtime_checkable

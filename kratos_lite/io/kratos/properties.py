@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -90,11 +91,14 @@ def _array(value: Any) -> Array:
 
 def _note_unused(model: Model, properties: Properties) -> None:
     """Note values other than 0 that a static solution does not use, but for those noted by the reader."""
-    idle = []
+    idle, own = [], ELASTIC
+    with suppress(KratosLiteError):
+        own = set(material_from(properties.values).variables.values())
     for name, value in properties.values.items():
         array = _array(value)
         noted = any(f" {name} " in f" {note} " and "not used" in note for note in model.notes)
-        if name not in USED and (array.any() or not array.size) and not noted:
+        is_used = name in own or name in USED - ELASTIC
+        if not is_used and (array.any() or not array.size) and not noted:
             idle.append(name)
     if idle:
         what = f"Properties {properties.id}: {', '.join(idle)}"

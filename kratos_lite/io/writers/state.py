@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kratos_lite.analysis.state import BODY_FIELDS, MODEL_FIELDS, State
+from kratos_lite.analysis.state import BODY_FIELDS, MODEL_FIELDS, STEP_FIELDS, State
 from kratos_lite.atomic import read_arrays, write_arrays
 from kratos_lite.errors import InputError
 
@@ -53,7 +53,9 @@ def read_state(path: str | Path) -> State:
         time, step, substeps = float(head["time"]), int(head["step"]), int(head["substeps"])
     except (ValueError, TypeError, OverflowError):
         raise InputError(f"{path}: not {WHAT}") from None
-    values = read_arrays(path, MODEL_FIELDS if kind == "model" else BODY_FIELDS, WHAT)
+    fields = STEP_FIELDS if integrator == "quasi_static" else MODEL_FIELDS
+    values = read_arrays(path, fields if kind == "model" else BODY_FIELDS, WHAT, others=True)
+    values = {name: array for name, array in values.items() if name not in HEAD}
     is_counted = head["step"].dtype.kind in "iu" and 0 <= step < 2**62
     if not is_counted or head["kind"].dtype.kind != "U" or any(a.dtype != float for a in values.values()):
         raise InputError(f"{path}: not {WHAT}")

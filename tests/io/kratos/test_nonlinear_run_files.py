@@ -124,8 +124,8 @@ def test_plastic_bar_pulled_in_steps_with_files_and_expected_values(tmp_path, ru
     table = np.loadtxt(tmp_path / "a.csv", delimiter=",", skiprows=1)
     assert np.abs(table[:, 0] - np.arange(5) / 4).max() < 1e-12
     pulls = [np.interp(t, [0, Y / E / strain, 1], [0, Y, stress]) * 2.0 for t in table[:, 0]]
-    total = json.loads((tmp_path / "materials.json").read_text()) and table[:, -1]
-    assert np.abs(total).max() < 1e-6 * max(pulls)  # rollers below and above balance
+    work = np.trapezoid(pulls, 0.003 * table[:, 0])
+    assert abs(table[-1, 1] - work) < 1e-6 * work
     case = read_case(path)
     case.time = case.time.__class__(0.25, 1, quasi_static={}, restart=str(tmp_path / "a.npz"))
     assert kl.run(case).rows[0] == ("time", "1 … 1.25 s, 1 steps in 1 parts")
