@@ -14,30 +14,53 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.errors import InputError
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constraints import ConstraintMap, rigid_modes
-from kratos_lite.solvers.eigen import Operator, Pencil, Problem, dense_modes, is_small, unresisted_modes
+from kratos_lite.solvers.eigen import (
+    Operator,
+    Pencil,
+    Problem,
+    dense_modes,
+    is_small,
+    modes_near,
+    unresisted_modes,
+)
 from kratos_lite.solvers.linear_solver import LinearSolver
-from kratos_lite.solvers.plan import DENSE_MODES, stepped
+from kratos_lite.solvers.plan import DENSE_MODES, FALLBACK_LIMIT, stepped
 from kratos_lite.typing import Array, Complexes, Progress
-from kratos_lite.validation import instance, whole_number
+from kratos_lite.validation import instance, number, whole_number
 
 
 def natural_modes(
-    model: Structure, count: int, lumped: bool = False, progress: Progress | None = None
+    model: Structure,
+    count: int,
+    lumped: bool = False,
+    near: float | None = None,
+    progress: Progress | None = None,
 ) -> tuple[Array, Array]:
     """Return frequencies (count,) in rad/s and shapes (count, n, 3) of K φ = ω² M φ; see `Model.modes`."""
+    near = None if near is None else number(near, "near", least=0, unit="rad/s")
+    solver = "auto" if near is None else "direct"
     phase = Phases(progress)
     with phase("check"):
-        e = EquationsOfMotion(model, lumped=lumped, solver="auto", progress=progress)
+        e = EquationsOfMotion(model, lumped=lumped, solver=solver, progress=progress)
     constraints, n = e.system.constraint_map, len(e.system.constraint_map.free)
+    if near is not None and n > FALLBACK_LIMIT:
+        raise InputError(
+            f"modes near a frequency take a factorization, of up to {FALLBACK_LIMIT} unknowns; got {n}; take "
+            "a coarser mesh, or leave near out for the lowest modes"
+        )
     with phase("assemble"):
         small = is_small(n, count)
-        solver, M = e.system.equations, e.mass.scalar
+        equations, M = e.system.equations, e.mass.scalar
     with phase("modes"):
-        if small:
-            K, M = solver.reduced_matrix, constraints.reduce_matrix(e.mass.matrix())
+        if near is not None:
+            omega, shapes = modes_near(
+                equations.reduced_matrix, constraints.reduce_matrix(e.mass.matrix()), count, near
+            )
+        elif small:
+            K, M = equations.reduced_matrix, constraints.reduce_matrix(e.mass.matrix())
             omega, shapes = dense_modes(K if isinstance(K, np.ndarray) else K.toarray(), M.toarray(), count)
         else:
-            omega, shapes = _by_iteration(e, solver, count, progress)
+            omega, shapes = _by_iteration(e, equations, count, progress)
     return omega, expanded(e, shapes)
 
 

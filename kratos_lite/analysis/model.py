@@ -262,7 +262,12 @@ class Model(Structure):
         return QuasiStaticAnalysis(self, **options)
 
     def modes(
-        self, count: int = 6, *, lumped: bool = False, progress: Progress | None = None
+        self,
+        count: int = 6,
+        *,
+        near: float | None = None,
+        lumped: bool = False,
+        progress: Progress | None = None,
     ) -> tuple[Array, Array]:
         """Return natural frequencies and mode shapes.
 
@@ -272,6 +277,7 @@ class Model(Structure):
         Parameters
         ----------
         count : number of modes.
+        near : rad/s, find the modes nearest to this frequency; the lowest if not given.
         lumped : concentrate the mass at the nodes.
         progress : called with the phase and the fraction done, 0 … 1.
 
@@ -283,14 +289,14 @@ class Model(Structure):
         Raises
         ------
         MeshError, ModelError, InputError
-            If the model is broken, has no mass, or has fewer modes.
+            If the model is broken, has no mass, has fewer modes, or is too large to factorize for `near`.
         SolveError
             If the iteration does not converge, or what it finds does not satisfy the equations.
         """
         from kratos_lite.analysis.modal import natural_modes
 
         with watched(progress) as shown:
-            return natural_modes(self, count, lumped, shown)
+            return natural_modes(self, count, lumped, near, shown)
 
     def complex_modes(
         self, count: int = 6, *, progress: Progress | None = None

@@ -23,7 +23,7 @@ import numpy as np
 from kratos_lite.errors import InputError, SolveError
 from kratos_lite.solvers import direct
 from kratos_lite.solvers.plan import DENSE_MODES
-from kratos_lite.typing import Array, Complexes, Csr, Progress
+from kratos_lite.typing import Array, Complexes, Csr, Ints, Progress
 from kratos_lite.validation import whole_number
 
 Operator: TypeAlias = Callable[[Array], Array]
@@ -64,6 +64,52 @@ def modes(K: Csr, M: Csr, count: int, progress: Progress | None = None) -> tuple
     problem = Problem(n, lambda X: (A @ X.T).T, lambda X: (M @ X.T).T, solve, norms, progress=progress)
     squares, shapes = problem.lowest(count)
     return np.sqrt(np.maximum(squares - shift, 0.0)), shapes.T
+
+
+def modes_near(K: Csr, M: Csr, count: int, near: float) -> tuple[Array, Array]:
+    """Return the ω (count,) nearest to one in rad/s, ascending, and their shapes (n, count).
+
+    Lanczos' method with factors of K - σ M finds what lies nearest in ω² to σ.  Then it looks beside the
+    modes known, from another vector at random, until all that it finds is farther in ω than those chosen.
+    """
+    from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
+
+    n = K.shape[0]
+    if is_small(n, count):
+        omega, X = dense_modes(K.toarray(), M.toarray(), n)
+        chosen = _nearest(omega, near, count)
+        return omega[chosen], X[:, chosen]
+    shift = near**2 + 1e-2 * first_shift(K, M)  # neither at a mode nor at 0, where those of free bodies are
+    factors = direct.factorize((K - shift * M).tocsr(), symmetric=False)
+    squares, X, complete = np.zeros(0), np.zeros((n, 0)), False
+    while not complete:
+
+        def inverse(f: Array) -> Array:
+            x = factors.solve(f)
+            return np.asarray(x - X @ ((M @ X).T @ x))  # noqa: B023
+
+        operator, start = LinearOperator((n, n), inverse, dtype=np.float64), _random(1 + len(squares), n)[0]
+        try:
+            found, Y = eigsh(K, count + GUARDS, M, shift, v0=inverse(M @ start), OPinv=operator)
+        except ArpackError:
+            raise not_converged(count) from None
+        first, radius = not len(squares), np.abs(found - shift).min()  # in ω², within which are no others
+        squares, X = np.append(squares, found), np.hstack([X, Y])
+        omega = np.sqrt(np.maximum(squares, 0.0))
+        chosen = _nearest(omega, near, count)
+        far = np.abs(omega[chosen] - near).max()
+        low, high = max(near - far, 0.0) ** 2, (near + far) ** 2
+        complete = not first and shift - radius <= low and high <= shift + radius
+    Y = factors.solve(M @ X[:, chosen])  # once more: high modes, in which rounding tells most, leave
+    squares, C = _ritz(Y.T @ (K @ Y), Y.T @ (M @ Y), count)
+    check_residuals([(np.ones(count), K), (-squares, M)], Y @ C)
+    return np.sqrt(np.maximum(squares, 0.0)), Y @ C
+
+
+def _nearest(omega: Array, near: float, count: int) -> Ints:
+    """Return the places (count,) of the frequencies nearest to one, by frequency."""
+    chosen = np.argsort(np.abs(omega - near), kind="stable")[:count]
+    return chosen[np.argsort(omega[chosen], kind="stable")]
 
 
 def is_small(n: int, count: int) -> bool:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
+from kratos_lite.analysis import modal
 from kratos_lite.analysis.modal import critical_rate
 from kratos_lite.errors import SolveError
 from kratos_lite.mesh.refinement import refine
@@ -63,6 +64,54 @@ def test_random_models_have_the_modes_of_lapack(seeds, monkeypatch):
         monkeypatch.setattr(eigen, "DENSE_MODES", 0)
         squares = model.modes(count, lumped=lumped)[0] ** 2
         np.testing.assert_allclose(squares, exact, rtol=4e-8, atol=roundoff, err_msg=f"seed {seed}")
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_modes_near_a_frequency_are_those_of_lapack(seed, monkeypatch):
+    """At a mode, between two, and below all of them: the same distances, to the rounding of the stiffness."""
+    model, lumped = random_model(seed)
+    count = 3
+    monkeypatch.setattr(eigen, "DENSE_MODES", 3000)
+    free = len(model.supports.constraint_map(np.arange(model.mesh.n_nodes)).free)
+    omega = model.modes(free // 4, lumped=lumped)[0]
+    rounding = 1e-13 * model.modes(1, lumped=lumped, near=1e12)[0][0] ** 2
+    for near in (omega[0], omega[-2], 0.3 * omega[-3] + 0.7 * omega[-2], 0.0):
+        squares = {}
+        for limit in (3000, 0):
+            monkeypatch.setattr(eigen, "DENSE_MODES", limit)
+            found, shapes = model.modes(count, lumped=lumped, near=near)
+            squares[limit] = np.sort(np.abs(found**2 - near**2))
+        np.testing.assert_allclose(squares[0], squares[3000], rtol=1e-8, atol=rounding)
+        assert (np.diff(found) >= 0).all()
+        assert shapes.shape == (count, model.mesh.n_nodes, 3)
+
+
+def test_modes_near_a_frequency_of_a_larger_body():
+    """The same as those counted from the lowest; the double ones both."""
+    model = kl.Model(kl.box((1, 1, 2), (6, 6, 12)), kl.Isotropic3D(nu=0.3, **STEEL))
+    model.fix("z-")
+    omega, shapes = model.modes(12)
+    near, found = model.modes(4, near=float(omega[5:9].mean()))
+    chosen = np.sort(np.argsort(np.abs(omega - omega[5:9].mean()))[:4])
+    np.testing.assert_allclose(near, omega[chosen], rtol=1e-9)
+    mass = model.transient().equations.mass
+    overlap = np.array([[a.ravel() @ mass.times(b.ravel()) for b in shapes] for a in found])
+    np.testing.assert_allclose((overlap**2).sum(axis=1), 1.0, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("near", "words"),
+    [
+        (-1.0, "near must be one number ≥ 0, in rad/s; got -1.0"),
+        ("low", "near must be"),
+        (np.inf, "near"),
+        (1.0, "take a factorization, of up to 20 unknowns; got 24; take a coarser mesh"),
+    ],
+)
+def test_what_has_no_modes_near_a_frequency(near, words, monkeypatch):
+    monkeypatch.setattr(modal, "FALLBACK_LIMIT", 20)
+    with pytest.raises(kl.InputError, match=words):
+        kl.Model(kl.box(), kl.Isotropic3D(nu=0.3, **STEEL)).modes(1, near=near)
 
 
 def test_modes_of_larger_bodies_by_closed_forms():
