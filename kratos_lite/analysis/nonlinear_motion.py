@@ -17,6 +17,7 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.constitutive import Constitutive, States, named, unnamed
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.gauss_point_fields import totals
+from kratos_lite.errors import SolveError
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.linear_solver import LinearSolver
 from kratos_lite.solvers.newton import forcing, newton
@@ -96,8 +97,13 @@ class NonlinearMotion(EquationsOfMotion):
             solver = replace(self._linear, K=known[1])
             return solver.solve(known[0], forcing(residuals, TOLERANCE), None, jump, jump).x
 
-        rest = np.zeros(self.size)
-        return newton(rest, evaluate, correction, TOLERANCE, ITERATIONS, int(prescribed.any()))[0]
+        rest, least = np.zeros(self.size), int(prescribed.any())
+        try:
+            return newton(rest, evaluate, correction, TOLERANCE, ITERATIONS, least)[0]
+        except SolveError as error:
+            raise SolveError(
+                f"the step from t = {before.time:g} s to {end:g} s has no solution: {error}; take smaller steps"
+            ) from None
 
     def commit(self, u: Array, time: float) -> None:
         """Let the states at displacements (3a,) be those from which the next step starts."""
