@@ -102,7 +102,8 @@ class NonlinearMotion(EquationsOfMotion):
             return newton(rest, evaluate, correction, TOLERANCE, ITERATIONS, least)[0]
         except SolveError as error:
             raise SolveError(
-                f"the step from t = {before.time:g} s to {end:g} s has no solution: {error}; take smaller steps"
+                f"the step from t = {before.time:g} s to {end:g} s has no solution: {error}; take smaller "
+                "steps"
             ) from None
 
     def commit(self, u: Array, time: float) -> None:
