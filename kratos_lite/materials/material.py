@@ -89,6 +89,12 @@ class Material:
             raise MaterialError(
                 f"{cls.__name__}.strain_measure is 'small' or 'finite'; got {cls.strain_measure!r}"
             )
+        sizes = cls.internal_variables
+        if not isinstance(sizes, Mapping) or not all(isinstance(size, int) for size in sizes.values()):
+            raise MaterialError(
+                f"{cls.__name__}.internal_variables is name → numbers at each Gauss point, such as "
+                f"{{'plastic_strain': 6}}; got {sizes!r}"
+            )
         MATERIALS.add(cls.__name__, cls, cls.__dict__.get("aliases", ()))
 
     def __post_init__(self) -> None:
@@ -99,6 +105,10 @@ class Material:
             size: Any = abs(value)
             if not size <= MAX_FLOAT:
                 raise MaterialError(f"{self._name(name)} must be finite; got {value}")
+        if not hasattr(self, "density"):
+            raise MaterialError(
+                f"{type(self).__name__} has no density: add density: float = 0.0 to its constants"
+            )
         if self.density < 0:
             raise MaterialError(
                 f"{self._name('density')} {self.density:g} must be ≥ 0 kg/m³; reverse gravity instead"
@@ -188,9 +198,9 @@ class Material:
         """
         answer = self.response(strain, state, dt)
         if not isinstance(answer, tuple) or len(answer) != 3:
+            found = f"{len(answer)} values" if isinstance(answer, tuple) else type(answer).__name__
             raise MaterialError(
-                f"{type(self).__name__}.response must return stress, tangent (or None) and state; "
-                f"got {type(answer).__name__}"
+                f"{type(self).__name__}.response must return stress, tangent (or None) and state; got {found}"
             )
         stress, D, new = answer
         self._check_shape("stress", stress, strain.shape)

@@ -158,7 +158,9 @@ def _lacks_decorator(kind: type) -> bool:
 
 
 def _cure(error: BaseException, defined: dict[str, Any]) -> str:
-    """Return what to do about an error that a missing decorator has led to, or an empty text."""
+    """Return what to do about an error that a decorator or a type has led to, or an empty text."""
+    if "mutable default" in str(error):
+        return ": it is no constant; write it without a type"
     if not isinstance(error, TypeError):
         return ""
     if "non-frozen dataclass" in str(error):

@@ -14,6 +14,15 @@ from numpy.typing import ArrayLike
 
 from kratos_lite.errors import MAX_PROBLEMS, KratosLiteError
 
+PYTHON = Path(traceback.__file__).parent
+
+CURES = {
+    "truth value of an array": "many points come at once: np.where(condition, a, b) chooses for each",
+    "KeyError": "a law finds in its state what internal_variables of its class lists",
+    "response() takes": "a law has response(self, strain, state, dt)",
+}
+"""What to do about errors of Python that say this."""
+
 S = TypeVar("S")
 T = TypeVar("T")
 
@@ -186,12 +195,15 @@ def describe(error: Exception) -> str:
     """Return an error as one text, with the last line of the student's own code that led to it."""
     frames = traceback.extract_tb(error.__traceback__)
     place = ""
-    for ours in (Path(__file__).parent, Path(__file__).parents[1]):
+    said = isinstance(error, KratosLiteError)  # where is no line of the library then
+    for ours in (Path(__file__).parent, Path(__file__).parents[1])[said:]:
         passed = {ours, Path(np.__file__).parent}
-        theirs = [frame for frame in frames if not passed & set(Path(frame.filename).parents)]
-        place = f" at {Path(theirs[-1].filename).name}:{theirs[-1].lineno}" if theirs else place
+        files = [(Path(frame.filename), frame.lineno) for frame in frames]
+        theirs = [f for f in files if not passed & set(f[0].parents) and f[0].parent != PYTHON]
+        place = f" at {theirs[-1][0].name}:{theirs[-1][1]}" if theirs else place
     kind = "" if isinstance(error, ConformanceError) else f"{type(error).__name__}: "
-    return f"{kind}{error}{place}"
+    text = f"{kind}{error}{place}"
+    return "; ".join([text, *(cure for sign, cure in CURES.items() if sign in text)])
 
 
 def difference(found: ArrayLike, expected: ArrayLike) -> float:

@@ -1,5 +1,7 @@
 """Checking the file of a student: what is found in it, and what is said about a file that does not run."""
 
+import re
+
 import pytest
 
 from kratos_lite.elements import ELEMENTS, kinematic_linear_3d6n
@@ -175,6 +177,40 @@ def test_a_law_that_is_not_linear_is_checked_as_one(checked):
     assert not failures(findings)
     assert len(findings) == 13
     assert [f.check for f in findings if f.skipped] == ["isotropy"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        (".mean(axis=-1, keepdims=True)", ".mean()", r"use \[\.\.\., i\] for components"),
+        ("new = state", "new = state['plastic_strain']; new +=  0 * state", "changed in place"),
+        ("excess = np", "if q < 1:\n            return 0\n        excess = np", r"mine.py:\d+; .* np\.where"),
+        (
+            '    internal_variables = {"plastic_strain": 6}\n',
+            "",
+            "'plastic_strain' at .*; a law finds in its",
+        ),
+        ("state, dt)", "state)", r"a law has response\(self, strain, state, dt\)"),
+        (', {"plastic_strain": new}', "", "got 2 values$"),
+        ("return stress - excess * s", "return stress * (1 - excess)", "is a factor 2 of shear missing"),
+    ],
+)
+def test_a_law_with_a_mistake_is_told_the_cure(checked, old, new, says):
+    ((_, findings),) = checked(STEEL.replace(old, new))
+    assert re.search(says, failures(findings)[0].detail)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ('{"plastic_strain": 6}', '{"plastic_strain"}', "name → numbers at each Gauss point"),
+        ("    density: float = 0.0\n", "", "add density: float = 0.0 to its constants"),
+        ("internal_variables =", "internal_variables: dict =", "write it without a type"),
+    ],
+)
+def test_a_law_that_cannot_be_made_is_told_the_cure(checked, old, new, says):
+    with pytest.raises(InputError, match=says):
+        checked(STEEL.replace(old, new))
 
 
 def test_a_material_without_an_instance_says_how_to_make_one(checked):
