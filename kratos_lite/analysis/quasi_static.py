@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import TypeAlias
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from kratos_lite.analysis.nodal_loads import AppliedLoads
 from kratos_lite.analysis.prescribed_motion import PrescribedMotion
-from kratos_lite.analysis.report import Report
+from kratos_lite.analysis.report import Report, StepReport
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.state import State, check_state
 from kratos_lite.assembly.block_matrix import BlockMatrix
@@ -37,29 +37,6 @@ WORN = 6.0
 """Iterations for a digit from which a multigrid of an older tangent is made anew."""
 SLACK, SEARCHES = 0.8, 6
 """Line search: fraction of the work of the residual that a full correction may leave, and most trials."""
-
-
-@dataclass(frozen=True)
-class StepReport:
-    """How a step, or a part of one, has converged.
-
-    Attributes
-    ----------
-    time : s, at its end.
-    residuals : relative residual before each correction and at the end.
-    """
-
-    time: float
-    residuals: tuple[float, ...]
-
-    @property
-    def iterations(self) -> int:
-        """Number of corrections."""
-        return len(self.residuals) - 1
-
-    def __str__(self) -> str:
-        last = self.residuals[-1]
-        return f"t = {self.time:g} s: {self.iterations} iterations, relative residual {last:.1e}"
 
 
 class QuasiStaticAnalysis:
@@ -209,7 +186,7 @@ class QuasiStaticAnalysis:
             self.work += float((internal + self.internal) @ (u - self.u)) / 2
             self.u, self.states, self.load, self.internal = u, states, force, internal
             self.time = start + fraction * (end - start)
-            self.reports.append(StepReport(self.time, tuple(residuals)))
+            self.reports.append(StepReport(self.time, tuple(residuals), fraction - done))
             return len(residuals) - 1
 
         error = in_parts(advance)[1]
@@ -333,6 +310,9 @@ class QuasiStaticAnalysis:
         checked = check_state(state, "model", {name: np.shape(value) for name, value in now.values.items()})
         if checked.integrator != "quasi_static":
             raise InputError(f"this state was made by {state.integrator}, not by a quasi-static analysis")
+        if other := state.values.keys() - now.values.keys():
+            names = ", ".join(sorted(other))
+            raise InputError(f"this state does not fit: it has {names}, of other laws or elements than here")
         return checked
 
     def restore(self, state: State) -> None:
@@ -378,21 +358,23 @@ class QuasiStaticAnalysis:
             finally:
                 self.restore(now)
         model, loads, reactions = self.model, self._whole(self.load).copy(), self._reactions()
-        last = self.reports[-1] if self.reports else StepReport(self.time, (0.0,))
+        steps = [report for report in self.reports if report.time <= self.time]
         report = Report(
             unknowns=len(self.system.constraint_map.free),
             total_load=loads.sum(axis=0),
             total_reaction=reactions.sum(axis=0),
             solver="newton",
-            reason=f"step {self.step}, {last}",
-            iterations=sum(step.iterations for step in self.reports),
-            backward_error=last.residuals[-1],
+            reason=f"{self.step} steps to t = {self.time:g} s",
+            iterations=sum(step.iterations for step in steps),
+            backward_error=steps[-1].residuals[-1] if steps else None,
             force_error=None,
             moment_error=None,
             seconds={},
             warnings=list(self.warnings),
             notes=model.remarks(),
             formulation=model.chosen(self.groups),
+            steps=steps,
+            work=self.work,
         )
         groups = [replace(g, states=s) for g, s in zip(self.groups, self.states, strict=True)]
         u0 = model.initial_displacement

@@ -14,6 +14,9 @@ from kratos_lite.native import described
 from kratos_lite.tabular import Tabular
 from kratos_lite.typing import Array
 
+SHOWN = 10
+"""Steps in a summary."""
+
 
 def peak_memory() -> int:
     """Return the largest memory of this process so far, in bytes (0 where the system does not say)."""
@@ -38,6 +41,32 @@ class RefinementStep:
 
     def __str__(self) -> str:
         return f"{self.error:.2%} with {self.unknowns} unknowns, {self.elements} {self.kinds}"
+
+
+@dataclass(frozen=True)
+class StepReport:
+    """How a step, or a part of one, has converged.
+
+    Attributes
+    ----------
+    time : s, at its end.
+    residuals : relative residual before each correction and at the end.
+    part : fraction of the step; below 1 where it was cut.
+    """
+
+    time: float
+    residuals: tuple[float, ...]
+    part: float = 1.0
+
+    @property
+    def iterations(self) -> int:
+        """Number of corrections."""
+        return len(self.residuals) - 1
+
+    def __str__(self) -> str:
+        last = self.residuals[-1]
+        cut = f", {self.part:g} of a step" if self.part < 1 else ""
+        return f"t = {self.time:g} s: {self.iterations} iterations, relative residual {last:.1e}{cut}"
 
 
 @dataclass
@@ -67,6 +96,8 @@ class Report(Tabular):
     error_of: str = "the energy norm"  # what has that error
     error_asked: float | None = None  # that was requested
     history: list[RefinementStep] = field(default_factory=list)  # the meshes, the last one of the result
+    steps: list[StepReport] = field(default_factory=list)  # of a quasi-static analysis
+    work: float | None = None  # J, of its loads and supports
 
     def table(self) -> list[tuple[str, str]]:
         """Return the rows of the summary, labels and values."""
@@ -87,6 +118,11 @@ class Report(Tabular):
         rows = [("solver", f"{self.solver}: {self.reason}")]
         if self.iterations:
             rows.append(("iterations", str(self.iterations)))
+        if len(self.steps) > SHOWN:
+            rows.append(("steps", f"{len(self.steps)}, the last {SHOWN} of which are"))
+        rows += [("step", str(step)) for step in self.steps[-SHOWN:]]
+        if self.work is not None:
+            rows.append(("work of loads", f"{self.work:.6e} J"))
         if self.backward_error is not None:
             rows.append(("backward error", f"{self.backward_error:.1e}"))
         if self.force_error is not None:

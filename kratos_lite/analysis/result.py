@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar, overload
 import numpy as np
 
 from kratos_lite.analysis.element_fields import ElementFields
-from kratos_lite.analysis.fields import data_frame, fields, nodal_columns
+from kratos_lite.analysis.fields import data_frame, fields, known, nodal_columns
 from kratos_lite.analysis.peak import peak
 from kratos_lite.analysis.report import Report, element_counts, vector
 from kratos_lite.assembly.element_groups import ElementGroup
@@ -28,6 +28,10 @@ if TYPE_CHECKING:
     from kratos_lite.analysis.point_values import LineValues, PointValues
     from kratos_lite.analysis.quantities import Quantity
     from kratos_lite.mesh.locate import Located
+
+
+MEASURES = {"accumulated_plastic_strain": "plastic strain", "damage": "damage"}
+"""Internal variables in a summary, as it calls them."""
 
 
 class Analysis(Protocol):
@@ -357,9 +361,28 @@ class Result(ElementFields, Tabular):
 
     def largest_von_mises(self) -> tuple[float, int, Array]:
         """Return the largest von Mises stress of Gauss points in Pa, id and center (3,) of its element."""
-        mesh, (_, mises, row) = self.mesh, self._totals
+        _, mises, row = self._totals
+        return mises, *self._element(row)
+
+    def largest_variables(self) -> dict[str, tuple[float, int, Array]]:
+        """Return the largest plastic strain and damage of Gauss points, as `largest_von_mises` does."""
+        largest = {}
+        for name in MEASURES:
+            if name in known(self.groups):
+                values = np.array([np.max(points) for points in self.field(name)])
+                row = int(values.argmax())
+                largest[name] = (float(values[row]), *self._element(row))
+        return largest
+
+    def _element(self, row: int) -> tuple[int, Array]:
+        """Return the id and the center (3,) of an element."""
         (nodes,) = (group.nodes[group.rows == row] for group in self.groups if row in group.rows)
-        return mises, int(mesh.element_ids[row]), mesh.points[nodes[0]].mean(axis=0)
+        return int(self.mesh.element_ids[row]), self.mesh.points[nodes[0]].mean(axis=0)
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether laws and strains are linear, so that the error can be estimated."""
+        return all(group.is_linear for group in self.groups)
 
     def table(self) -> list[tuple[str, str]]:
         """Return the rows of the summary, labels and values."""
@@ -367,8 +390,13 @@ class Result(ElementFields, Tabular):
         counts = mesh.n_nodes, element_counts(mesh, self.groups, report.formulation)
         extremes = self.largest_displacement(), self.energy(), self.largest_von_mises()
         size = float(np.abs(self.loads).sum() + np.abs(self.reactions).sum())
-        error = [("estimated error", self._stated_error())]
+        error = [("estimated error", self._stated_error())] if self.is_linear else []
+        for name, (value, element, center) in self.largest_variables().items():
+            place = f"in element {element} around {vector(center)} m"
+            error.append((f"largest {MEASURES[name]}", f"{value:.6e} (at a Gauss point) {place}"))
         rows = self._summary(counts, extremes, error, size, str(peak(self) or ""))
+        if not self.is_linear:
+            return rows
         return rows + [("warning", text) for text in self._error.warnings if text not in report.warnings]
 
     def _summary(

@@ -50,8 +50,7 @@ def summary(result: Result) -> dict[str, Any]:
     report, mesh = result.report, result.mesh
     length, node, _ = result.largest_displacement()
     mises, element, _ = result.largest_von_mises()
-    error, top = result.error(), peak(result)
-    asked = {}
+    top, asked = peak(result), dict[str, Any]()
     if report.error is not None:
         history = [vars(step) for step in report.history]
         asked = {"requested_error": {"relative": report.error, "of": report.error_of, "history": history}}
@@ -64,17 +63,18 @@ def summary(result: Result) -> dict[str, Any]:
         "total_reaction": report.total_reaction.tolist(),
         "largest_displacement": {"value": length, "node": node},
         "strain_energy": result.energy(),
-        "estimated_error": {
-            "relative": error.relative,
-            "absolute": error.absolute,
-            "method": error.method,
-            "warnings": error.warnings,
-        },
+        **_estimate(result),
         **asked,
         "largest_von_mises_stress": {"value": mises, "element": element, **(vars(top) if top else {})},
+        **{
+            f"largest_{name}": {"value": value, "element": element}
+            for name, (value, element, _) in result.largest_variables().items()
+        },
         "solver": report.solver,
         "reason": report.reason,
         "iterations": report.iterations,
+        **({"steps": [vars(step) for step in report.steps]} if report.steps else {}),
+        **({} if report.work is None else {"work": report.work}),
         "backward_error": report.backward_error,
         "force_error": report.force_error,
         "moment_error": report.moment_error,
@@ -86,6 +86,15 @@ def summary(result: Result) -> dict[str, Any]:
         "warnings": report.warnings,
         "notes": report.notes,
     }
+
+
+def _estimate(result: Result) -> dict[str, Any]:
+    """Return the estimated error, which a result that is not linear does not have."""
+    if not result.is_linear:
+        return {}
+    error = result.error()
+    names = ("relative", "absolute", "method", "warnings")
+    return {"estimated_error": {name: getattr(error, name) for name in names}}
 
 
 def write_json(path: str | Path, result: Result) -> None:

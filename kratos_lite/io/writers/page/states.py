@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from kratos_lite.analysis.fields import FIELDS, Field
+from kratos_lite.analysis.fields import FIELDS, Field, variable
 from kratos_lite.analysis.subjects import evenly
 from kratos_lite.io.writers.page.content import Content, Frame
 from kratos_lite.io.writers.page.write import write_page
@@ -15,7 +15,10 @@ MOST_FRAMES = 120
 """States in a page."""
 MOST_VALUES = 1_000_000
 """Nodes of all states together, about 10 MB."""
-OF_STATES = [FIELDS[name] for name in ("displacement", "von_mises", "velocity")]
+OF_STATES = [
+    *(FIELDS[name] for name in ("displacement", "von_mises", "velocity")),
+    *(variable(name, 1) for name in ("accumulated_plastic_strain", "damage")),
+]
 """Fields of states, those that there are."""
 
 
