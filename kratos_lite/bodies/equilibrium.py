@@ -16,11 +16,10 @@ from kratos_lite.errors import InputError, ModelError, SolveError
 from kratos_lite.solvers import direct
 from kratos_lite.solvers.constraints import ConstraintMap
 from kratos_lite.solvers.linear_solver import LinearSolver
+from kratos_lite.solvers.newton import in_parts, newton
 from kratos_lite.solvers.plan import Facts, choose
 from kratos_lite.typing import Array, Ints, Progress
 
-INCREMENTS = (1, 4, 16, 64)
-"""Numbers of load increments that are tried one after the other."""
 NEWTON_MAX = 25
 CONVERGED = 1e-9
 """Last Newton step, as a fraction of the displacement; the remaining error is its square."""
@@ -78,43 +77,56 @@ def find_equilibrium(body: Body, *, progress: Progress | None = None) -> int:
             raise ModelError(
                 f"a {type(constraint).__name__} does not apply in statics; use PrescribedDisplacement"
             )
-    start = body.q.copy()
-    for count in INCREMENTS:
-        body.q = start.copy()
+    start, total = body.q.copy(), 0
+
+    def advance(done: float, fraction: float) -> int:
+        nonlocal total
+        before = body.q
         try:
-            iterations = sum(_increment(body, start, k / count, progress) for k in range(1, count + 1))
+            iterations = _increment(body, start, fraction)
             body.set_configuration(body.q)  # Newton may end at an inverted shape
         except (SolveError, InputError, np.linalg.LinAlgError) as error:
-            failed = error
-            continue
-        body.u = np.zeros_like(body.u)
+            body.q = before
+            raise SolveError(str(error)) from None
+        total += iterations
+        if progress:
+            progress("equilibrium", fraction)
         return iterations
-    body.q = start
-    raise SolveError(
-        f"no equilibrium was found: {failed}; is the body supported by constraints "
-        "or springs, and are the loads not too large?"
-    )
+
+    reached, failed = in_parts(advance)
+    if failed:
+        body.q = start
+        raise SolveError(
+            f"no equilibrium was found under more than {reached:.0%} of the load: {failed}; is the body "
+            "supported by constraints or springs, and are the loads not too large?"
+        )
+    body.u = np.zeros_like(body.u)
+    return total
 
 
-def _increment(body: Deformable, start: Array, fraction: float, progress: Progress | None) -> int:
+def _increment(body: Deformable, start: Array, fraction: float) -> int:
     """Find the equilibrium under a fraction of the loads; return the number of iterations."""
-    initial, roundoff = _gap(body, start), ROUND_OFF * body.extent()
-    multipliers, rest = np.zeros(len(initial)), np.zeros_like(body.u)
-    for iteration in range(1, NEWTON_MAX + 1):
+    initial, roundoff, size = _gap(body, start), ROUND_OFF * body.extent(), len(body.q)
+    rest = np.zeros_like(body.u)
+
+    def evaluate(x: Array) -> tuple[float, tuple[Array, Array]]:
+        body.q, multipliers = x[:size], x[size:]
         residual = fraction * body.external_force(u=rest) - body.internal_force(body.q)
         gap = _gap(body, body.q) - (1 - fraction) * initial
         step, multipliers = _newton_step(body, residual, gap, _tangent(body, fraction, multipliers))
         largest = float(np.abs(step).max())
-        if not np.isfinite(largest):
-            break
-        if largest > roundoff or iteration == 1:  # less would not make it better
-            body.q = body.q + step
-        if largest <= max(roundoff, CONVERGED * float(np.abs(body.q - start).max())):
-            _balance(body, fraction, multipliers)
-            if progress:
-                progress("equilibrium", fraction)
-            return iteration
-    raise SolveError(f"Newton does not converge in {NEWTON_MAX} iterations at {fraction:.0%} of the load")
+        if largest <= roundoff and x is not begin:  # more would not make it better
+            return 0.0, (0.0 * step, multipliers)
+        return largest / (float(np.abs(body.q + step - start).max()) or 1.0), (step, multipliers)
+
+    def correction(x: Array, known: tuple[Array, Array], residuals: list[float]) -> Array:
+        return np.concatenate([known[0], known[1] - x[size:]])
+
+    begin = np.concatenate([body.q, 0.0 * initial])
+    x, (step, multipliers), residuals = newton(begin, evaluate, correction, CONVERGED, NEWTON_MAX)
+    body.q = x[:size] + step
+    _balance(body, fraction, multipliers)
+    return len(residuals)
 
 
 def _gap(body: Deformable, q: Array) -> Array:
