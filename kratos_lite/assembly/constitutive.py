@@ -91,11 +91,15 @@ def _only(groups: Sequence[ElementGroup], wanted: Callable[[ElementGroup], bool]
 
 
 def initial_states(points: Array, group: ElementGroup) -> PointStates:
-    """Return the states of a group at the beginning; a law that asks for it knows the length of elements."""
+    """Return the states of a group at the beginning; a law that asks for it knows the size of elements."""
     shape = len(group), len(group.rule)
     variables = group.material.initial_state(*shape)
     if "element_length" in variables:
         variables["element_length"][...] = np.cbrt(volumes(points, group).sum(axis=1))[:, None, None]
+    if "element_radius" in variables:
+        X = points[group.nodes]
+        radii = np.linalg.norm(X - X.mean(axis=1, keepdims=True), axis=-1).max(axis=1)
+        variables["element_radius"][...] = radii[:, None, None]
     modes = np.zeros((len(group), 21)) if group.element.formulation == "enhanced" else None
     return PointStates(np.zeros((*shape, 6)), variables, modes)
 

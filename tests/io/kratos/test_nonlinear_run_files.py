@@ -28,11 +28,7 @@ PULL = process(
 
 
 def law(name, **variables):
-    content = materials("Structure.Body", 7850.0, 2e9, 0.3)
-    material = content["properties"][0]["Material"]
-    material["constitutive_law"] = {"name": name}
-    material["Variables"] |= variables
-    return content
+    return materials("Structure.Body", 7850.0, 2e9, 0.3, name, **variables)
 
 
 def box(folder, large=True, content=None):
@@ -92,11 +88,8 @@ def test_conditions_of_small_displacements_keep_their_pressure(tmp_path):
 def test_plastic_bar_pulled_in_steps_with_files_and_expected_values(tmp_path, run):
     """σ = σ_Y + E H / (E + H) (ε - σ_Y / E), also in the check of the run file and after a restart."""
     E, H, Y = 2e9, 4e8, 2e6
-    steel = law("SmallStrainJ2Plasticity3DLaw", YIELD_STRESS=Y, ISOTROPIC_HARDENING_MODULUS=H)
-    steel["properties"][0]["Material"]["Variables"] |= {
-        "EXPONENTIAL_SATURATION_YIELD_STRESS": Y,
-        "HARDENING_EXPONENT": 0.0,
-    }
+    hardening = {"ISOTROPIC_HARDENING_MODULUS": H, "EXPONENTIAL_SATURATION_YIELD_STRESS": Y}
+    steel = law("SmallStrainJ2Plasticity3DLaw", YIELD_STRESS=Y, HARDENING_EXPONENT=0.0, **hardening)
     box(tmp_path, large=False, content=steel)
     rollers = process("assign_scalar_variable_process", "Structure.Bottom", "DISPLACEMENT_Z", value=0.0)
     corner = [process("fix_scalar_variable_process", "Structure.Corner", f"DISPLACEMENT_{a}") for a in "XY"]

@@ -1,0 +1,146 @@
+"""J2Softening3D: plasticity of von Mises that softens, with an energy that the mesh does not change."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from kratos_lite import voigt
+from kratos_lite.errors import MaterialError
+from kratos_lite.materials.isotropic3d import Isotropic3D
+from kratos_lite.materials.material import GaussState, Material, Response
+from kratos_lite.typing import Array
+
+EXPONENTIAL, PERFECT = 1, 3
+"""HARDENING_CURVE of Kratos."""
+MOST = 0.9999
+"""Fraction of the fracture energy that is dissipated at most."""
+
+
+@dataclass(frozen=True)
+class J2Softening3D(Material):
+    """Elastic up to the yield stress of von Mises, which falls with the dissipated energy: σ_Y (1 - κ).
+
+    κ is the work of the stress over plastic strains relative to the fracture energy over the radius of the
+    element, from its center to its farthest node; in a bar the stress falls exponentially.
+
+    Parameters
+    ----------
+    E, nu : Young's modulus in Pa and Poisson's ratio.
+    yield_stress : σ_Y in Pa, > 0.
+    fracture_energy : J/m², > 0.
+    curve : 1 to soften, 3 for perfect plasticity.
+    compression : yield stress of compression in Pa, the same; 0 if not given.
+    density : kg/m³.
+
+    Raises
+    ------
+    MaterialError
+        If a constant lies outside its bounds, or an element is so large that it would snap back.
+
+    Notes
+    -----
+    The plastic strain of a step is Δp = (q - σ_Y (1 - κ)) / (3 G - σ_Y q / g) with the equivalent stress q
+    of the elastic trial and g, fracture energy over radius: it takes the softening at the trial stress, and
+    meets the yield condition to the second order in Δp.  Source: Oller, Nonlinear Dynamics of Structures
+    (2014), and GenericConstitutiveLawIntegratorPlasticity of KratosConstitutiveLawsApplication, which does
+    the same.
+
+    Examples
+    --------
+    >>> steel = J2Softening3D(E=200e9, nu=0.3, yield_stress=200e6, fracture_energy=4e5)
+    >>> start = steel.initial_state()
+    >>> start["element_radius"][:] = 0.05
+    >>> stress, _, state = steel.evaluate(np.array([0, 0, 0, 4e-3, 0, 0]), start, 1.0)
+    >>> bool(0 < state["plastic_dissipation"][0] < 1) and bool(stress[3] < 200e6 / 3**0.5)
+    True
+    """
+
+    E: float
+    nu: float
+    yield_stress: float
+    fracture_energy: float
+    curve: float = EXPONENTIAL
+    compression: float = 0.0
+    density: float = 0.0
+
+    isotropic: ClassVar[bool] = True
+    aliases: ClassVar[tuple[str, ...]] = ("SmallStrainIsotropicPlasticity3DVonMisesVonMises",)
+    variables: ClassVar[dict[str, str]] = {
+        "E": "YOUNG_MODULUS",
+        "nu": "POISSON_RATIO",
+        "yield_stress": "YIELD_STRESS_TENSION",
+        "fracture_energy": "FRACTURE_ENERGY",
+        "curve": "HARDENING_CURVE",
+        "compression": "YIELD_STRESS_COMPRESSION",
+        "density": "DENSITY",
+    }
+    internal_variables: ClassVar[Mapping[str, int]] = {
+        "plastic_strain": 6,
+        "plastic_dissipation": 1,
+        "element_radius": 1,
+    }
+
+    @classmethod
+    def from_variables(cls, values: dict[str, Any]) -> Material:
+        """Make the material from the variables of a file; YIELD_STRESS stands for that of tension."""
+        given = {"YIELD_STRESS_TENSION": values["YIELD_STRESS"]} if "YIELD_STRESS" in values else {}
+        return super().from_variables(given | values)
+
+    def check(self) -> None:
+        """Check the bounds of the constants.
+
+        Raises
+        ------
+        MaterialError
+            If one is beyond them.
+        """
+        Isotropic3D(self.E, self.nu)
+        for name, unit in (("yield_stress", "Pa"), ("fracture_energy", "J/m²")):
+            if not getattr(self, name) > 0:
+                raise MaterialError(f"{self._name(name)} {getattr(self, name):g} must be > 0 {unit}")
+        if self.curve not in (EXPONENTIAL, PERFECT):
+            raise MaterialError(
+                f"{self._name('curve')} must be 1, exponential softening, or 3, perfect plasticity; "
+                f"got {self.curve:g}"
+            )
+        if self.compression not in (0, self.yield_stress):
+            raise MaterialError(
+                f"{self._name('compression')} {self.compression:g} must be that of tension, "
+                f"{self.yield_stress:g} Pa: von Mises knows no difference"
+            )
+
+    def response(self, strain: Array, state: GaussState, dt: float) -> Response:
+        """Return stress, consistent tangent and internal variables; see `Material.response`."""
+        elastic = Isotropic3D(self.E, self.nu)
+        C, G = elastic.C, elastic.lame[1]
+        trial = (strain - state["plastic_strain"]) @ C.T
+        s = voigt.deviator(trial)
+        norm = np.sqrt(s**2 @ voigt.SHEAR_TWICE)
+        q, kappa = 1.5**0.5 * norm, state["plastic_dissipation"][..., 0]
+        per_energy = state["element_radius"][..., 0] / self.fracture_energy  # 1/g
+        soft = self.yield_stress * per_energy if self.curve == EXPONENTIAL else np.zeros_like(q)
+        limit = self.yield_stress * (1 - kappa) if self.curve == EXPONENTIAL else self.yield_stress
+        plastic, slope = q > limit * (1 + 1e-10), 3 * G - soft * q
+        if (plastic & (slope <= 0)).any():
+            raise MaterialError(
+                f"{type(self).__name__}: an element of radius {float(state['element_radius'].max()):.3g} m "
+                "would snap back; take a finer mesh, or smaller steps"
+            )
+        dp = np.where(plastic, (q - limit) / slope, 0.0)
+        n = s / np.where(norm > 0, norm, 1.0)[..., None]
+        flow = (1.5**0.5 * dp)[..., None] * n
+        work = (q - 3 * G * dp) * dp * per_energy
+        new = {
+            "plastic_strain": state["plastic_strain"] + flow * voigt.SHEAR_TWICE,
+            "plastic_dissipation": np.minimum(kappa + work, MOST)[..., None],
+            "element_radius": state["element_radius"].copy(),
+        }
+        beta = 3 * G * dp / np.where(q > 0, q, 1.0)
+        rate = np.where(plastic, 3 * G * (1 + soft * dp) / slope, 0.0)
+        D = C - 2 * G * beta[..., None, None] * voigt.DEVIATOR
+        D = D - (2 * G * (rate - beta))[..., None, None] * n[..., :, None] * n[..., None, :]
+        return trial - 2 * G * flow, D, new

@@ -1,0 +1,93 @@
+"""Laws in Kratos, live, and here: the same run file with the same displacements after each step."""
+
+import json
+from importlib.metadata import PackageNotFoundError, version
+
+import numpy as np
+import pytest
+from run_files import CLAMP, box_mdpa, materials, process, run_file, run_kratos, write
+
+from kratos_lite.io.files import read_case
+from kratos_lite.io.run import prepare
+
+for wheel in ("Multiphysics", "StructuralMechanicsApplication", "ConstitutiveLawsApplication"):
+    try:
+        version(f"Kratos{wheel}")
+    except PackageNotFoundError:
+        pytest.skip(f"Kratos{wheel} is not installed", allow_module_level=True)
+
+PLASTIC = {
+    "YIELD_STRESS": 4e6,
+    "ISOTROPIC_HARDENING_MODULUS": 1e8,
+    "EXPONENTIAL_SATURATION_YIELD_STRESS": 6e6,
+    "HARDENING_EXPONENT": 50.0,
+}
+VON_MISES = {
+    "name": "SmallStrainIsotropicPlasticityFactory",
+    "yield_surface": "VonMises",
+    "plastic_potential": "VonMises",
+}
+SOFTENING = {
+    "YIELD_STRESS_TENSION": 4e6,
+    "YIELD_STRESS_COMPRESSION": 4e6,
+    "FRACTURE_ENERGY": 2e5,
+    "HARDENING_CURVE": 1,
+    "MAXIMUM_STRESS": 5e6,
+    "MAXIMUM_STRESS_POSITION": 0.1,
+    "FRICTION_ANGLE": 32.0,
+    "DILATANCY_ANGLE": 32.0,
+    "SOFTENING_TYPE": 1,
+}
+PERFECT = SOFTENING | {"HARDENING_CURVE": 3}
+CASES = {
+    "J2": ("SmallDisplacementElement", "SmallStrainJ2Plasticity3DLaw", PLASTIC, 0.01),
+    "von Mises": ("SmallDisplacementElement", VON_MISES, SOFTENING, 0.01),
+    "perfect": ("SmallDisplacementElement", VON_MISES, PERFECT, 0.01),
+    "neo-Hooke": ("TotalLagrangianElement", "HyperElastic3DLaw", {}, 0.3),
+    "Saint Venant": ("TotalLagrangianElement", "KirchhoffSaintVenant3DLaw", {}, 0.3),
+    "updated": ("UpdatedLagrangianElement", "HyperElastic3DLaw", {}, 0.3),
+}
+
+
+def moved(axis, value):
+    return process(
+        "assign_scalar_variable_process",
+        "Structure.Top",
+        f"DISPLACEMENT_{axis}",
+        value=value,
+        interval=[0.0, "End"],
+    )
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_ten_steps_are_those_of_kratos(tmp_path, name):
+    """The upper face goes forth and back, pulled and sheared; all else is free.
+
+    In the first step all is elastic, as laws of Kratos do not flow in the first iteration of all.
+    """
+    element, law, variables, size = CASES[name]
+    (tmp_path / "box.mdpa").write_text(box_mdpa().replace("SmallDisplacementElement", element))
+    write(tmp_path, materials("Structure.Body", 7850.0, 2e9, 0.3, law, **variables), "materials.json")
+    content = run_file(
+        [CLAMP, moved("Z", f"{size}*sin(5*t*t)"), moved("X", f"{size / 2}*t*t")],
+        [],
+        step=0.1,
+        end=0.95,
+        analysis_type="non_linear",
+        convergence_criterion="residual_criterion",
+        residual_relative_tolerance=1e-12,
+        residual_absolute_tolerance=1e-9,
+        max_iteration=50,
+    )
+    path = write(tmp_path, content)
+    run_kratos(tmp_path)
+    expected = json.loads((tmp_path / "kratos.json").read_text())["steps"]
+    case = read_case(path)
+    _, states = prepare(case)
+    ids = [str(i) for i in case.model.mesh.node_ids]
+    count = 0
+    for state, known in zip(states, expected, strict=True):
+        reference = np.array([known[i] for i in ids])
+        assert np.abs(state.u - reference).max() < 1e-8 * np.abs(reference).max(), (name, state.step)
+        count += 1
+    assert count == 10
