@@ -99,6 +99,7 @@ from kratos_lite.materials.generalized_maxwell3d import GeneralizedMaxwell3D as 
 from kratos_lite.materials.isotropic3d import Isotropic3D as Isotropic3D
 from kratos_lite.materials.isotropic_damage3d import IsotropicDamage3D as IsotropicDamage3D
 from kratos_lite.materials.j2_plasticity3d import J2Plasticity3D as J2Plasticity3D
+from kratos_lite.materials.j2_softening3d import J2Softening3D as J2Softening3D
 from kratos_lite.materials.mooney_rivlin3d import MooneyRivlin3D as MooneyRivlin3D
 from kratos_lite.materials.neo_hookean3d import NeoHookean3D as NeoHookean3D
 from kratos_lite.materials.ogden3d import Ogden3D as Ogden3D

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from kratos_lite import voigt
-from kratos_lite.errors import MaterialError
+from kratos_lite.errors import MaterialError, SolveError
 from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.materials.material import GaussState, Material, Response
 from kratos_lite.typing import Array
@@ -39,7 +39,7 @@ class J2Softening3D(Material):
     Raises
     ------
     MaterialError
-        If a constant lies outside its bounds, or an element is so large that it would snap back.
+        If a constant lies outside its bounds.
 
     Notes
     -----
@@ -114,7 +114,13 @@ class J2Softening3D(Material):
             )
 
     def response(self, strain: Array, state: GaussState, dt: float) -> Response:
-        """Return stress, consistent tangent and internal variables; see `Material.response`."""
+        """Return stress, consistent tangent and internal variables; see `Material.response`.
+
+        Raises
+        ------
+        SolveError
+            If a step or an element is so large that it would snap back.
+        """
         elastic = Isotropic3D(self.E, self.nu)
         C, G = elastic.C, elastic.lame[1]
         trial = (strain - state["plastic_strain"]) @ C.T
@@ -126,7 +132,7 @@ class J2Softening3D(Material):
         limit = self.yield_stress * (1 - kappa) if self.curve == EXPONENTIAL else self.yield_stress
         plastic, slope = q > limit * (1 + 1e-10), 3 * G - soft * q
         if (plastic & (slope <= 0)).any():
-            raise MaterialError(
+            raise SolveError(
                 f"{type(self).__name__}: an element of radius {float(state['element_radius'].max()):.3g} m "
                 "would snap back; take a finer mesh, or smaller steps"
             )

@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.errors import MaterialError
+from kratos_lite.errors import MaterialError, SolveError
 from kratos_lite.materials import Material
 
 LAWS = [
     (kl.J2Plasticity3D(200e9, 0.3, 250e6), 3e-3),
     (kl.J2Plasticity3D(200e9, 0.3, 250e6, 1e9, 2e9, 400e6, 20.0), 3e-3),
+    (kl.J2Softening3D(200e9, 0.3, 250e6, 4e6), 3e-3),
+    (kl.J2Softening3D(200e9, 0.3, 250e6, 4e5, curve=3), 3e-3),
     (kl.DruckerPrager3D(20e6, 0.3, 1e4, 30.0), 2e-3),
     (kl.DruckerPrager3D(20e6, 0.3, 1e4, 30.0, 10.0, 1e5), 2e-3),
     (kl.DruckerPrager3D(20e6, 0.3, 1e4, 30.0, 30.0, 1e5), 2e-3),
@@ -27,8 +29,8 @@ HYPERELASTIC = [law for law, _ in LAWS if law.strain_measure == "finite"]
 def start(law: Material, *shape: int) -> dict:
     """Return the state at the beginning, in elements of 0.1 m."""
     state = law.initial_state(*shape)
-    if "element_length" in state:
-        state["element_length"][:] = 0.1
+    for name in state.keys() & {"element_length", "element_radius"}:
+        state[name][:] = 0.1
     return state
 
 
@@ -155,6 +157,31 @@ def test_damage_dissipates_the_fracture_energy(linear):
         assert abs(energy - 100.0) < 0.01 * 100.0
 
 
+def test_softening_is_exponential_and_dissipates_the_fracture_energy():
+    """σ = σ_Y exp(-σ_Y p / g) of a bar, to the first order in the steps; then the energy is g."""
+    errors = []
+    for steps in (400, 800):
+        law = kl.J2Softening3D(200e9, 0.3, 250e6, 4e5)
+        g = 4e5 / 0.1
+        strains = np.linspace(0, 0.1, steps)
+        stress, state = uniaxial(law, strains, start(law))
+        p = strains - stress / 200e9
+        flowing = p > 1e-6
+        exact = 250e6 * np.exp(-250e6 * p / g)
+        errors.append(np.abs(stress - exact)[flowing].max() / 250e6)
+        energy = np.diff(strains) @ (stress[1:] + stress[:-1]) / 2
+        assert abs(energy / g - state["plastic_dissipation"][0]) < 0.01
+    assert errors[1] < 0.6 * errors[0] < 0.02
+
+
+def test_a_softening_element_that_is_too_large_is_refused():
+    law = kl.J2Softening3D(200e9, 0.3, 250e6, 1e3)
+    state = start(law)
+    state["element_radius"][:] = 10.0
+    with pytest.raises(SolveError, match="an element of radius 10 m would snap back"):
+        law.evaluate(np.array([0.01, 0, 0, 0, 0, 0]), state, 1.0)
+
+
 def test_damage_does_not_heal():
     law = kl.IsotropicDamage3D(30e9, 0.2, 3e6, 100.0)
     stress, state = uniaxial(law, [3e-4], start(law))
@@ -244,6 +271,9 @@ def test_a_law_cannot_use_its_own_tangent_at_rest(monkeypatch):
         (lambda: kl.MooneyRivlin3D(-1.0, 0.0, 1.0), "shear modulus"),
         (lambda: kl.Ogden3D(1.0, -2.0, 1.0), "shear modulus"),
         (lambda: kl.IsotropicDamage3D(1.0, 0.2, 1.0, 0.0), "FRACTURE_ENERGY"),
+        (lambda: kl.J2Softening3D(1.0, 0.2, 1.0, 0.0), "FRACTURE_ENERGY"),
+        (lambda: kl.J2Softening3D(1.0, 0.2, 1.0, 1.0, curve=2), "HARDENING_CURVE"),
+        (lambda: kl.J2Softening3D(1.0, 0.2, 1.0, 1.0, compression=2.0), "YIELD_STRESS_COMPRESSION"),
         (lambda: kl.GeneralizedMaxwell3D(1.0, 0.2, 0.9, 1.0, 0.2), "sum ≤ 1"),
         (lambda: kl.GeneralizedMaxwell3D(1.0, 0.2, 0.9, 0.0), "tau1"),
     ],
