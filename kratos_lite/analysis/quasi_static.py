@@ -19,11 +19,12 @@ from kratos_lite.assembly.constitutive import Constitutive, States, named, unnam
 from kratos_lite.assembly.stiffness import assemble_stiffness
 from kratos_lite.errors import InputError, ModelError, SolveError
 from kratos_lite.model.structure import Structure
+from kratos_lite.solvers.arc_length import along_path
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.direct import one_thread
 from kratos_lite.solvers.linear_solver import LinearSolver
 from kratos_lite.solvers.newton import SMALLEST_PART, forcing, in_parts, newton
-from kratos_lite.solvers.plan import stepped
+from kratos_lite.solvers.plan import Plan, stepped
 from kratos_lite.typing import Array, Ints, Progress
 from kratos_lite.validation import number, whole_number
 
@@ -51,6 +52,9 @@ class QuasiStaticAnalysis:
     tolerance : relative residual at which a step has converged.
     iterations : most corrections of a step; one that needs more is cut.
     line_search : whether corrections are shortened that overshoot; thin bodies that bend go better without.
+    arc_length : whether steps after the first, which is one of the load, have its length along the path of
+        equilibrium, through limit points: the time is the load factor then, and may fall.  Loads are
+        proportional to the time, ``amplitude=lambda t: t``, or constant.
     progress : called with the phase and the fraction done, 0 … 1.
 
     Attributes
@@ -87,6 +91,7 @@ class QuasiStaticAnalysis:
         tolerance: float = 1e-8,
         iterations: int = 25,
         line_search: bool = False,
+        arc_length: bool = False,
         progress: Progress | None = None,
     ) -> None:
         self.tolerance = number(tolerance, "the tolerance", least=1e-14)
@@ -105,15 +110,20 @@ class QuasiStaticAnalysis:
         self.law = Constitutive(self.system.points, self.system.groups, self.system.pattern)
         self._plan = stepped(len(self.system.constraint_map.free))
         self._symmetric = all(group.material.symmetric_tangent for group in self.groups)
+        self.arc_length = arc_length
         u0 = model.initial_displacement
         self._u0 = np.zeros(3 * len(self.system.nodes)) if u0 is None else self.system.gather(u0)
         self._version = model.version
         self.time, self.step, self.parts, self.work = 0.0, 0, 1, 0.0
         self.u = np.zeros_like(self._u0)
         self.states = self.law.start()
+        self.increment, self.speed = np.zeros_like(self.u), 0.0
         self.load = np.zeros_like(self.u)
         self.internal = self._forces(self.u)
         self.reports: list[StepReport] = []
+        if arc_length:
+            self._check_factor()
+            self._plan = Plan("direct", "tangents beyond a limit point are not positive definite")
 
     def _forces(self, u: Array) -> Array:
         """Return the internal forces (3a,) of the committed states at displacements (3a,)."""
@@ -121,6 +131,16 @@ class QuasiStaticAnalysis:
 
     def _strained(self, u: Array) -> Array:
         return (u - self._u0).reshape(-1, 3)
+
+    def _check_factor(self) -> None:
+        """Refuse loads that are no constant ones and a factor times others, and supports that move."""
+        f = [self._loads(self.u, t)[0] for t in (0.0, 1.0, 2.0)]
+        if self.model.supports.motions or np.abs(f[2] - 2 * f[1] + f[0]).max() > 1e-9 * np.abs(f[1]).max():
+            raise InputError(
+                "the arc length scales loads: give them amplitude=lambda t: t, or none, and hold the supports"
+            )
+        if not np.abs(f[1] - f[0]).max() > 0:
+            raise InputError("no load grows with the time; give one amplitude=lambda t: t for the arc length")
 
     # ---- steps -----------------------------------------------------------------------------------
 
@@ -161,10 +181,17 @@ class QuasiStaticAnalysis:
             A step does not converge, however much it is cut; the last converged state is kept.
         """
         for _ in range(count):
-            begin = self.time
+            begin, before = self.time, self.u
             for k in range(self.parts):
-                self._advance_to(begin + (k + 1) * h / self.parts)
-            self.time = begin + h
+                if self.speed:
+                    self._advance_along(h / self.parts)
+                else:
+                    self._advance_to(begin + (k + 1) * h / self.parts)
+            if not self.speed:
+                self.time = begin + h
+            if self.arc_length and not self.speed:
+                self.increment = self.u - before
+                self.speed = float(np.linalg.norm(self.increment[self.system.constraint_map.free])) / h
             self.step += 1
 
     def _advance_to(self, end: float) -> None:
@@ -180,14 +207,11 @@ class QuasiStaticAnalysis:
 
             field = (1 - fraction) * fields[0] + fraction * fields[1]
             with one_thread():
-                u, (internal, force, _, _, states), residuals = self._newton(
+                u, known, residuals = self._newton(
                     load, field, (fraction - done) * (end - start)
                 )
-            self.work += float((internal + self.internal) @ (u - self.u)) / 2
-            self.u, self.states, self.load, self.internal = u, states, force, internal
-            self.time = start + fraction * (end - start)
-            self.reports.append(StepReport(self.time, tuple(residuals), fraction - done))
-            return len(residuals) - 1
+            time = start + fraction * (end - start)
+            return self._commit(u, known, StepReport(time, tuple(residuals), fraction - done))
 
         error = in_parts(advance)[1]
         if error:
@@ -197,36 +221,82 @@ class QuasiStaticAnalysis:
                 "or the law may soften: prescribe displacements in place of loads, or take smaller steps"
             )
 
+    def _advance_along(self, h: float) -> None:
+        """Go on along the path of equilibrium, in parts where one step does not converge."""
+
+        def evaluate(u: Array, factor: float) -> tuple[float, Response]:
+            return self._balance(u, self._loads(u, factor), h)
+
+        def solve(u: Array, known: Response, residuals: list[float]) -> list[Array]:
+            internal, force, K, tangent, _ = known
+            unit = self._loads(u, 1.0)[0] - self._loads(u, 0.0)[0]
+            return self._corrections(K, tangent, [unit, force - internal], np.zeros_like(u), residuals)
+
+        def advance(done: float, fraction: float) -> int:
+            length, free = (fraction - done) * self.speed * h, self.system.constraint_map.free
+            with one_thread():
+                u, time, known, residuals = along_path(
+                    (self.u, self.time),
+                    self.increment,
+                    length,
+                    free,
+                    evaluate,
+                    solve,
+                    self.tolerance,
+                    self.iterations,
+                )
+            self.increment = u - self.u
+            return self._commit(u, known, StepReport(time, tuple(residuals), fraction - done))
+
+        if error := in_parts(advance)[1]:
+            raise SolveError(f"no equilibrium was found beyond the load factor {self.time:g}: {error}")
+
+    def _loads(self, u: Array, time: float) -> Load:
+        following, tangent = self.applied.following(time, u)
+        return self.applied(time) + following, tangent
+
+    def _commit(self, u: Array, known: Response, report: StepReport) -> int:
+        """Keep what has converged; return the iterations."""
+        internal, force, _, _, states = known
+        self.work += float((internal + self.internal) @ (u - self.u)) / 2
+        self.u, self.states, self.load, self.internal, self.time = u, states, force, internal, report.time
+        self.reports.append(report)
+        return report.iterations
+
+    def _balance(self, u: Array, load: Load, dt: float) -> tuple[float, Response]:
+        """Return the relative residual at displacements (3a,), and what is known there."""
+        (internal, K, states), (force, tangent) = self._evaluate(u, dt), load
+        scale = max(float(np.linalg.norm(v)) for v in (force, internal))
+        residual = float(np.linalg.norm(self.system.constraint_map.reduce(force - internal)))
+        return residual / (scale or 1.0), (internal, force, K, tangent, states)
+
     def _newton(
         self, load: Callable[[Array], Load], field: Array, dt: float
     ) -> tuple[Array, Response, list[float]]:
         """Return displacements, what the law says there, and residuals under a load and a field."""
-        reduce, before = self.system.constraint_map.reduce, self.u
-        jump = field - self.prescribed.part(before)
+        reduce = self.system.constraint_map.reduce
+        jump = field - self.prescribed.part(self.u)
 
         def evaluate(u: Array) -> tuple[float, Response]:
-            (internal, K, states), (force, tangent) = self._evaluate(u, dt), load(u)
-            scale = max(float(np.linalg.norm(v)) for v in (force, internal))
-            residual = float(np.linalg.norm(reduce(force - internal))) / (scale or 1.0)
-            return residual, (internal, force, K, tangent, states)
+            return self._balance(u, load(u), dt)
 
         def correction(u: Array, known: Response, residuals: list[float]) -> Array:
             internal, force, K, tangent, _ = known
             first, forces = len(residuals) == 1, force - internal
-            du = self._correction(K, tangent, forces, jump if first else 0.0 * jump, residuals)
+            (du,) = self._corrections(K, tangent, [forces], jump if first else 0.0 * jump, residuals)
             moved = first and jump.any()
             return du if moved or not self.line_search else self._shortened(u, du, reduce(forces), load, dt)
 
-        return newton(before, evaluate, correction, self.tolerance, self.iterations, int(jump.any()))
+        return newton(self.u, evaluate, correction, self.tolerance, self.iterations, int(jump.any()))
 
     def _evaluate(self, u: Array, dt: float) -> tuple[Array, BlockMatrix, States]:
         forces, K, states = self.law.evaluate(self._strained(u), self.states, dt)
         assert K is not None
         return forces.ravel(), K, states
 
-    def _correction(
-        self, K: BlockMatrix, tangent: Changes, forces: Array, jump: Array, residuals: list[float]
-    ) -> Array:
+    def _corrections(
+        self, K: BlockMatrix, tangent: Changes, forces: list[Array], jump: Array, residuals: list[float]
+    ) -> list[Array]:
         """Return (K - tangent)⁻¹ of forces (3a,) with a jump (3a,) of what is prescribed."""
         where, iterates = (self.system.constraint_map, self.system.points), self._plan.iterates
         if len(residuals) == 1:
@@ -234,14 +304,14 @@ class QuasiStaticAnalysis:
         if iterates and tangent and self._near is None:
             half = [(nodes, (k + k.transpose(0, 3, 4, 1, 2)) / 2) for nodes, k in tangent]
             self._near = LinearSolver(self._less(K, half), *where, self._plan)
-        symmetric = self._symmetric and not tangent
+        symmetric = self._symmetric and not tangent and not self.arc_length
         solver = LinearSolver(self._less(K, tangent), *where, self._plan, symmetric, self._near)
         tolerance = forcing(residuals, self.tolerance)
-        solution = solver.solve(forces, tolerance, None, jump, jump)
+        solutions = [solver.solve(each, tolerance, None, jump, jump) for each in forces]
         if iterates:
-            worn = self._symmetric and solution.iterations > WORN * -np.log10(tolerance)
+            worn = self._symmetric and solutions[-1].iterations > WORN * -np.log10(tolerance)
             self._near = None if solver.near and worn else solver.near or solver
-        return solution.x
+        return [solution.x for solution in solutions]
 
     @cached_property
     def _elastic(self) -> LinearSolver | None:
@@ -287,6 +357,8 @@ class QuasiStaticAnalysis:
         """Return the model as it is now."""
         values = {"u": self._whole(self.u).copy(), "reactions": self._reactions(), "load": self.load.copy()}
         values |= {"internal": self.internal.copy(), "work": np.array(self.work)}
+        if self.arc_length:
+            values |= {"increment": self.increment.copy(), "speed": np.array(self.speed)}
         values |= named(self.states)
         return State("model", "quasi_static", self.time, self.step, values, self.parts)
 
@@ -330,6 +402,8 @@ class QuasiStaticAnalysis:
         get = self.check_state(state).values
         self.u = self.system.gather(get["u"]).copy()
         self.load, self.internal, self.work = get["load"].copy(), get["internal"].copy(), float(get["work"])
+        if self.arc_length:
+            self.increment, self.speed = get["increment"].copy(), float(get["speed"])
         self.states = unnamed(get, self.states)
         self.time, self.step = float(state.time), int(state.step)
 
