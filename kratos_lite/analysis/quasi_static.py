@@ -207,9 +207,7 @@ class QuasiStaticAnalysis:
 
             field = (1 - fraction) * fields[0] + fraction * fields[1]
             with one_thread():
-                u, known, residuals = self._newton(
-                    load, field, (fraction - done) * (end - start)
-                )
+                u, known, residuals = self._newton(load, field, (fraction - done) * (end - start))
             time = start + fraction * (end - start)
             return self._commit(u, known, StepReport(time, tuple(residuals), fraction - done))
 
