@@ -198,6 +198,11 @@ def element_groups_of(
             chosen = element.rule if proven else _fitting(element, element.rule if other is None else other)
             nodes = block.nodes if len(cells) == len(block) else block.nodes[cells]
             stress = None if prestress is None else prestress[rows]
+            if stress is not None and stress.any() and element.finite and not materials[material].is_linear:
+                raise ModelError(
+                    f"{mesh.place(block, 0)}: a prestress is not for {type(materials[material]).__name__}, "
+                    "whose stress is not linear in the strain; strain the body by supports or loads instead"
+                )
             groups.append(ElementGroup(element, chosen, materials[material], nodes, rows, stress))
     if mesh.whole and not groups:
         raise ModelError("the model has no elements; nothing can be solved")

@@ -25,6 +25,8 @@ GaussState: TypeAlias = "dict[str, Array]"
 Response: TypeAlias = "tuple[Array, Array | None, GaussState]"
 """Stress (..., 6) in Pa, its tangent (..., 6, 6) in Pa or None, and the internal variables after the step."""
 
+SHORT = 1e-9
+"""Step in s over which a law is elastic."""
 STRAIN_STEP = 1e-3
 """Strain from which on steps of differences grow with it: that of metals at their yield stress."""
 
@@ -85,6 +87,10 @@ class Material:
         super().__init_subclass__(**kwargs)
         if family:
             return
+        if cls.is_linear and not any("elasticity" in vars(base) for base in cls.__mro__):
+            raise MaterialError(
+                f"{cls.__name__}.is_linear is for a LinearMaterial; derive from that, or leave it out"
+            )
         if cls.strain_measure not in ("small", "finite"):
             raise MaterialError(
                 f"{cls.__name__}.strain_measure is 'small' or 'finite'; got {cls.strain_measure!r}"
@@ -152,7 +158,9 @@ class Material:
         raise TypeError(f"{type(self).__name__} must define response(strain, state, dt)")
 
     def energy(self, strain: Array, stress: Array, state: GaussState) -> Array:
-        """Return the stored energy: ½ σ:C⁻¹:σ of the elastic strain, unless a law defines another.
+        """Return the stored energy, unless a law defines another.
+
+        Without internal variables it is ∫ σ:dε from rest, else ½ σ:C⁻¹:σ, the energy of the elastic strain.
 
         Parameters
         ----------
@@ -162,7 +170,11 @@ class Material:
         -------
         (...) J/m³
         """
-        return np.asarray((stress @ np.linalg.inv(self.C) * stress).sum(axis=-1) / 2)
+        if self.internal_variables or self.is_linear:
+            return np.asarray((stress @ np.linalg.inv(self.C) * stress).sum(axis=-1) / 2)
+        places, weights = np.polynomial.legendre.leggauss(8)
+        parts = [self.evaluate((1 + x) / 2 * strain, {}, SHORT, tangent=False)[0] for x in places]
+        return np.asarray(sum(w / 2 * (s * strain).sum(axis=-1) for w, s in zip(weights, parts, strict=True)))
 
     def initial_state(self, *shape: int) -> GaussState:
         """Return the internal variables at the beginning, 0.
@@ -196,7 +208,13 @@ class Material:
         MaterialError
             The law returns something else than its contract says, or numbers that are not finite.
         """
-        answer = self.response(strain, state, dt)
+        strain = np.array(strain, dtype=float)  # a copy, which a law cannot spoil
+        if strain.shape[-1:] != (6,) or not dt >= 0:
+            raise MaterialError(
+                f"a strain has six components xx yy zz xy yz zx, and a step dt ≥ 0 s; got shape "
+                f"{strain.shape} and dt = {dt}"
+            )
+        answer = self._response(strain, state, dt)
         if not isinstance(answer, tuple) or len(answer) != 3:
             found = f"{len(answer)} values" if isinstance(answer, tuple) else type(answer).__name__
             raise MaterialError(
@@ -213,6 +231,22 @@ class Material:
         self._check_shape("tangent", D, (*strain.shape, 6))
         return stress, D, new
 
+    def _response(self, strain: Array, state: GaussState, dt: float) -> Any:
+        """Return what the law returns; its arguments cannot be written, as a step may be taken again."""
+        arrays = strain, *state.values()
+        views = [array.view() for array in arrays]
+        for view in views:
+            view.flags.writeable = False
+        try:
+            return self.response(views[0], dict(zip(state, views[1:], strict=True)), dt)
+        except ValueError as error:
+            if "read-only" not in str(error):
+                raise
+            raise MaterialError(
+                f"{type(self).__name__}.response changes its strain or state in place; work on copies and "
+                "return new arrays, as a step that fails is taken again"
+            ) from None
+
     def _tangent_by_differences(self, strain: Array, state: GaussState, dt: float, stress: Array) -> Array:
         """Return ∂σ/∂ε (..., 6, 6) from one-sided differences, six more evaluations."""
         size = np.maximum(np.abs(strain).max(axis=-1), STRAIN_STEP)
@@ -222,7 +256,7 @@ class Material:
             moved = strain.copy()
             moved[..., column] += h
             exact = moved[..., column] - strain[..., column]  # what rounding has made of h
-            D[..., column] = (self.response(moved, state, dt)[0] - stress) / exact[..., None]
+            D[..., column] = (self._response(moved, state, dt)[0] - stress) / exact[..., None]
         return D
 
     def _check_shape(self, what: str, values: Any, shape: tuple[int, ...]) -> None:
@@ -248,7 +282,7 @@ class Material:
 
     @cached_property
     def C(self) -> Array:
-        """Elasticity matrix (6, 6) in Pa, the tangent at the beginning; read-only.
+        """Elasticity matrix (6, 6) in Pa: the symmetric part of the tangent at rest, over a short step.
 
         Raises
         ------
@@ -262,7 +296,7 @@ class Material:
             )
         vars(self)["_making_C"] = True
         try:
-            C = np.array(self.evaluate(np.zeros(6), self.initial_state(), 1.0)[1])
+            C = np.array(self.evaluate(np.zeros(6), self.initial_state(), SHORT)[1])
         finally:
             del vars(self)["_making_C"]
         C = (C + C.T) / 2
@@ -286,10 +320,10 @@ class Material:
         MaterialError
             If a variable is missing or outside its bounds.
         """
-        constants = {field: values[name] for field, name in cls.variables.items() if name in values}
+        file_names = {f.name: cls.variables.get(f.name, f.name) for f in fields(cls)}  # type: ignore[arg-type]
+        constants = {field: values[name] for field, name in file_names.items() if name in values}
         needed = {f.name for f in fields(cls) if f.default is MISSING} - {"density"}  # type: ignore[arg-type]
-        absent = sorted(needed - constants.keys())
-        missing = [f"{field} ({cls.variables.get(field, field)})" for field in absent]
+        missing = [f"{field} ({file_names[field]})" for field in sorted(needed - constants.keys())]
         if missing:
             raise MaterialError(f"{cls.__name__} needs {', '.join(missing)}")
         return cls(**constants)

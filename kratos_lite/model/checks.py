@@ -13,7 +13,7 @@ from kratos_lite.assembly.element_groups import ElementGroup, element_class
 from kratos_lite.assembly.gauss_point_fields import clearly_positive, volumes
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.tables import gradients_at_nodes, tabulate
-from kratos_lite.errors import MAX_PROBLEMS, MeshError, ModelError, Problems, SolveError
+from kratos_lite.errors import MAX_PROBLEMS, InputError, MeshError, ModelError, Problems, SolveError
 from kratos_lite.materials import LinearMaterial, Material
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.model.loads import Load
@@ -45,7 +45,14 @@ def checked_linear_material(material: object) -> LinearMaterial:
 
 def checked_material(material: object) -> Material:
     """Return a material; InputError if it is not a material."""
-    return instance(material, "a material", Material, "kl.Isotropic3D(E=210e9, nu=0.3)")
+    law = instance(material, "a material", Material, "kl.Isotropic3D(E=210e9, nu=0.3)")
+    frozen = getattr(type(law), "__dataclass_params__", None)
+    if not law.is_linear and not (frozen and frozen.frozen and hasattr(law, "density")):
+        raise InputError(
+            f"{type(law).__name__} must be a frozen dataclass with a density: @dataclass(frozen=True) above "
+            "it, and density: float = 0.0 among its constants"
+        )
+    return law
 
 
 def check_geometry(mesh: Mesh, formulation: str | None = None) -> list[str]:

@@ -1,10 +1,12 @@
 """Nonlinear laws at one point: tangents by differences, closed forms, energies, refusals."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.errors import MaterialError, SolveError
+from kratos_lite.errors import InputError, MaterialError, SolveError
 from kratos_lite.materials import Material
 
 LAWS = [
@@ -250,6 +252,37 @@ def test_a_law_that_breaks_the_contract_is_told_how(change, says, monkeypatch):
     monkeypatch.setattr(kl.J2Plasticity3D, "response", lambda *a: change(*response(*a)))
     with pytest.raises(MaterialError, match=says):
         law.evaluate(np.full(6, 1e-3), law.initial_state(), 1.0)
+
+
+@dataclass(frozen=True)
+class Stiffening(Material):
+    E: float
+    hidden: float = 0.0
+    density: float = 0.0
+
+    def response(self, strain, state, dt):
+        return self.E * (strain + 100 * strain**3), None, {}
+
+
+def test_a_law_of_a_user():
+    law = Stiffening.from_variables({"E": 2e9, "DENSITY": 3.0})
+    assert law == Stiffening(2e9, 0.0, 3.0)
+    stress = law.evaluate([0.1, 0, 0, 0, 0, 0], {}, 1.0)[0]
+    assert abs(law.energy(np.array([0.1, 0, 0, 0, 0, 0]), stress, {}) - 2e9 * (0.005 + 25e-4)) < 1e-3
+    assert np.abs(law.C - 2e9 * np.eye(6)).max() < 1e-6 * 2e9
+    with pytest.raises(MaterialError, match=r"needs E \(E\)"):
+        Stiffening.from_variables({"hidden": 1.0})
+    with pytest.raises(MaterialError, match="six components"):
+        law.evaluate(np.zeros(5), {}, 1.0)
+
+
+def test_a_law_that_is_not_a_frozen_dataclass_is_refused():
+    class Plain(Material):
+        def response(self, strain, state, dt):
+            return strain, None, {}
+
+    with pytest.raises(InputError, match="frozen dataclass with a density"):
+        kl.Model(kl.box(), Plain())
 
 
 def test_a_law_cannot_use_its_own_tangent_at_rest(monkeypatch):

@@ -81,7 +81,7 @@ def yield_forgotten_in_pressure(law, strain, state, s, D, new):
         (pressure_scaled, "elastic strain", "as the stress does"),
         (elastic_tangent, "tangent", "against differences"),
         (hardened_twice, "one step or two", "updated twice"),
-        (state_overwritten, "contract", "changed in place"),
+        (state_overwritten, "contract", "in place"),
         (strain_changed, "contract", "work on copies"),
         (stress_at_rest, "rest", "stress at rest"),
         (last_state_kept, "elastic strain", "engineering shear"),
