@@ -208,10 +208,17 @@ CASES = (
 )
 
 
-@pytest.mark.parametrize(
-    ("way", "solver"), [(slabs, "direct"), (slabs, "amg"), (at_random, "amg"), (one_empty, "amg")]
+WAYS = (
+    *(
+        (build, make, way, solver)
+        for build, make in CASES
+        for way, solver in ((slabs, "direct"), (at_random, "amg"))
+    ),
+    *((build, box, way, "amg") for build in (pulled, tied, free) for way in (slabs, one_empty)),
 )
-@pytest.mark.parametrize(("build", "make"), CASES)
+
+
+@pytest.mark.parametrize(("build", "make", "way", "solver"), WAYS)
 def test_same_as_one_process(build, make, way, solver, monkeypatch):
     monkeypatch.setattr(cut, "parts_of", way)
     model = build(make())

@@ -17,7 +17,7 @@ from kratos_lite.solvers.plate_level import bending_modes, plate_axes, plate_lev
 pytestmark = compiled
 LIMIT = 60
 STEEL = kl.Isotropic3D(E=2e11, nu=0.3)
-CELLS = {"4N": (11, 11, 11), "8N": (11, 11, 11), "10N": (5, 5, 5), "20N": (6, 6, 6), "27N": (5, 5, 5)}
+CELLS = {"4N": (9, 9, 9), "8N": (9, 9, 9), "10N": (4, 4, 4), "20N": (5, 5, 5), "27N": (4, 4, 4)}
 
 
 WEIGHT = (3.0, 4.0, -9.0)  # in no special direction
@@ -68,7 +68,6 @@ def to_the_tolerance(monkeypatch):
 LINEAR, QUADRATIC = ("4N", "8N"), ("10N", "15N", "20N", "27N")
 STRETCHED = {
     "flat": (CELLS, (1.0, 1.0, 0.1), "z-"),
-    "very flat": (CELLS, (1.0, 1.0, 0.01), "z-"),
     "extremely flat": (CELLS, (1.0, 1.0, 0.001), "z-"),
     "flat, clamped at their edge": (CELLS, (1.0, 1.0, 0.1), "x-"),
     "very flat, clamped at their edge": (LINEAR, (1.0, 1.0, 0.01), "x-"),
