@@ -39,6 +39,11 @@ def stress_load(model: Structure, groups: Sequence[ElementGroup], u: Array) -> A
     return internal_load(model.mesh.points, groups, u if u0 is None else u - u0)
 
 
+def turned(tangents: Array) -> Array:
+    """Return the transposes of tangents (m, k, 3, k, 3)."""
+    return tangents.transpose(0, 3, 4, 1, 2)
+
+
 class AppliedLoads:
     """The nodal forces of the loads of a structure at a time; what does not change is made once."""
 

@@ -13,6 +13,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion, Solve
+from kratos_lite.analysis.nodal_loads import turned
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.constitutive import Constitutive, States, named, unnamed
 from kratos_lite.assembly.element_groups import ElementGroup
@@ -43,7 +44,11 @@ Known: TypeAlias = tuple[Array, BlockMatrix, History]
 
 
 class NonlinearMotion(EquationsOfMotion):
-    """Equations of motion whose stiffness follows the displacements; damping is that of the initial one."""
+    """Equations of motion whose stiffness follows the displacements; damping is that of the initial one.
+
+    What loads that follow the body have beyond those on the undeformed one counts as internal forces, and of
+    its tangent the symmetric part.
+    """
 
     history: History
 
@@ -64,7 +69,10 @@ class NonlinearMotion(EquationsOfMotion):
     def _evaluate(self, u: Array, time: float, tangent: bool) -> tuple[History, BlockMatrix | None]:
         strained, h = (u - self._u0).reshape(-1, 3), time - self.history.time
         forces, K, states = self.law.evaluate(strained, self.history.states, h, tangent=tangent)
-        self._found = History(time, u, forces.ravel(), states)
+        more, changes = self.applied.following(time, u)
+        if K is not None:
+            self.system.pattern.add_tangents(K.data, [(n, -(k + turned(k)) / 2) for n, k in changes])
+        self._found = History(time, u, forces.ravel() - more, states)
         return self._found, K
 
     def times_stiffness(self, u: Array, time: float) -> Array:

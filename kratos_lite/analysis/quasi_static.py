@@ -9,7 +9,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from kratos_lite.analysis.nodal_loads import AppliedLoads
+from kratos_lite.analysis.nodal_loads import AppliedLoads, turned
 from kratos_lite.analysis.prescribed_motion import PrescribedMotion
 from kratos_lite.analysis.report import Report, StepReport
 from kratos_lite.analysis.result import Result
@@ -300,7 +300,7 @@ class QuasiStaticAnalysis:
         if len(residuals) == 1:
             self._near = self._elastic  # not of the last step, which a restart does not know
         if iterates and tangent and self._near is None:
-            half = [(nodes, (k + k.transpose(0, 3, 4, 1, 2)) / 2) for nodes, k in tangent]
+            half = [(nodes, (k + turned(k)) / 2) for nodes, k in tangent]
             self._near = LinearSolver(self._less(K, half), *where, self._plan)
         symmetric = self._symmetric and not tangent and not self.arc_length
         solver = LinearSolver(self._less(K, tangent), *where, self._plan, symmetric, self._near)
@@ -325,8 +325,7 @@ class QuasiStaticAnalysis:
         if not tangent:
             return K
         data = K.data.copy()
-        for nodes, k in tangent:
-            self.system.pattern.add_at(data, nodes.astype(np.int32), -k.transpose(0, 1, 3, 2, 4))
+        self.system.pattern.add_tangents(data, [(nodes, -k) for nodes, k in tangent])
         return BlockMatrix(data, K.indices, K.indptr)
 
     def _shortened(self, u: Array, du: Array, r: Array, load: Callable[[Array], Load], dt: float) -> Array:

@@ -44,6 +44,11 @@ class Pattern:
         """Add matrices of some elements of a number: (m, k, k, 3, 3) to (nnz, 3, 3), (m, k, k) to (nnz,)."""
         self.add_at(data, self.connectivity[number][window], matrices)
 
+    def add_tangents(self, data: Array, tangents: Sequence[tuple[Ints, Array]]) -> None:
+        """Add tangents (m, k, 3, k, 3) at nodes (m, k), each of one element."""
+        for nodes, matrices in tangents:
+            self.add_at(data, nodes.astype(np.int32), matrices.transpose(0, 1, 3, 2, 4))
+
     def add_at(self, data: Array, nodes: Rows, matrices: Array) -> None:
         """Add matrices to nodes (m, k) that are each of one element."""
         if module := kernels("stiffness"):

@@ -82,7 +82,7 @@ def read_kratos_project(
         text = "supports, loads and motion are taken at the end of the run"
         notes.append(f"{text}: those at t = {times[-1]:g} s")
     actions, checks = _read_processes(settings, context, notes)
-    in_time = ProcessesInTime(actions, context, dynamic) if dynamic or in_steps else None
+    in_time = ProcessesInTime(actions, context, dynamic, nonlinear) if dynamic or in_steps else None
     processes = partial(run, actions, context, notes) if in_time is None else in_time.prepare
     initial_displacement = initial_displacement and in_time is None
     model = model_from(document, initial_displacement=initial_displacement, processes=processes)

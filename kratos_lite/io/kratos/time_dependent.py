@@ -39,8 +39,11 @@ UNPRESCRIBED = ("VELOCITY", "ACCELERATION")
 class ProcessesInTime:
     """The processes of a run file as supports, loads and initial state of a transient, or of static steps."""
 
-    def __init__(self, actions: Sequence[Action], context: RunContext, dynamic: bool = True) -> None:
+    def __init__(
+        self, actions: Sequence[Action], context: RunContext, dynamic: bool = True, follows: bool = False
+    ) -> None:
         self.context, self.dynamic = context, dynamic
+        self.follows = follows  # whether loads on faces follow the body
         self.notes = notes_of(actions, context)
         self.actions = [action for action in actions if action.steps and len(action.indices)]
         self._later: list[Load] = []
@@ -63,7 +66,7 @@ class ProcessesInTime:
             actions = [action for action in self.actions if action.component in group]
             if any(action.mentions("t") or not self._acts_always(action) for action in actions):
                 if group is SURFACE:
-                    values.note_idle(self.notes, follows=not self.dynamic)
+                    values.note_idle(self.notes, follows=self.follows)
                 values.drop(group)
                 self._later.append(TimeDependentLoad(_load_in_time(actions, times, base, load_of)))
         values.drop({f"{name}_{axis}" for name in UNPRESCRIBED for axis in "XYZ"})
