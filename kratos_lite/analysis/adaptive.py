@@ -72,6 +72,7 @@ def solve_to(
         raise ModelError(
             "a model whose material moves through its mesh is not refined; solve it without error"
         )
+    model.require_linear("a requested error")
     check_quantity(quantity)
     level: Level | None = None
     step: RefinedMesh | None = None

@@ -58,11 +58,8 @@ class EquationsOfMotion:
         self.step = 0.0  # s, over which an acceleration is taken from the rate; 0 for its slope
         self.rayleigh = _checked_rayleigh(rayleigh)
         self.groups, self.warnings = model.checked()  # elements on all nodes of the mesh
-        if model.motion is not None and model.is_nonlinear:
-            raise ModelError(
-                "a motion of the material takes linear laws and small displacements; got "
-                f"{', '.join(sorted({_law(g) for g in self.groups if not g.is_linear}))}"
-            )
+        if model.motion is not None:
+            model.require_linear("a motion of the material")
         if not free:
             self.free_motions.check((), moving=False)
         for group in self.groups:
@@ -303,11 +300,6 @@ def _solved(
 ) -> Array:
     """Return displacements (3a,); no lambda, as an analysis can be pickled."""
     return equations.solve(f, STEP_TOLERANCE, progress, prescribed, start, OF_START).x
-
-
-def _law(group: ElementGroup) -> str:
-    """Return the name of what is not linear in a group: its law, or its element."""
-    return type(group.material).__name__ if not group.material.is_linear else group.element.__name__
 
 
 def _checked_rayleigh(rayleigh: tuple[float, float]) -> tuple[float, float]:

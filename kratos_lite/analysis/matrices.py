@@ -103,6 +103,8 @@ def local_system_of(model: Structure, element: int, u: ArrayLike | None = None) 
     """Return the matrices of an element; see `Model.local_system`."""
     points = model.mesh.points
     displaced = np.zeros_like(points) if u is None else finite(u, "the displacement", points.shape)
+    if u is not None:
+        model.require_linear("the local system at a displacement")
     if model.initial_displacement is not None:
         displaced = displaced - model.initial_displacement
     group = group_of_element(model.mesh, model.element_groups(), element)

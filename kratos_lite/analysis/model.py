@@ -31,7 +31,8 @@ class Model(Structure):
     mesh : points, elements and named parts.
     material : one material for all elements, or materials by part name or property id.
     formulation : of the elements, in place of what their names in the mesh say: ``standard``, ``enhanced``,
-        ``b_bar``, ``reduced``, or ``non_locking``: that of each shape which does not lock with its material.
+        ``b_bar``, ``reduced``, ``total_lagrangian`` for large displacements, or ``non_locking``: that of each
+        shape which does not lock with its material.
 
     Raises
     ------
@@ -116,7 +117,8 @@ class Model(Structure):
             if self.is_nonlinear:
                 from kratos_lite.analysis.quasi_static import solve_nonlinear  # as above
 
-                check_own(backend, petsc, "a law that is not linear")
+                if backend == "petsc" or petsc is not None:
+                    self.require_linear("backend='petsc'")
                 return solve_nonlinear(self, tolerance, shown)
             analysis = StaticAnalysis(self, solver, tolerance, shown, backend=backend, petsc=petsc)
             try:
@@ -216,6 +218,10 @@ class Model(Structure):
             equations = EquationsOfMotion(self, free=False, steady=True)
             equations.load(0.0)
             return equations.warnings
+        if self.is_nonlinear:
+            steps = self.quasi_static()
+            steps.applied(0.0)
+            return steps.warnings
         analysis = StaticAnalysis(self)
         analysis.check()
         return analysis.warnings
@@ -272,7 +278,7 @@ class Model(Structure):
         """Return natural frequencies and mode shapes.
 
         All supported degrees of freedom are fixed at zero.  A motion of the material is ignored: see
-        `complex_modes`.
+        `complex_modes`.  Laws that are not linear count with C, their tangent at rest, and no stress.
 
         Parameters
         ----------
@@ -347,6 +353,8 @@ class Model(Structure):
         self, *, time: float = 0.0, lumped: bool = False, rayleigh: tuple[float, float] = (0.0, 0.0)
     ) -> Matrices:
         """Return K, M, C, f and what supports do, as SciPy matrices, to solve them in another way.
+
+        K of a law that is not linear is that of its C, the tangent at rest.
 
         Parameters
         ----------

@@ -86,6 +86,7 @@ def solve_part(
     phase = Phases(progress if partition.rank == 0 else None)
     with partition.agree_on_errors():
         check_arguments(solver, tolerance)
+        model.require_linear("a mesh in parts")
         with phase("check"):
             groups, warnings = _checked(model)
         with phase("load"):

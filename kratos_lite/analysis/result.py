@@ -393,7 +393,7 @@ class Result(ElementFields, Tabular):
         error = [("estimated error", self._stated_error())] if self.is_linear else []
         for name, (value, element, center) in self.largest_variables().items():
             place = f"in element {element} around {vector(center)} m"
-            error.append((f"largest {MEASURES[name]}", f"{value:.6e} (at a Gauss point) {place}"))
+            error.append((MEASURES[name], f"up to {value:.6e} (at a Gauss point) {place}"))
         rows = self._summary(counts, extremes, error, size, str(peak(self) or ""))
         if not self.is_linear:
             return rows

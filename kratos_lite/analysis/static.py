@@ -61,6 +61,7 @@ class StaticAnalysis:
         self.backend, self.petsc = backend_of(backend, petsc), petsc
         if model.motion is not None:
             raise ModelError("a model with a motion is solved by model.solve() or moves by model.transient()")
+        model.require_linear("static analysis with one matrix")
         self.model, self.solver, self.tolerance = model, solver, tolerance
         self.progress = progress
         self._phase = Phases(progress)

@@ -10,7 +10,10 @@ from kratos_lite.errors import InputError, KratosLiteError
 BACKEND = "petsc: statics, by PETSc over all processes that mpirun or srun has started (own, on one)"
 BOUNDARIES = "condition on the cut faces of the moving frame (absorbing)"
 ERROR = "relative error of the energy norm below 1, such as 1%% or 0.01: statics, the mesh made finer"
-FORMULATION = "instead of that of the names of elements: standard, enhanced, b_bar, reduced or non_locking"
+FORMULATION = (
+    "instead of that of the names of elements: standard, enhanced, b_bar, reduced, "
+    "total_lagrangian or non_locking"
+)
 INTEGRATOR = (
     "newmark[:BETA,GAMMA], hht[:ALPHA], bossak[:ALPHA], generalized_alpha[:RHO] or central_difference"
 )

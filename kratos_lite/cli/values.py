@@ -136,6 +136,7 @@ def material(text: str) -> tuple[str | None, Material]:
     ('steel', Isotropic3D(E=210000000000.0, nu=0.3, density=0.0))
     """
     from kratos_lite.materials import MATERIALS  # help and version do without NumPy
+    from kratos_lite.tabular import names_of
 
     *names, constants = text.split(":")
     laws = ["Isotropic3D", *(name for name in names if name in MATERIALS)]
@@ -144,12 +145,13 @@ def material(text: str) -> tuple[str | None, Material]:
         hint = nearest(str(parts[-1]), MATERIALS)
         raise InputError(f"{parts[-1]!r} is no material; have {', '.join(MATERIALS)}.{hint}")
     law = MATERIALS[laws[-1]]
+    variables = {field: law.variables.get(field, field) for field in names_of(law)}
     values: dict[str, float] = {}
     for pair in constants.split(","):
         key, equals, value = (word.strip() for word in pair.partition("="))
-        variable = law.variables.get(key, key)
-        if not equals or variable not in law.variables.values():
-            raise InputError(f"constants of {laws[-1]} are {', '.join(law.variables)}; got {pair!r}")
+        variable = variables.get(key, key)
+        if not equals or variable not in variables.values():
+            raise InputError(f"constants of {laws[-1]} are {', '.join(variables)}; got {pair!r}")
         if variable in values:
             raise InputError(f"{key} is given twice")
         values[variable] = number(value)

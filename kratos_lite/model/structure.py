@@ -158,6 +158,26 @@ class Structure(Tabular):
             return self.formulation == "total_lagrangian"
         return any(len(b) and b.name in ELEMENTS and ELEMENTS[b.name].finite for b in self.mesh.blocks)
 
+    def require_linear(self, what: str) -> None:
+        """Refuse laws and displacements that are not linear.
+
+        Parameters
+        ----------
+        what : needs them linear; the error begins with it.
+
+        Raises
+        ------
+        ModelError
+            A law is not linear, or an element has large displacements.
+        """
+        if self.is_nonlinear:
+            laws = {type(law).__name__ for law in self._used_materials() if not law.is_linear}
+            raise ModelError(
+                f"{what} takes linear laws and small displacements; got "
+                f"{', '.join(sorted(laws)) or 'large displacements'}; take model.solve() or "
+                "model.quasi_static() of the model as it is"
+            )
+
     @property
     def has_own_rules(self) -> bool:
         """Whether any element has another quadrature rule than that of its class."""

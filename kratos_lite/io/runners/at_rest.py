@@ -11,7 +11,7 @@ from kratos_lite.typing import Progress
 def check(case: Case) -> list[str]:
     """Return the warnings of the model, checked as its solution does."""
     model = case.model
-    if model.motion is not None:
+    if model.motion is not None or model.is_nonlinear:
         return model.check()
     analysis = StaticAnalysis(model, case.solver, case.tolerance, backend=case.backend, petsc=case.petsc)
     return analysis.check()
