@@ -51,7 +51,7 @@ def test_every_input_is_a_case_with_its_analysis(folder):
         written(RUN, "static.py"): "static",
         written(RUN + "model.add(kl.ale.Translation('x', 1.0))\n", "steady.py"): "steady",
         written(RUN + "case.time = kl.TimeIntegration(0.1, 3)\n", "time.py"): "transient",
-        written(RUN + "case.time = kl.TimeIntegration(0.1, 3, quasi_static={})\n", "steps.py"): "quasi_static",
+        written(RUN + "case.time = kl.TimeIntegration(1, 3, quasi_static={})\n", "steps.py"): "quasi_static",
         written(BODY, "body.py"): "bodies",
     }
     cases = {name: kl.read_case(name) for name in inputs}
