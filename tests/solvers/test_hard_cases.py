@@ -311,7 +311,7 @@ def unstructured(aspect):
 
 
 def halves(x):
-    return x[:, 2] > 6 / 11
+    return x[:, 2] > 5 / 9
 
 
 CLUSTERS = {
@@ -320,9 +320,9 @@ CLUSTERS = {
     "three sides without a gap": (0, lambda: cylinder(40)),
     "unstructured": (0, lambda: unstructured(1)),
     "unstructured and flat": (0, lambda: unstructured(10)),
-    "flat: lines": (12**2, lambda: body("8N", (1.0, 1.0, 0.1), "rollers")),
-    "long: planes": (12, lambda: body("8N", (1.0, 1.0, 10.0), "rollers")),
-    "flat, of unlike materials": (2 * 12**2, lambda: body("8N", (1, 1, 0.1), "rollers", contrast=halves)),
+    "flat: lines": (10**2, lambda: body("8N", (1.0, 1.0, 0.1), "rollers")),
+    "long: planes": (10, lambda: body("8N", (1.0, 1.0, 10.0), "rollers")),
+    "flat, of unlike materials": (2 * 10**2, lambda: body("8N", (1, 1, 0.1), "rollers", contrast=halves)),
 }
 """Clusters of nodes on the finest level, and a body with as many."""
 
