@@ -92,7 +92,7 @@ GROUPS = {
         ),
         Option("--formulation", "WORD", FORMULATION, only="models"),
         Option("--scale", "FACTOR", "on the coordinates of a mesh file: a number, or mm, cm, in, ft (1)"),
-        Option("--linear", None, "small deformations, also where a run file asks for large ones"),
+        Option("--linear", None, "small displacements and linear laws, whatever a run file asks for"),
         Option("--ignore-initial-displacement", None, STRESS_FREE),
     ),
     "motion of the material through the mesh (one at most)": _all(

@@ -78,7 +78,7 @@ def read_case(
     allow_outside : let a .json file name files outside its folder.
     initial_displacement : take the DISPLACEMENT of nodes that are not fixed for the state without stress;
         False ignores it.
-    linear : take small deformations where a run file asks for large ones, which is refused otherwise.
+    linear : take small displacements and linear laws where a run file asks for others.
     scale : factor on the coordinates of a mesh file, such as 1e-3 for mm; nothing else is scaled.
     part : number of the part to read, of a mesh that Kratos has divided into part files.
 

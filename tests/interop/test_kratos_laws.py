@@ -48,6 +48,29 @@ CASES = {
     "updated": ("UpdatedLagrangianElement", "HyperElastic3DLaw", {}, 0.3),
 }
 
+EXACT = {
+    "analysis_type": "non_linear",
+    "convergence_criterion": "residual_criterion",
+    "residual_relative_tolerance": 1e-12,
+    "residual_absolute_tolerance": 1e-9,
+    "max_iteration": 50,
+}
+
+
+def compare(folder, content, steps):
+    """Compare the displacements after each step of a folder."""
+    path = write(folder, content)
+    run_kratos(folder)
+    expected = json.loads((folder / "kratos.json").read_text())["steps"]
+    case = read_case(path)
+    ids = [str(i) for i in case.model.mesh.node_ids]
+    count = 0
+    for state, known in zip(prepare(case)[1], expected, strict=True):
+        reference = np.array([known[i] for i in ids])
+        assert np.abs(state.u - reference).max() < 1e-8 * np.abs(reference).max(), state.step
+        count += 1
+    assert count == steps
+
 
 def moved(axis, value):
     return process(
@@ -73,21 +96,20 @@ def test_ten_steps_are_those_of_kratos(tmp_path, name):
         [],
         step=0.1,
         end=0.95,
-        analysis_type="non_linear",
-        convergence_criterion="residual_criterion",
-        residual_relative_tolerance=1e-12,
-        residual_absolute_tolerance=1e-9,
-        max_iteration=50,
+        **EXACT,
     )
-    path = write(tmp_path, content)
-    run_kratos(tmp_path)
-    expected = json.loads((tmp_path / "kratos.json").read_text())["steps"]
-    case = read_case(path)
-    _, states = prepare(case)
-    ids = [str(i) for i in case.model.mesh.node_ids]
-    count = 0
-    for state, known in zip(states, expected, strict=True):
-        reference = np.array([known[i] for i in ids])
-        assert np.abs(state.u - reference).max() < 1e-8 * np.abs(reference).max(), (name, state.step)
-        count += 1
-    assert count == 10
+    compare(tmp_path, content, 10)
+
+
+@pytest.mark.parametrize("prefix", ["", "SmallDisplacement"])
+def test_loads_on_faces_follow_the_body_as_in_kratos(tmp_path, prefix):
+    """Pressures and tractions of SurfaceLoadCondition act on deformed faces; these keep their direction."""
+    text = box_mdpa().replace("SmallDisplacementElement", "TotalLagrangianElement")
+    text = text.replace("SmallDisplacementSurfaceLoad", f"{prefix}SurfaceLoad")
+    (tmp_path / "box.mdpa").write_text(text)
+    write(tmp_path, materials("Structure.Body", 7850.0, 2e9, 0.3, "HyperElastic3DLaw"), "materials.json")
+    to_conditions = "assign_scalar_variable_to_conditions_process"
+    pressure = process(to_conditions, "Structure.Side", "POSITIVE_FACE_PRESSURE", value="-2e8*t")
+    vector = "assign_vector_variable_to_conditions_process"
+    traction = process(vector, "Structure.Top", "SURFACE_LOAD", value=["1e8*t", 0.0, "2e8*t"])
+    compare(tmp_path, run_file([CLAMP], [pressure, traction], step=0.25, end=0.95, **EXACT), 4)
