@@ -253,6 +253,10 @@ class EquationsOfMotion:
         """Return the history that has such values at displacements (3a,) and a time."""
         return None
 
+    def load_of_result(self, u: Array, time: float) -> Array:
+        """Return the nodal forces (3a,) at displacements (3a,) and a time."""
+        return self.load(time)
+
     def groups_of_result(self) -> list[ElementGroup]:
         """Return the elements with the states of their laws."""
         return self.groups

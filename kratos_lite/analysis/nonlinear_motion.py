@@ -22,7 +22,7 @@ from kratos_lite.errors import SolveError
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.linear_solver import LinearSolver
 from kratos_lite.solvers.newton import forcing, newton
-from kratos_lite.solvers.plan import Plan, stepped
+from kratos_lite.solvers.plan import stepped
 from kratos_lite.typing import Array
 
 TOLERANCE, ITERATIONS = 1e-9, 25
@@ -60,11 +60,7 @@ class NonlinearMotion(EquationsOfMotion):
         self._found: History | None = None  # of the last evaluation
         rest = np.zeros(self.size)
         self.history = History(0.0, rest, rest, self.law.start())
-        symmetric = all(group.material.symmetric_tangent for group in self.groups)
-        plan = stepped(len(self.system.constraint_map.free))
-        made = LinearSolver(self.K, self.system.constraint_map, self.system.points, plan)
-        unsymmetric = Plan("direct", "the tangent of a law is not symmetric")
-        self._linear = made if symmetric else replace(made, plan=unsymmetric, symmetric=False)
+        self._symmetric = all(group.material.symmetric_tangent for group in self.groups)
 
     def _evaluate(self, u: Array, time: float, tangent: bool) -> tuple[History, BlockMatrix | None]:
         strained, h = (u - self._u0).reshape(-1, 3), time - self.history.time
@@ -81,11 +77,19 @@ class NonlinearMotion(EquationsOfMotion):
         return known.internal
 
     def solver(self, time: float, m: float, c: float, k: float, h: float) -> Solve:
-        """Return what solves m M u + c C u + k (r(u₀ + u) - r(u₀)) = f + reactions, u₀ of the history."""
-        return partial(self._newton, self.matrix(time, m, c, 0.0), k, self.history.time + h)
+        """Return what solves m M u + c C u + k (r(u₀ + u) - r(u₀)) = f + reactions, u₀ of the history.
+
+        Tangents are solved with the multigrid of the body at rest.
+        """
+        plan, near = stepped(len(self.system.constraint_map.free)), None
+        if plan.iterates:
+            near = super().solver(time, m, c, k, h).args[0]  # type: ignore[attr-defined]
+        A = self.matrix(time, m, c, 0.0)
+        linear = LinearSolver(A, self.system.constraint_map, self.system.points, plan, near=near)
+        return partial(self._newton, linear, k, self.history.time + h)
 
     def _newton(
-        self, A: BlockMatrix, k: float, end: float, f: Array, prescribed: Array, start: Array | None
+        self, linear: LinearSolver, k: float, end: float, f: Array, prescribed: Array, start: Array | None
     ) -> Array:
         """Return displacements (3a,) from the history, under forces f with a jump of what is prescribed."""
         before, reduce = self.history, self.system.constraint_map.reduce
@@ -93,16 +97,16 @@ class NonlinearMotion(EquationsOfMotion):
         def evaluate(du: Array) -> tuple[float, Known]:
             now, K = self._evaluate(before.u + du, end, True)
             assert K is not None
-            inertia, internal = A @ du, k * (now.internal - before.internal)
+            inertia, internal = linear.K @ du, k * (now.internal - before.internal)
             r = f - inertia - internal
             scale = max(float(np.linalg.norm(v)) for v in (f, inertia, now.internal))
             K.data *= k
-            K.data += A.data
+            K.data += linear.K.data
             return float(np.linalg.norm(reduce(r))) / (scale or 1.0), (r, K, now)
 
         def correction(du: Array, known: Known, residuals: list[float]) -> Array:
             jump = prescribed if len(residuals) == 1 else 0.0 * prescribed
-            solver = replace(self._linear, K=known[1])
+            solver = replace(linear, K=known[1], symmetric=self._symmetric)
             return solver.solve(known[0], forcing(residuals, TOLERANCE), None, jump, jump).x
 
         rest, least = np.zeros(self.size), int(prescribed.any())
@@ -125,6 +129,10 @@ class NonlinearMotion(EquationsOfMotion):
         """Return the energy in J that the laws store."""
         strained = (u - self._u0).reshape(-1, 3)
         return totals(self.system.points, self._with_states(self.system.groups), strained)[0]
+
+    def load_of_result(self, u: Array, time: float) -> Array:
+        """Return the nodal forces (3a,) at a time, those among them that follow the faces."""
+        return self.load(time) + self.applied.following(time, u)[0]
 
     def groups_of_result(self) -> list[ElementGroup]:
         """Return the elements with the states of their laws."""

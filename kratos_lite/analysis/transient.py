@@ -310,7 +310,7 @@ class TransientAnalysis:
             on free nodes, relative; None for integrators that do not take the balance at the end of a step.
         """
         e, at, residual = self.equations, self.state() if state is None else self.check_state(state), None
-        model, loads = e.model, e.system.scatter(e.load(at.time)).copy()
+        model = e.model
         if self.integrator.balanced:
             _, free, largest = self._residual(at)
             residual = free / largest if largest else 0.0
@@ -321,8 +321,8 @@ class TransientAnalysis:
             "seconds": {},
             "warnings": warnings,
         }
-        fields = at.u.copy(), at.reactions.copy(), loads
-        with self._at(at):
+        with self._at(at) as (u, _, _, time):
+            fields = at.u.copy(), at.reactions.copy(), e.system.scatter(e.load_of_result(u, time)).copy()
             result = result_of(Result, None, model, e.groups_of_result(), fields, solution, **told)
         result.report.backward_error = residual
         if e.terms is not None:

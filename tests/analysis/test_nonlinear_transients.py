@@ -165,6 +165,23 @@ def test_restart_goes_on_bit_by_bit(law, integrator):
         other.transient().state().restore(again)
 
 
+@pytest.mark.parametrize("direct", [0, 10_000], ids=["multigrid", "factors"])
+def test_a_block_comes_to_rest_where_statics_has_it(direct, monkeypatch):
+    """Under a pressure that follows its faces."""
+    monkeypatch.setattr("kratos_lite.solvers.plan.STEPPED_LIMIT", direct)
+    model = kl.Model(kl.box((1, 1, 2), (2, 2, 3), "Element3D8N"), RUBBER)
+    model.fix("z-")
+    model.add(kl.Pressure("x+", 6e4, follower=True))
+    transient = model.transient(rayleigh=(15.0, 5e-3), integrator=kl.GeneralizedAlpha(0.2))
+    after(transient, 0.05, 100)
+    result, static = transient.result(), model.solve()
+    assert np.abs(static.u).max() > 1.0
+    assert np.abs(result.u - static.u).max() < 1e-5
+    assert np.abs(result.report.total_load - static.report.total_load).max() < 1.0
+    assert np.abs(result.report.total_load + result.report.total_reaction).max() < 1.0
+    assert abs(static.report.total_load[2]) > 1e3  # as the face has turned
+
+
 def test_a_step_without_a_solution_is_not_taken():
     model = held(RUBBER, (1, 1, 2))
     model.fix("z-")
