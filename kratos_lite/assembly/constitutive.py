@@ -186,10 +186,10 @@ class Window:
         """Return the response of the law for some elements; an error of it names them."""
         try:
             return self.group.material.evaluate(strain, state.take(some).variables, dt, tangent=tangent)
-        except MaterialError as error:
+        except (MaterialError, SolveError) as error:
             rows = self.group.rows[some]
             where = f"[element, point] of the elements in rows {rows[0]} … {rows[-1]}"
-            raise MaterialError(f"{error}; {where}") from None
+            raise type(error)(f"{error}; {where}") from None
 
     def strain(self) -> Array:
         """Return ε = B u, or Green's strain, (m, g, 6); SolveError for elements turned inside out."""
@@ -238,7 +238,10 @@ class Window:
                 size = np.einsum("mgci,mgc->mi", np.abs(weighted), np.abs(stress))
                 if (np.abs(h) <= MODES_CONVERGED * size.max(axis=1, keepdims=True)).all():
                     break
-                alpha = alpha - np.linalg.solve(A, h[..., None])[..., 0]
+                try:
+                    alpha = alpha - np.linalg.solve(A, h[..., None])[..., 0]
+                except np.linalg.LinAlgError:
+                    raise SolveError("the law does not resist enhanced strains; take b_bar") from None
             else:
                 raise SolveError(
                     f"enhanced strains do not converge in {MODES_MAX} iterations; take smaller steps"

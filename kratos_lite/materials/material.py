@@ -10,7 +10,7 @@ from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
-from kratos_lite.errors import MaterialError
+from kratos_lite.errors import MaterialError, SolveError
 from kratos_lite.registry import Registry
 from kratos_lite.tabular import names_of
 from kratos_lite.typing import Array
@@ -206,7 +206,9 @@ class Material:
         Raises
         ------
         MaterialError
-            The law returns something else than its contract says, or numbers that are not finite.
+            The law returns something else than its contract says.
+        SolveError
+            It returns numbers that are not finite: a step is cut then.
         """
         strain = np.array(strain, dtype=float)  # a copy, which a law cannot spoil
         if strain.shape[-1:] != (6,) or not dt >= 0:
@@ -267,7 +269,7 @@ class Material:
             )
         if not np.isfinite(values).all():
             at = np.argwhere(~np.isfinite(values))[0].tolist()
-            raise MaterialError(f"{type(self).__name__}.response: the {what} is not finite at {at}")
+            raise SolveError(f"{type(self).__name__}.response: the {what} is not finite at {at}")
 
     def _check_state(self, state: Any, lead: tuple[int, ...]) -> None:
         names = dict(self.internal_variables)

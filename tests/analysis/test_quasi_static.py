@@ -1,10 +1,13 @@
 """Quasi-static analyses beside closed forms; convergence, restart, cuts and refusals."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 
 import kratos_lite as kl
 from kratos_lite.errors import InputError, ModelError, SolveError
+from kratos_lite.materials import MATERIALS
 from kratos_lite.solvers.multigrid import multigrid
 
 E, H, Y = 200e9, 2e9, 200e6
@@ -196,6 +199,40 @@ def test_an_element_turned_inside_out_is_named(law):
     u[:, 2] = -1.25 * model.mesh.points[:, 2]
     with pytest.raises(SolveError, match=r"row 0 is turned inside out at Gauss point 1"):
         model.quasi_static().law.evaluate(u, model.quasi_static().states, 1.0)
+
+
+def test_what_comes_back_to_rest_converges():
+    law = kl.NeoHookean3D(1e6, 0.3)
+    loaded = bar(law, size=(1, 1, 1))
+    loaded.add(kl.Traction("z+", (0, 0, 3e5)), amplitude=lambda t: 1 - abs(t - 1))
+    assert np.abs(steps(loaded, 1.0, 2).result().u).max() < 1e-6
+    turned = kl.Model(kl.box(cells=(2, 1, 1)), law)
+    x, y, _ = turned.mesh.points.T
+    c, s = np.cos(0.5) - 1, np.sin(0.5)
+    turned.fix("x-", value=np.stack([c * x - s * y, s * x + c * y, 0 * x], 1)[turned.mesh.nodes("x-")])
+    turned.fix("x+", value=np.stack([c * x - s * y, s * x + c * y, 0 * x], 1)[turned.mesh.nodes("x+")])
+    result = turned.solve()
+    assert np.abs(result.stress()).max() < 1e-6 * 1e6
+
+
+def test_a_law_that_overflows_is_approached_in_parts():
+    """Its stress is not finite where the first correction leads."""
+
+    @dataclass(frozen=True)
+    class Bounded(kl.Material):
+        E: float
+        density: float = 0.0
+
+        def response(self, strain, state, dt):
+            with np.errstate(all="ignore"):
+                return self.E * strain / np.sqrt(1 - (strain / 0.1) ** 2), None, {}
+
+    with MATERIALS.temporary():
+        model = bar(Bounded(1e6), "KinematicLinear3D8N", size=(1, 1, 1))
+        model.add(kl.Traction("z+", (0, 0, 1.5e5)))
+        result = model.solve()
+    e = result.displacement("z+")[:, 2].mean()
+    assert abs(1e6 * e / np.sqrt(1 - (e / 0.1) ** 2) / 1.5e5 - 1) < 1e-6
 
 
 def test_refusals():

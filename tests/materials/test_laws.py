@@ -250,7 +250,7 @@ def test_rubber_pulled_and_sheared(stretch):
 def test_a_law_that_breaks_the_contract_is_told_how(change, says, monkeypatch):
     law, response = kl.J2Plasticity3D(200e9, 0.3, 250e6), kl.J2Plasticity3D.response
     monkeypatch.setattr(kl.J2Plasticity3D, "response", lambda *a: change(*response(*a)))
-    with pytest.raises(MaterialError, match=says):
+    with pytest.raises((MaterialError, SolveError), match=says):
         law.evaluate(np.full(6, 1e-3), law.initial_state(), 1.0)
 
 
