@@ -259,3 +259,13 @@ def test_the_pulse_leaves_the_window(tmp_path, script):
         assert float(wrong[time]) == pytest.approx(error, rel=0.05)
     assert number(r"energy left (\S+)", out) < 1e-4
     assert (tmp_path / "pulse.png").stat().st_size > 10_000
+
+
+def test_twisted_rubber_resists_and_pushes(tmp_path, script):
+    pytest.importorskip("matplotlib")
+    out = script(EXAMPLES / "twisted_rubber.py", tmp_path / "rubber.png")
+    torque, push = np.array(re.findall(r"torque +(\S+) kN m, push +(\S+) N", out), float).T
+    slope = 1e6 / 2.8 * 0.1406 / 4 / 1e3  # G J / L of a square in kN m
+    assert abs(torque[0] / (slope * np.pi / 4) - 1) < 0.05
+    assert abs(push[1] / push[0] / 4 - 1) < 0.06  # Poynting: with the square of small angles
+    assert (tmp_path / "rubber.png").stat().st_size > 10_000

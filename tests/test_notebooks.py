@@ -26,9 +26,9 @@ def test_notebooks_run_and_reach_their_numbers(folder, tmp_path):
     run_scripts(tmp_path, {name: "\n".join(code) for name, code in pages.items()}, dict.fromkeys(pages, data))
 
 
-def test_there_are_ten_tutorials_and_each_leads_to_the_next():
+def test_there_are_eleven_tutorials_and_each_leads_to_the_next():
     tutorials = [page for page in NOTEBOOKS if page.parent != SOLUTIONS]
-    assert len(tutorials) == 10
+    assert len(tutorials) == 11
     for page, following in pairwise(tutorials):
         assert f"({following.name})" in page.read_text()
 
