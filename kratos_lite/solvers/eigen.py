@@ -40,6 +40,8 @@ PATIENCE = 40
 """Steps without a smaller error after which it does not either."""
 DEPENDENT = 1e-11
 """Squared size of what a vector adds to the span of others, as a fraction, up to which it is rounding."""
+RESTARTS = 12
+"""Times that Lanczos' method for modes near a frequency begins again before it does not converge."""
 SECOND, NEAR = 2, 1e-3
 """Vectors of the second start, and the error up to which its eigenvalues tell whether one was missed."""
 CANCELLED = 0.01
@@ -90,9 +92,13 @@ def modes_near(K: Csr, M: Csr, count: int, near: float) -> tuple[Array, Array]:
 
         operator, start = LinearOperator((n, n), inverse, dtype=np.float64), _random(1 + len(squares), n)[0]
         try:
-            found, Y = eigsh(K, count + GUARDS, M, shift, v0=inverse(M @ start), OPinv=operator)
+            options = {"ncv": min(n, 4 * count + 40), "maxiter": RESTARTS, "v0": inverse(M @ start)}
+            found, Y = eigsh(K, count + GUARDS, M, shift, OPinv=operator, **options)
         except ArpackError:
-            raise not_converged(count) from None
+            raise SolveError(
+                f"{count} modes near {near:g} rad/s cannot be found by iteration; ask for more or for fewer, "
+                "and look whether the model has modes at such frequencies"
+            ) from None
         first, radius = not len(squares), np.abs(found - shift).min()  # in ω², within which are no others
         squares, X = np.append(squares, found), np.hstack([X, Y])
         omega = np.sqrt(np.maximum(squares, 0.0))

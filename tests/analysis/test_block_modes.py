@@ -114,6 +114,15 @@ def test_what_has_no_modes_near_a_frequency(near, words, monkeypatch):
         kl.Model(kl.box(), kl.Isotropic3D(nu=0.3, **STEEL)).modes(1, near=near)
 
 
+def test_frequencies_that_a_model_does_not_have_are_refused(monkeypatch):
+    model = kl.Model(kl.box((1, 1, 1), (4, 4, 4)), kl.Isotropic3D(nu=0.3, **STEEL))
+    model.fix("z-")
+    monkeypatch.setattr(eigen, "DENSE_MODES", 0)
+    monkeypatch.setattr(eigen, "RESTARTS", 1)
+    with pytest.raises(SolveError, match=r"3 modes near 1e\+08 rad/s cannot be found .* at such frequencies"):
+        model.modes(3, near=1e8)
+
+
 def test_modes_of_larger_bodies_by_closed_forms():
     """A confined column: c π (k - ½) / L; a free cube has double and triple modes."""
     material = kl.Isotropic3D(E=1.0, nu=0.3, density=1.0)
