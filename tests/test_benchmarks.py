@@ -29,6 +29,7 @@ from benchmarks import (  # noqa: E402
     driver,
     dynamics,
     hard_scenes,
+    laws,
     motion,
     report,
     scaling,
@@ -286,6 +287,19 @@ def test_modes_and_steps_beside_statics(monkeypatch):
     assert last.startswith("| 8N | 336 | 2 | 5 (2.5) | ")
 
 
+def test_laws_beside_another_program():
+    row = laws.timed(sys.executable, "ours", "J2", 2)
+    assert row["unknowns"] == 3 * 3 * 3 * 5
+    assert row["iterations"] > 10
+    other = row | {"seconds": 2 * row["seconds"], "u": row["u"] * (1 + 1e-9)}
+    rows = [{"law": "J2", "n": 2, "ours": row, "Kratos": other}]
+    page = laws.page({"rows": [*rows, rows[0] | {"Kratos": {"failed": "> 9 s"}}], "points": {"J2": 3.14}})
+    assert "| 0.5 | 1e-09 |" in page
+    assert "| > 9 s |" in page
+    assert page.endswith("J2 3.1.\n")
+    assert "failed" in laws.timed(sys.executable, "ours", "clay", 2)
+
+
 def test_scenes_that_may_stall_have_ratios_to_the_block_and_to_other_solvers():
     rows = [
         stall_row("block"),
@@ -512,7 +526,8 @@ def test_goal_table_gives_ratios():
 
 
 @pytest.mark.parametrize(
-    "module", [accuracy, curves, driver, dynamics, tables, sets, stall, hard_scenes, report, scaling, command]
+    "module",
+    [accuracy, curves, driver, dynamics, laws, tables, sets, stall, hard_scenes, report, scaling, command],
 )
 def test_examples_of_the_modules_hold(module):
     assert doctest.testmod(module).failed == 0

@@ -1,0 +1,191 @@
+"""Blocks of steel and rubber beside Kratos, whole processes, and the Gauss points that laws evaluate.
+
+``python -m benchmarks laws --python PATH``, an interpreter with KratosConstitutiveLawsApplication, writes
+the page `docs/about/laws.md`.  Each block is a process: ``python -m benchmarks.laws PROGRAM LAW CELLS``.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Sequence
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from benchmarks.driver import ROOT, load, save
+from benchmarks.tables import Row, ratio, seconds, table
+
+PAGE, RESULTS = ROOT / "docs" / "about" / "laws.md", ROOT / "benchmarks" / "results" / "laws.json"
+LAWS = {"J2": (6e7, 200e9), "neo-Hookean": (2e4, 1e6)}
+"""Shear traction on the top at the end and Young's modulus in Pa."""
+STEPS, CELLS, LIMIT = 10, (12, 20), 240
+TEXT = """# Laws beside Kratos
+
+Blocks of 1 × 1 × 2 m on a clamped side, sheared at the top in {steps} steps, elements 8N: steel
+(`J2Plasticity3D`, linear hardening, B-bar) and rubber (`NeoHookean3D`, total Lagrangian); relative residual
+1e-8. `python -m benchmarks laws`, two cores, seconds of whole processes from Python's start to the last step;
+Kratos takes AMGCL with 3 × 3 blocks to 1e-10. The last column is the difference of the largest displacement.
+The machine was busy with other work: ratios are rough, and seconds and points a second are low.
+
+"""
+POINTS = "\nGauss points a second of `evaluate` with the tangent on one core, in millions: "
+
+
+def laws(kratos: str, cells: Sequence[int] = CELLS) -> None:
+    """Measure all blocks and write the page."""
+    rows = []
+    for law in LAWS:
+        for n in cells:
+            row: Row = {"law": law, "n": n}
+            for program, python in (("ours", sys.executable), ("Kratos", kratos)):
+                row[program] = timed(python, program, law, n) if python else {"failed": "not asked for"}
+            rows.append(row)
+            print(row, flush=True)
+            save(RESULTS, {"set": "laws", "rows": rows, "points": points()})
+            PAGE.write_text(page(load(RESULTS)), encoding="utf-8")
+
+
+def timed(python: str, *words: Any) -> Row:
+    """Return what a process says, with its seconds."""
+    command, start = [python, "-m", "benchmarks.laws", *map(str, words)], perf_counter()
+    try:
+        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=LIMIT, check=True)
+    except subprocess.TimeoutExpired:
+        return {"failed": f"> {LIMIT} s"}
+    except subprocess.CalledProcessError as error:
+        return {"failed": error.stderr.strip().splitlines()[-1][:200]}
+    return json.loads(done.stdout.splitlines()[-1]) | {"seconds": perf_counter() - start}
+
+
+def page(found: Row) -> str:
+    """Return the page of what is kept."""
+    body = []
+    for row in found["rows"]:
+        ours, kratos = row["ours"], row["Kratos"]
+        cells = [row["law"], str(ours["unknowns"]), f"{seconds(ours['seconds'])} ({ours['iterations']})"]
+        if "failed" in kratos:
+            body.append([*cells, kratos["failed"], "", ""])
+            continue
+        theirs = f"{seconds(kratos['seconds'])} ({kratos['iterations']})"
+        off = abs(ours["u"] / kratos["u"] - 1)
+        body.append([*cells, theirs, ratio(ours["seconds"], kratos["seconds"]), f"{off:.0e}"])
+    head = ["law", "unknowns", "kratos_lite (iterations)", "Kratos (iterations)", "ratio", "difference"]
+    rates = ", ".join(f"{name} {value:.1f}" for name, value in found["points"].items())
+    return TEXT.format(steps=STEPS) + table(head, body) + POINTS + rates + ".\n"
+
+
+def made(law: str, n: int) -> Any:
+    """Return the model of kratos_lite."""
+    import kratos_lite as kl
+
+    (traction, E), mesh = LAWS[law], kl.box((1, 1, 2), (n, n, 2 * n), "Element3D8N")
+    model = kl.Model(mesh, kl.J2Plasticity3D(E, 0.3, 250e6, 2e9) if law == "J2" else kl.NeoHookean3D(E, 0.3))
+    model.fix("z-")
+    model.add(kl.Traction("z+", (traction, 0, 0)), amplitude=lambda t: t)
+    return model
+
+
+def ours(law: str, n: int) -> Row:
+    """Solve the block."""
+    import kratos_lite as kl
+
+    model = made(law, n)
+    analysis = model.quasi_static()
+    *_, last = kl.integrate(analysis, 1 / STEPS, STEPS, every=STEPS)
+    count = sum(report.iterations for report in analysis.reports)
+    return {"unknowns": 3 * model.mesh.n_nodes, "iterations": count, "u": float(np.abs(last.u).max())}
+
+
+def kratos(law: str, n: int) -> Row:
+    """Solve the same nodes, elements and nodal forces with Kratos."""
+    import KratosMultiphysics as KM
+    import KratosMultiphysics.ConstitutiveLawsApplication as CLA
+    import KratosMultiphysics.StructuralMechanicsApplication as SMA
+
+    from benchmarks.programs.kratos import AXES, BLOCKS, SOLVERS
+
+    KM.Logger.GetDefaultOutput().SetSeverity(KM.Logger.Severity.WARNING)
+    model = made(law, n)
+    mesh, whole = model.mesh, KM.Model()
+    part, E = whole.CreateModelPart("Structure", 2), LAWS[law][1]
+    part.ProcessInfo[KM.DOMAIN_SIZE] = 3
+    for variable in (KM.DISPLACEMENT, KM.REACTION, KM.VOLUME_ACCELERATION, SMA.POINT_LOAD):
+        part.AddNodalSolutionStepVariable(variable)
+    steel = part.CreateNewProperties(1)
+    constants = {"YOUNG_MODULUS": E, "POISSON_RATIO": 0.3, "DENSITY": 0.0}
+    if law == "J2":
+        constants |= {"YIELD_STRESS": 250e6, "ISOTROPIC_HARDENING_MODULUS": 2e9}
+        constants |= {"EXPONENTIAL_SATURATION_YIELD_STRESS": 250e6, "HARDENING_EXPONENT": 1.0}
+    for name, value in constants.items():
+        steel.SetValue(KM.KratosGlobals.GetVariable(name), value)
+    made_law = CLA.SmallStrainJ2Plasticity3DLaw() if law == "J2" else CLA.HyperElastic3DLaw()
+    steel.SetValue(KM.CONSTITUTIVE_LAW, made_law)
+    for i, x in enumerate(mesh.points.tolist()):
+        part.CreateNewNode(i + 1, *x)
+    kind = "SmallDisplacementBbarElement3D8N" if law == "J2" else "TotalLagrangianElement3D8N"
+    for i, nodes in enumerate((mesh.blocks[0].nodes + 1).tolist()):
+        part.CreateNewElement(kind, i + 1, nodes, steel)
+    for axis in AXES:
+        names = (getattr(KM, f"{name}_{axis}") for name in ("DISPLACEMENT", "REACTION"))
+        KM.VariableUtils().AddDof(*names, part)
+    for i in mesh.nodes("z-").tolist():
+        for axis in AXES:
+            part.GetNode(i + 1).Fix(getattr(KM, f"DISPLACEMENT_{axis}"))
+    forces = model.loads[0].load.forces(mesh, model.element_groups())
+    top = mesh.nodes("z+").tolist()
+    for i in top:
+        part.CreateNewCondition("PointLoadCondition3D1N", i + 1, [i + 1], steel)
+    from KratosMultiphysics.python_linear_solver_factory import ConstructSolver
+
+    settings = {"solver_type": "amgcl", "tolerance": 1e-10, "max_iteration": 1000} | BLOCKS | SOLVERS["AMGCL"]
+    solver = ConstructSolver(KM.Parameters(json.dumps(settings)))
+    strategy = KM.ResidualBasedNewtonRaphsonStrategy(
+        part,
+        KM.ResidualBasedIncrementalUpdateStaticScheme(),
+        KM.ResidualCriteria(1e-8, 1e-9),
+        KM.ResidualBasedBlockBuilderAndSolver(solver),
+        25,
+        False,
+        False,
+        True,
+    )
+    strategy.SetEchoLevel(0)
+    strategy.Initialize()
+    count = 0
+    for step in range(1, STEPS + 1):
+        part.CloneTimeStep(step / STEPS)
+        for i in top:
+            force = KM.Array3((forces[i] * step / STEPS).tolist())
+            part.GetNode(i + 1).SetSolutionStepValue(SMA.POINT_LOAD, force)
+        strategy.InitializeSolutionStep()
+        strategy.Predict()
+        if not strategy.SolveSolutionStep():
+            raise RuntimeError(f"no convergence in step {step}")
+        strategy.FinalizeSolutionStep()
+        count += part.ProcessInfo[KM.NL_ITERATION_NUMBER]
+    u = KM.VariableUtils().GetSolutionStepValuesVector(part.Nodes, KM.DISPLACEMENT, 0, 3)
+    return {"unknowns": len(u), "iterations": count, "u": float(np.abs(np.array(u)).max())}
+
+
+def points() -> dict[str, float]:
+    """Return millions of Gauss points a second of laws, of steel mostly beyond its elastic limit."""
+    import kratos_lite as kl
+
+    strain = np.random.default_rng(1).normal(size=(500, 8, 6))
+    rates = {}
+    for law, size in ((kl.J2Plasticity3D(200e9, 0.3, 250e6, 2e9), 5e-4), (kl.NeoHookean3D(1e6, 0.3), 0.05)):
+        state, times = law.initial_state(500, 8), []
+        for _ in range(50):
+            start = perf_counter()
+            law.evaluate(size * strain, state, 1.0)
+            times.append(perf_counter() - start)
+        rates[type(law).__name__] = 4000 / min(times) / 1e6
+    return rates
+
+
+if __name__ == "__main__":
+    program, law, n = sys.argv[1:]
+    print(json.dumps((ours if program == "ours" else kratos)(law, int(n))))
