@@ -277,7 +277,8 @@ class QuasiStaticAnalysis:
         scale = max(float(np.linalg.norm(v)) for v in (force, internal, self.load, self.internal))
         residual = float(np.linalg.norm(self.system.constraint_map.reduce(force - internal)))
         relative = residual / (scale or 1.0)
-        if residual <= ROUNDING * K.norm() * float(np.linalg.norm(u)):
+        known = float(np.linalg.norm(self.u) + np.linalg.norm(self.prescribed.part(u)))  # u may have run away
+        if residual <= ROUNDING * K.norm() * known:
             relative = min(relative, self.tolerance)
         return relative, (internal, force, K, tangent, states)
 
