@@ -14,7 +14,7 @@ from kratos_lite.errors import InputError, nearest
 
 T = TypeVar("T")
 F = TypeVar("F", bound=Callable[..., Any])
-FEW = 24
+FEW = 30
 """Names that are all listed where none is near to an unknown one."""
 
 

@@ -17,10 +17,15 @@ STEEL, RUBBER = kl.Isotropic3D(E=210e9, nu=0.3), kl.Isotropic3D(E=1e6, nu=0.499)
 
 def test_formulations_of_a_shape_are_those_of_the_registry():
     words = {word: kind.__name__ for word, kind in formulations_of(Hexahedron8).items()}
-    assert words == {"standard": "KinematicLinear3D8N", "enhanced": "EnhancedStrain3D8N", "b_bar": "BBar3D8N"}
-    assert set(formulations_of(Hexahedron20)) == {"standard", "b_bar", "reduced"}
-    assert set(formulations_of(Wedge15)) == {"standard", "b_bar"}
-    assert list(formulations_of(Tetrahedron4)) == ["standard"]
+    assert words == {
+        "total_lagrangian": "TotalLagrangianElement3D8N",
+        "standard": "KinematicLinear3D8N",
+        "enhanced": "EnhancedStrain3D8N",
+        "b_bar": "BBar3D8N",
+    }
+    assert set(formulations_of(Hexahedron20)) == {"total_lagrangian", "standard", "b_bar", "reduced"}
+    assert set(formulations_of(Wedge15)) == {"total_lagrangian", "standard", "b_bar"}
+    assert list(formulations_of(Tetrahedron4)) == ["total_lagrangian", "standard"]
 
 
 @pytest.mark.parametrize(

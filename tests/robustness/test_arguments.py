@@ -26,11 +26,11 @@ WRONG = {
     "mesh": (lambda: kl.Model(None), "a mesh must be a Mesh, such as"),
     "material number": (
         lambda: kl.Model(kl.box(), 5),
-        "a material must be a LinearMaterial, .*; got 5",
+        "a material must be a Material, .*; got 5",
     ),
     "material word": (
         lambda: kl.Model(kl.box(), "steel"),
-        "a material must be a LinearMaterial, such as .*; got '",
+        "a material must be a Material, such as .*; got '",
     ),
     "material part": (lambda: kl.Model(kl.box(), {"zz": STEEL}), "there is no part 'zz'"),
     "material property": (lambda: kl.Model(kl.box(), {99: STEEL}), "no element has property 99"),
@@ -50,7 +50,10 @@ WRONG = {
     "where unknown": (lambda: model().fix("top"), "there is no part 'top'"),
     "link negative": (lambda: model().constrain((-1, "x"), {TOP: 1.0}), "a degree of freedom is"),
     "link axis": (lambda: model().constrain((1, "xy"), {TOP: 1.0}), "a degree of freedom is"),
-    "link independents": (lambda: model().constrain((1, "x"), [TOP]), "independents must map"),
+    "link independents": (
+        lambda: model().constrain((1, "x"), [TOP]),
+        "dependents, .* must be whole numbers; got",
+    ),
     "link weight": (
         lambda: model().constrain((1, "x"), {TOP: "a"}),
         "weights of a constraint must be made of real",
