@@ -8,7 +8,7 @@ from typing import Any
 from sphinx.util.docutils import SphinxDirective
 
 from kratos_lite.analysis.fields import FIELDS
-from kratos_lite.analysis.subjects import NAMES
+from kratos_lite.analysis.subjects import names_of_parts
 from kratos_lite.io.formats.mdpa.scan import LISTS, TOP
 from kratos_lite.io.kratos import (
     expected_values,
@@ -68,7 +68,7 @@ def _fields() -> list[str]:
     rows = []
     for key, field in FIELDS.items():
         variable = [field.kratos] if field.listed and field.kratos else []
-        pictures = [name for name, (of, _) in NAMES.items() if of == key]
+        pictures = [name for name, (of, *_) in names_of_parts(FIELDS).items() if of == key]
         rows.append((f"`{key}`", field.unit or "–", _code(variable), ", ".join(field.where), _code(pictures)))
     return _table(*rows, head="| field | unit | in files | where | in pictures |")
 
