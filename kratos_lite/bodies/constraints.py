@@ -183,6 +183,7 @@ class AlongDirection(Constraint):
         n = finite(direction, "a direction", (3,))
         if not n.any():
             raise InputError(f"a direction needs three components, not all 0; got {direction!r}")
+        n = n / np.abs(n).max()  # the square of a tiny one would be 0
         self.direction = n / float(np.linalg.norm(n))
 
     def directions(self, x: Array) -> Array:

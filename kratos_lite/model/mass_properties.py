@@ -14,7 +14,7 @@ import numpy as np
 from kratos_lite.assembly.element_groups import ElementGroup, by_mass_rule
 from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.typing import Array, ArrayLike, Mask
-from kratos_lite.validation import finite
+from kratos_lite.validation import finite, reals
 
 SYMMETRIC = 1e-10
 """How far, relative to its largest entry, a tensor may be from symmetric, or two values from each other."""
@@ -288,8 +288,9 @@ def _positive(value: ArrayLike, what: str, unit: str, shape: tuple[int | str, ..
 
 def _volume(value: ArrayLike) -> Array:
     """Return volumes; nan stands for one that is not known."""
-    known = _positive(np.nan_to_num(value, nan=1.0, posinf=np.inf), "volume", "m³")
-    return np.where(np.isnan(np.asarray(value, dtype=float)), np.nan, known)
+    volumes = reals(value, "a volume")
+    known = _positive(np.where(np.isnan(volumes), 1.0, volumes), "volume", "m³")
+    return np.where(np.isnan(volumes), np.nan, known)
 
 
 def _tensors(inertia: ArrayLike | None, euler: ArrayLike | None) -> tuple[Array, Array]:

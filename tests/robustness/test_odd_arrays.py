@@ -390,6 +390,7 @@ ELSEWHERE = {
     *((name, "xi") for name in ("N", "dN")),
     *(("plot", name) for name in ("clim", "displacement", "modes", "points", "values")),
     *(("animate", name) for name in ("clim", "modes", "values")),
+    *(("material_point", name) for name in ("strain", "stress")),
     ("PlacedCell", "X"),
     ("Block", "shape"),
 }
