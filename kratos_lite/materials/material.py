@@ -185,7 +185,7 @@ class Material:
 
         Returns
         -------
-        dict of (*shape, size) arrays
+        dict of arrays (shape, size)
         """
         return {name: np.zeros((*shape, size)) for name, size in self.internal_variables.items()}
 
