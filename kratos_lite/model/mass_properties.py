@@ -288,7 +288,7 @@ def _positive(value: ArrayLike, what: str, unit: str, shape: tuple[int | str, ..
 
 def _volume(value: ArrayLike) -> Array:
     """Return volumes; nan stands for one that is not known."""
-    volumes = reals(value, "a volume")
+    volumes = reals(value, "the volume of a body")
     known = _positive(np.where(np.isnan(volumes), 1.0, volumes), "volume", "m³")
     return np.where(np.isnan(volumes), np.nan, known)
 

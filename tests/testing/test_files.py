@@ -183,7 +183,7 @@ def test_a_law_that_is_not_linear_is_checked_as_one(checked):
     ("old", "new", "says"),
     [
         (".mean(axis=-1, keepdims=True)", ".mean()", r"use \[\.\.\., i\] for components"),
-        ("new = state", "new = state['plastic_strain']; new +=  0 * state", "changed in place"),
+        ("new = state", "new = state['plastic_strain']; new +=  0 * state", "state in place"),
         ("excess = np", "if q < 1:\n            return 0\n        excess = np", r"mine.py:\d+; .* np\.where"),
         (
             '    internal_variables = {"plastic_strain": 6}\n',
