@@ -1,17 +1,17 @@
 """Run files of Kratos with nonlinear laws and large displacements: in quasi-static steps, or made linear."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 from run_files import CLAMP, box_mdpa, materials, process, run_file, write
+from scenes import SHARED
 
 import kratos_lite as kl
 from kratos_lite.errors import InputError
 from kratos_lite.io.files import read_case
 
-SHARED = Path("/work/shared/kratos_examples")
+FOLDERS = SHARED / "kratos_examples"
 PRESSURE = process(
     "assign_scalar_variable_to_conditions_process",
     "Structure.Side",
@@ -167,12 +167,12 @@ def test_an_unknown_law_is_refused_with_the_nearest(tmp_path):
 
 def steps_of(name, count):
     """Yield states of a shared folder beside what Kratos says of its steps."""
-    if not (SHARED / name).is_dir():
+    if not (FOLDERS / name).is_dir():
         pytest.skip(f"{name} is not there")
-    case = read_case(SHARED / name / "ProjectParameters.json")
+    case = read_case(FOLDERS / name / "ProjectParameters.json")
     analysis = case.model.quasi_static(**case.time.quasi_static)
     analysis.time = case.time.start
-    known = json.loads((SHARED / name / "reference.json").read_text())["steps"]
+    known = json.loads((FOLDERS / name / "reference.json").read_text())["steps"]
     yield from zip(kl.integrate(analysis, case.time.step, steps=count), known, strict=False)
 
 
