@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from kratos_lite.analysis.prepared import check_own
 from kratos_lite.analysis.result import Result
+from kratos_lite.analysis.solution_checks import check_arguments
 from kratos_lite.analysis.static import StaticAnalysis
 from kratos_lite.errors import InputError
 from kratos_lite.model.loads import Load
@@ -68,9 +69,12 @@ class Model(Structure):
     ) -> Result:
         """Check the model and solve it: statics, or the steady state of a motion at the time 0.
 
+        Laws that are not linear and large displacements are found by one step of `quasi_static`, which ends
+        at the loads and supports of the time 1 s.
+
         Parameters
         ----------
-        solver : ``auto``, ``dense``, ``direct`` or ``amg``.
+        solver : ``auto``, ``dense``, ``direct`` or ``amg``, of linear models.
         tolerance : relative residual at which the iterative solver stops.
         progress : called with the phase and the fraction done, 0 … 1.
         error : relative error of the energy norm, such as 0.01, for which the mesh is made finer and linear
@@ -119,6 +123,7 @@ class Model(Structure):
 
                 if backend == "petsc" or petsc is not None:
                     self.require_linear("backend='petsc'")
+                check_arguments(solver, tolerance)
                 return solve_nonlinear(self, tolerance, shown)
             analysis = StaticAnalysis(self, solver, tolerance, shown, backend=backend, petsc=petsc)
             try:

@@ -449,7 +449,7 @@ class QuasiStaticAnalysis:
             total_load=loads.sum(axis=0),
             total_reaction=reactions.sum(axis=0),
             solver="newton",
-            reason=f"{self.step} steps to t = {self.time:g} s",
+            reason=f"{self.step} {'step' if self.step == 1 else 'steps'} to t = {self.time:g} s",
             iterations=sum(step.iterations for step in steps),
             backward_error=steps[-1].residuals[-1] if steps else None,
             force_error=None,
