@@ -64,7 +64,8 @@ def _paths(law: Material) -> Iterator[tuple[str, Array, GaussState]]:
 def contract(law: Material) -> Measured:
     """Check that the response has its shapes for one point and many, and leaves its arguments as they are."""
     sizes = np.geomspace(SMALLEST, GREATEST[law.strain_measure] / 3, POINTS)  # some points yield
-    strain, state, faults = sizes[:, None] * _directions(), start(law, POINTS), {}
+    strain, state = sizes[:, None] * _directions(), start(law, POINTS)
+    faults: dict[str, float] = {}
     stress = law.evaluate(strain, state, DT)[0]
     for i in (0, POINTS - 1):
         alone = law.evaluate(strain[i], {name: v[i] for name, v in state.items()}, DT)[0]
