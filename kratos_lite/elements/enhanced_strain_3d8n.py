@@ -100,7 +100,8 @@ class EnhancedStrain3D8N(KinematicLinear):
         D = np.swapaxes(G.reshape(*G.shape[:-3], -1, G.shape[-1]), -1, -2) @ flat
         B = strain_rows(self._gauss[1])
         L = np.swapaxes(flat, -1, -2) @ B.reshape(*B.shape[:-3], -1, B.shape[-1])
-        size = np.sqrt(np.einsum("...ii->...i", D).clip(min=0))[..., None]  # modes of thin cells differ in size
+        # modes of thin cells differ in size
+        size = np.sqrt(np.einsum("...ii->...i", D).clip(min=0))[..., None]
         try:
             if not (size > 0).all():
                 raise np.linalg.LinAlgError
