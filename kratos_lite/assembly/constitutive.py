@@ -142,19 +142,16 @@ class Window:
                 self.kernels.add_stiffness(*placed, D, self.dilatation, finite, symmetric, *rows, self.data)
             return PointStates(stress, variables)
         for chunk in group.chunks():
-            element, q, s = group.at(self.points, chunk), self.u[group.nodes[chunk]], stress[chunk]
-            F = np.eye(3) + lagrange.displacement_gradient(element, q) if finite else np.eye(3)
-            at = lagrange.Deformation(F, s, F, 1.0, 1.0)
-            of_element = lagrange.internal_force(element, at) if finite else None
-            if of_element is None:
-                of_element = element.internal_force(s, group.material.C)
-            add_nodal(forces, group.nodes[chunk], of_element)
-            if self.data is None:
-                continue
+            element, s, C = group.at(self.points, chunk), stress[chunk], group.material.C
             if finite:
+                F = np.eye(3) + lagrange.displacement_gradient(element, self.u[group.nodes[chunk]])
+                at = lagrange.Deformation(F, s, F, 1.0, 1.0)
+            nodal = lagrange.internal_force(element, at) if finite else element.internal_force(s, C)
+            add_nodal(forces, group.nodes[chunk], nodal)
+            if self.data is not None and finite:
                 self._scatter(chunk, lagrange.stiffness_by_axis(element, D[chunk], at))
-            else:
-                B = element._operator(group.material.C)
+            elif self.data is not None:
+                B = element._operator(C)
                 self._scatter(chunk, tables.by_axis(tables.summed(B, D[chunk] @ B, element.dV)))
         return PointStates(stress, variables)
 

@@ -24,7 +24,7 @@ from kratos_lite.assembly.stiffness import assemble_stiffness
 from kratos_lite.bodies.linear_algebra import Solve
 from kratos_lite.bodies.rotations import polar
 from kratos_lite.elements.formulations import NON_LOCKING
-from kratos_lite.errors import InputError
+from kratos_lite.errors import InputError, ModelError
 from kratos_lite.registry import Registry
 from kratos_lite.solvers import plan
 from kratos_lite.solvers.constraints import ConstraintMap
@@ -141,11 +141,17 @@ class Formulation(ABC):
 
     def load_over(self, q: Array, dq: Array, damping: float) -> Array:
         """Return the load (3n,) over an increment, whose work is the change of energy; damping is η/h."""
-        raise NotImplementedError  # for the energy–momentum integrator alone, which may be `without`
+        raise self._no_energy_momentum()
 
     def increment_solver(self, q: Array, dq: Array, damping: float, c: float) -> Solve:
         """Return what solves (M + c D) x = b, D the derivative of `load_over` with respect to dq."""
-        raise NotImplementedError
+        raise self._no_energy_momentum()
+
+    def _no_energy_momentum(self) -> ModelError:
+        return ModelError(
+            f"the formulation {self.name} has no energy–momentum integrator; name it in `without`, or take "
+            "formulation='total_lagrangian'"
+        )
 
     def highest_frequency(self, q: Array) -> float:
         """Return an upper bound of the angular frequencies in rad/s."""
