@@ -15,7 +15,8 @@ from kratos_lite.model.checks import check_carried
 from kratos_lite.model.loads import Load, TimeDependentLoad
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
-from kratos_lite.typing import Array, Ints
+from kratos_lite.solvers.tangents import Changes
+from kratos_lite.typing import Array
 
 
 def external_loads(mesh: Mesh, groups: Sequence[ElementGroup], loads: Sequence[Load]) -> Array:
@@ -39,11 +40,6 @@ def stress_load(model: Structure, groups: Sequence[ElementGroup], u: Array) -> A
     return internal_load(model.mesh.points, groups, u if u0 is None else u - u0)
 
 
-def turned(tangents: Array) -> Array:
-    """Return the transposes of tangents (m, k, 3, k, 3)."""
-    return tangents.transpose(0, 3, 4, 1, 2)
-
-
 class AppliedLoads:
     """The nodal forces of the loads of a structure at a time; what does not change is made once."""
 
@@ -64,12 +60,12 @@ class AppliedLoads:
             total += history(time)
         return total
 
-    def following(self, time: float, u: Array) -> tuple[Array, list[tuple[Ints, Array]]]:
+    def following(self, time: float, u: Array) -> tuple[Array, Changes]:
         """Return what displacements u (3a,) change of the loads at a time in s, and its tangent.
 
         Forces (3a,) in N, and for some nodes (m, k) of the equations the derivatives (m, k, 3, k, 3) in N/m.
         """
-        mesh, changes = self.model.mesh, list[tuple[Ints, Array]]()
+        mesh, changes = self.model.mesh, Changes()
         x, total = mesh.points + self.system.scatter(u), np.zeros_like(mesh.points)
         for factor, load in chain.from_iterable(load.acting(time) for load in self.model.loads):
             for nodes, forces, tangent in load.follow(mesh, x):

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cached_property
+from functools import partial
 from typing import Any, TypeAlias
 
 import numpy as np
 
-from kratos_lite.analysis.nodal_loads import AppliedLoads, turned
+from kratos_lite.analysis.nodal_loads import AppliedLoads
 from kratos_lite.analysis.prescribed_motion import PrescribedMotion
 from kratos_lite.analysis.report import Report, StepReport
 from kratos_lite.analysis.result import Result
@@ -18,24 +18,22 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.constitutive import Constitutive, States, named, unnamed
 from kratos_lite.assembly.stiffness import assemble_stiffness
 from kratos_lite.errors import InputError, ModelError, SolveError
+from kratos_lite.mesh.mesh import place_of
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.arc_length import along_path
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.direct import one_thread
 from kratos_lite.solvers.linear_solver import LinearSolver
-from kratos_lite.solvers.newton import SMALLEST_PART, forcing, in_parts, newton
+from kratos_lite.solvers.newton import SMALLEST_PART, in_parts, newton
 from kratos_lite.solvers.plan import Plan, stepped
-from kratos_lite.typing import Array, Ints, Progress
+from kratos_lite.solvers.tangents import Changes, Tangents
+from kratos_lite.typing import Array, Progress
 from kratos_lite.validation import number, whole_number
 
-Changes: TypeAlias = list[tuple[Ints, Array]]
-"""Tangent of a load: for nodes (m, k) the derivatives (m, k, 3, k, 3) of their forces."""
 Load: TypeAlias = tuple[Array, Changes]
 """Nodal forces (3a,) at some displacements, and their tangent."""
 Response: TypeAlias = tuple[Array, Array, BlockMatrix, Changes, States]
 """Internal forces and load (3a,), tangents of both, and states at some displacements."""
-WORN = 6.0
-"""Iterations for a digit from which a multigrid of an older tangent is made anew."""
 ROUNDING = 10 * float(np.finfo(float).eps)
 """Fraction of |K| |u| that rounding leaves of forces in balance."""
 SLACK, SEARCHES = 0.8, 6
@@ -109,19 +107,15 @@ class QuasiStaticAnalysis:
         )
         self.applied = AppliedLoads(model, self.system, self.groups, initial=False)
         self.prescribed = PrescribedMotion(supports, self.system)
-        self.law = Constitutive(self.system.points, self.system.groups, self.system.pattern)
-        self._plan = stepped(len(self.system.constraint_map.free))
-        self._symmetric = all(group.material.symmetric_tangent for group in self.groups)
+        self.law = law_of(model, self.system)
+        plan = stepped(len(self.system.constraint_map.free))
+        if arc_length:
+            plan = Plan("direct", "tangents beyond a limit point are not positive definite")
+        self.tangents = Tangents(self.system, plan, self.law.symmetric and not arc_length, self._at_rest)
         self.arc_length = arc_length
-        u0 = model.initial_displacement
-        self._u0 = np.zeros(3 * len(self.system.nodes)) if u0 is None else self.system.gather(u0)
-        if u0 is not None and any(group.element.finite for group in self.groups):
-            raise ModelError(
-                "a stress-free displacement is for small strains; move the nodes of the mesh instead"
-            )
         self._version = self._versions()
         self.time, self.step, self.parts, self.work = 0.0, 0, 1, 0.0
-        self.u = np.zeros_like(self._u0)
+        self.u = np.zeros(3 * len(self.system.nodes))
         self.states = self.law.start()
         self.increment, self.speed = np.zeros_like(self.u), 0.0
         self.load = np.zeros_like(self.u)
@@ -129,7 +123,6 @@ class QuasiStaticAnalysis:
         self.reports: list[StepReport] = []
         if arc_length:
             self._check_factor()
-            self._plan = Plan("direct", "tangents beyond a limit point are not positive definite")
 
     def _versions(self) -> list[Any]:
         """Return what must stay as it is; equal as long as it does."""
@@ -137,10 +130,7 @@ class QuasiStaticAnalysis:
 
     def _forces(self, u: Array) -> Array:
         """Return the internal forces (3a,) of the committed states at displacements (3a,)."""
-        return self.law.evaluate(self._strained(u), self.states, 0.0, tangent=False)[0].ravel()
-
-    def _strained(self, u: Array) -> Array:
-        return (u - self._u0).reshape(-1, 3)
+        return self.law.evaluate(u, self.states, 0.0, tangent=False)[0]
 
     def _check_factor(self) -> None:
         """Refuse loads that are no constant ones and a factor times others, and supports that move."""
@@ -238,7 +228,8 @@ class QuasiStaticAnalysis:
         def solve(u: Array, known: Response, residuals: list[float]) -> list[Array]:
             internal, force, K, tangent, _ = known
             unit = self._loads(u, 1.0)[0] - self._loads(u, 0.0)[0]
-            return self._corrections(K, tangent, [unit, force - internal], np.zeros_like(u), residuals)
+            forces = [unit, force - internal]
+            return self.tangents.solve(K, tangent, forces, np.zeros_like(u), residuals, self.tolerance)
 
         def advance(done: float, fraction: float) -> int:
             length, free = (fraction - done) * self.speed * h, self.system.constraint_map.free
@@ -273,7 +264,8 @@ class QuasiStaticAnalysis:
 
     def _balance(self, u: Array, load: Load, dt: float) -> tuple[float, Response]:
         """Return the relative residual at displacements (3a,), and what is known there."""
-        (internal, K, states), (force, tangent) = self._evaluate(u, dt), load
+        (internal, K, states), (force, tangent) = self.law.evaluate(u, self.states, dt), load
+        assert K is not None
         scale = max(float(np.linalg.norm(v)) for v in (force, internal, self.load, self.internal))
         residual = float(np.linalg.norm(self.system.constraint_map.reduce(force - internal)))
         relative = residual / (scale or 1.0)
@@ -294,53 +286,19 @@ class QuasiStaticAnalysis:
 
         def correction(u: Array, known: Response, residuals: list[float]) -> Array:
             internal, force, K, tangent, _ = known
-            first, forces = len(residuals) == 1, force - internal
-            (du,) = self._corrections(K, tangent, [forces], jump if first else 0.0 * jump, residuals)
-            moved = first and jump.any()
-            return du if moved or not self.line_search else self._shortened(u, du, reduce(forces), load, dt)
+            first, r = len(residuals) == 1, force - internal
+            moved = jump if first else 0.0 * jump
+            (du,) = self.tangents.solve(K, tangent, [r], moved, residuals, self.tolerance)
+            exact = moved.any() or not self.line_search
+            return du if exact else self._shortened(u, du, reduce(r), load, dt)
 
         return newton(self.u, evaluate, correction, self.tolerance, self.iterations, int(jump.any()))
 
-    def _evaluate(self, u: Array, dt: float) -> tuple[Array, BlockMatrix, States]:
-        forces, K, states = self.law.evaluate(self._strained(u), self.states, dt)
-        assert K is not None
-        return forces.ravel(), K, states
-
-    def _corrections(
-        self, K: BlockMatrix, tangent: Changes, forces: list[Array], jump: Array, residuals: list[float]
-    ) -> list[Array]:
-        """Return (K - tangent)⁻¹ of forces (3a,) with a jump (3a,) of what is prescribed."""
-        where, iterates = (self.system.constraint_map, self.system.points), self._plan.iterates
-        if len(residuals) == 1:
-            self._near = self._elastic  # not of the last step, which a restart does not know
-        if iterates and tangent and self._near is None:
-            half = [(nodes, (k + turned(k)) / 2) for nodes, k in tangent]
-            self._near = LinearSolver(self._less(K, half), *where, self._plan)
-        symmetric = self._symmetric and not tangent and not self.arc_length
-        solver = LinearSolver(self._less(K, tangent), *where, self._plan, symmetric, self._near)
-        tolerance = forcing(residuals, self.tolerance)
-        solutions = [solver.solve(each, tolerance, None, jump, jump) for each in forces]
-        if iterates:
-            worn = self._symmetric and solutions[-1].iterations > WORN * -np.log10(tolerance)
-            self._near = None if solver.near and worn else solver.near or solver
-        return [solution.x for solution in solutions]
-
-    @cached_property
-    def _elastic(self) -> LinearSolver | None:
-        """What solves the body at rest by multigrid, with which steps begin; None with factors."""
-        if not self._plan.iterates:
-            return None
+    def _at_rest(self) -> LinearSolver:
+        """Return what solves the body at rest."""
         system = self.system
         K = assemble_stiffness(system.points, system.groups, system.pattern)
-        return LinearSolver(K, system.constraint_map, system.points, self._plan, groups=system.groups)
-
-    def _less(self, K: BlockMatrix, tangent: Changes) -> BlockMatrix:
-        """Return K - tangent."""
-        if not tangent:
-            return K
-        data = K.data.copy()
-        self.system.pattern.add_tangents(data, [(nodes, -k) for nodes, k in tangent])
-        return BlockMatrix(data, K.indices, K.indptr)
+        return LinearSolver(K, system.constraint_map, system.points, self.tangents.plan, groups=system.groups)
 
     def _shortened(self, u: Array, du: Array, r: Array, load: Callable[[Array], Load], dt: float) -> Array:
         """Return a correction, shortened until the residual does little work over it.
@@ -351,8 +309,8 @@ class QuasiStaticAnalysis:
         q, s = du[constraints.free], 1.0
         before = float(q @ r)
         for _ in range(SEARCHES):
-            forces = self.law.evaluate(self._strained(u + s * du), self.states, dt, tangent=False)[0]
-            after = float(q @ constraints.reduce(load(u + s * du)[0] - forces.ravel()))
+            forces = self.law.evaluate(u + s * du, self.states, dt, tangent=False)[0]
+            after = float(q @ constraints.reduce(load(u + s * du)[0] - forces))
             if after * before >= 0 or abs(after) <= SLACK * abs(before):
                 break
             s *= float(np.clip(before / (before - after), 0.1, 0.5))
@@ -464,6 +422,14 @@ class QuasiStaticAnalysis:
         groups = [replace(g, states=s) for g, s in zip(self.groups, self.states, strict=True)]
         u0 = model.initial_displacement
         return Result(model.mesh, groups, self._whole(self.u).copy(), reactions, loads, report, u0)
+
+
+def law_of(model: Structure, system: ConstrainedSystem) -> Constitutive:
+    """Return the laws of a model in its equations."""
+    u0 = model.initial_displacement
+    gathered = None if u0 is None else system.gather(u0)
+    place = partial(place_of, model.mesh)
+    return Constitutive(system.points, system.groups, system.pattern, place, gathered)
 
 
 def solve_nonlinear(model: Structure, tolerance: float, progress: Progress | None) -> Result:

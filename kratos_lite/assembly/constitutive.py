@@ -38,10 +38,20 @@ MODES_MAX, MODES_CONVERGED = 30, 1e-10
 
 
 class Constitutive:
-    """Internal forces, tangent and states of all elements of a model."""
+    """Internal forces, tangent and states of all elements of a model, stress-free at a displacement u0."""
 
-    def __init__(self, points: Array, groups: Sequence[ElementGroup], pattern: Pattern) -> None:
+    def __init__(
+        self,
+        points: Array,
+        groups: Sequence[ElementGroup],
+        pattern: Pattern,
+        place: Callable[[int], str],
+        u0: Array | None = None,
+    ) -> None:
         self.points, self.groups, self.pattern = as_double(points), list(groups), pattern
+        self.place = place  # the words for an element in messages, of its index
+        self._u0 = np.zeros(3 * len(points)) if u0 is None else u0
+        self.symmetric = all(group.material.symmetric_tangent for group in groups)
         self._linear = _only(groups, lambda group: group.is_linear)
         self._lagrange = _only(groups, lambda group: group.element.finite and group.material.is_linear)
         self._dilatations = [None if g.material.is_linear else dilatation(self.points, g) for g in groups]
@@ -59,11 +69,12 @@ class Constitutive:
     def evaluate(
         self, u: Array, states: States, dt: float, *, tangent: bool = True
     ) -> tuple[Array, BlockMatrix | None, States]:
-        """Return internal forces (n, 3) in N, tangent stiffness and new states at displacements u (n, 3).
+        """Return internal forces (3n,) in N, tangent stiffness and new states at displacements u (3n,).
 
         `states` are those at the start of a step of `dt` s.  SolveError names an element that is turned
         inside out; MaterialError says where a law fails.
         """
+        u = self.strained(u)
         K, at_rest = self._linear_part
         forces = at_rest + (K @ u.ravel()).reshape(-1, 3)
         data = K.data.copy() if tangent else None
@@ -82,7 +93,11 @@ class Constitutive:
                 add = part.add if before.modes is None else part.add_enhanced
                 parts.append(add(forces, before, dt))
             new.append(_joined(parts) if parts else None)
-        return forces, None if data is None else BlockMatrix(data, K.indices, K.indptr), new
+        return forces.ravel(), None if data is None else BlockMatrix(data, K.indices, K.indptr), new
+
+    def strained(self, u: Array) -> Array:
+        """Return the displacements (n, 3) that strain the body, those beyond the stress-free ones."""
+        return (u - self._u0).reshape(-1, 3)
 
 
 def _only(groups: Sequence[ElementGroup], wanted: Callable[[ElementGroup], bool]) -> list[ElementGroup]:
@@ -124,6 +139,7 @@ class Window:
         chosen[window] = True
         self.group, self.u, self.points = law.groups[number].take(chosen), as_double(u), law.points
         self.pattern, self.number, self.window, self.data = law.pattern, number, window, data
+        self.place = law.place
         extra = law._dilatations[number]
         self.dilatation = None if extra is None else np.ascontiguousarray(extra[window])
         self.kernels = compiled("constitutive", self.group.element)
@@ -180,13 +196,22 @@ class Window:
     def _evaluate(
         self, some: slice, strain: Array, state: PointStates, dt: float, tangent: bool = True
     ) -> tuple[Array, Array, dict[str, Array]]:
-        """Return the response of the law for some elements; an error of it names them."""
+        """Return the response of the law for some elements; an error of it names one that has it alone."""
+        variables, rows = state.take(some).variables, self.group.rows[some]
+
+        def evaluate(at: Any) -> tuple[Array, Array, dict[str, Array]]:
+            now = {name: values[at] for name, values in variables.items()}
+            return self.group.material.evaluate(strain[at], now, dt, tangent=tangent)
+
         try:
-            return self.group.material.evaluate(strain, state.take(some).variables, dt, tangent=tangent)
-        except (MaterialError, SolveError) as error:
-            rows = self.group.rows[some]
-            where = f"[element, point] of the elements in rows {rows[0]} … {rows[-1]}"
-            raise type(error)(f"{error}; {where}") from None
+            return evaluate(...)
+        except (MaterialError, SolveError):
+            for i, j in np.ndindex(strain.shape[:2]):
+                try:
+                    evaluate(np.s_[i : i + 1, j : j + 1])
+                except (MaterialError, SolveError) as error:
+                    raise type(error)(f"{self.place(int(rows[i]))}, Gauss point {j + 1}: {error}") from None
+            raise
 
     def strain(self) -> Array:
         """Return ε = B u, or Green's strain, (m, g, 6); SolveError for elements turned inside out."""
@@ -210,10 +235,8 @@ class Window:
             strain, det = (np.concatenate(values) for values in zip(*found, strict=True))
         if (det <= 0).any():
             at, point = np.argwhere(det <= 0)[0]
-            raise SolveError(
-                f"the element in row {group.rows[at]} is turned inside out at Gauss point {point + 1}: "
-                "det F ≤ 0"
-            )
+            where = f"{self.place(int(group.rows[at]))}, Gauss point {point + 1}"
+            raise SolveError(f"{where}: the element is turned inside out, det F ≤ 0")
         return strain
 
     def add_enhanced(self, forces: Array, state: PointStates, dt: float) -> PointStates:

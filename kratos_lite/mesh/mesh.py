@@ -11,7 +11,17 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import numpy as np
 
 from kratos_lite.errors import MeshError
-from kratos_lite.mesh.blocks import NO_ROWS, Block, Part, blocks_of, distinct, ids_of, rows_of_ids, select
+from kratos_lite.mesh.blocks import (
+    NO_ROWS,
+    Block,
+    Part,
+    blocks_of,
+    distinct,
+    ids_of,
+    rows_of_ids,
+    select,
+    with_rows,
+)
 from kratos_lite.mesh.selection import Where, WhereElements, find_elements, find_nodes, find_part
 from kratos_lite.mesh.topology import Faces, inverted, mirror
 from kratos_lite.tabular import Tabular
@@ -490,3 +500,9 @@ class Mesh(Tabular):
         inside[self.nodes(where)] = True
         chosen = [block.take(np.asarray(inside[block.nodes].all(axis=1))) for block in self.boundary]
         return [block for block in chosen if len(block)]
+
+
+def place_of(mesh: Mesh, element: int) -> str:
+    """Return a readable place of an element for messages, by its index in the mesh."""
+    block, at = next(each for each in with_rows(mesh.blocks) if element < each[1].stop)
+    return mesh.place(block, element - at.start)

@@ -574,6 +574,10 @@ class Structure(Tabular):
             With every element or part that is wrong.
         """
         warnings, groups = self.check_geometry(), self.element_groups()
+        if self.initial_displacement is not None and any(group.element.finite for group in groups):
+            raise ModelError(
+                "a stress-free displacement is for small strains; move the nodes of the mesh instead"
+            )
         return groups, [*warnings, *(text for check in CHECKS for text in check(self, groups))]
 
     def free_motions(self, groups: list[ElementGroup]) -> FreeMotions:

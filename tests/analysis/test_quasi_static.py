@@ -197,8 +197,8 @@ def test_an_element_turned_inside_out_is_named(law):
         model.solve()
     u = np.zeros_like(model.mesh.points)
     u[:, 2] = -1.25 * model.mesh.points[:, 2]
-    with pytest.raises(SolveError, match=r"row 0 is turned inside out at Gauss point 1"):
-        model.quasi_static().law.evaluate(u, model.quasi_static().states, 1.0)
+    with pytest.raises(SolveError, match=r"element 1 \(.*\), Gauss point 1: .* inside out"):
+        model.quasi_static().law.evaluate(u.ravel(), model.quasi_static().states, 1.0)
 
 
 def test_what_comes_back_to_rest_converges():
@@ -278,4 +278,4 @@ def test_one_multigrid_serves_many_tangents(law, monkeypatch):
         assert (analysis.u == again.u).all()
     corrections = sum(report.iterations for report in analysis.reports)
     assert np.abs(ends[0] - ends[1]).max() < 1e-7 * size
-    assert 0 < len(made) < corrections / 3
+    assert len(made) == 2 < corrections  # one for each analysis
