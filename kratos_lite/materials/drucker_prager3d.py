@@ -11,13 +11,13 @@ import numpy as np
 
 from kratos_lite import voigt
 from kratos_lite.errors import MaterialError
-from kratos_lite.materials.isotropic3d import Isotropic3D
-from kratos_lite.materials.material import GaussState, Material, Response
+from kratos_lite.materials.isotropic_law import IsotropicLaw
+from kratos_lite.materials.material import GaussState, Response
 from kratos_lite.typing import Array
 
 
 @dataclass(frozen=True)
-class DruckerPrager3D(Material):
+class DruckerPrager3D(IsotropicLaw):
     """Elastic within the cone √J₂ + η p ≤ ξ c that meets Mohr and Coulomb's in triaxial compression.
 
     Parameters
@@ -56,7 +56,8 @@ class DruckerPrager3D(Material):
     hardening: float = 0.0
     density: float = 0.0
 
-    isotropic: ClassVar[bool] = True
+    positive: ClassVar[Mapping[str, str]] = {"cohesion": "Pa"}
+    not_negative: ClassVar[Mapping[str, str]] = {"hardening": "Pa"}
     variables: ClassVar[dict[str, str]] = {
         "E": "YOUNG_MODULUS",
         "nu": "POISSON_RATIO",
@@ -74,16 +75,8 @@ class DruckerPrager3D(Material):
         return self.friction == self.dilatancy
 
     def check(self) -> None:
-        """Check the bounds of the constants.
-
-        Raises
-        ------
-        MaterialError
-            If one is beyond them.
-        """
-        Isotropic3D(self.E, self.nu)
-        if not self.cohesion > 0:
-            raise MaterialError(f"{self._name('cohesion')} {self.cohesion:g} must be > 0 Pa")
+        """Check the angles."""
+        super().check()
         if not 0 < self.friction < 90:
             raise MaterialError(f"{self._name('friction')} {self.friction:g} must lie in 0° … 90°")
         if not 0 <= self.dilatancy <= self.friction:
@@ -91,16 +84,13 @@ class DruckerPrager3D(Material):
                 f"{self._name('dilatancy')} {self.dilatancy:g} must lie in 0° … "
                 f"{self.friction:g}°, the friction"
             )
-        if self.hardening < 0:
-            raise MaterialError(f"{self._name('hardening')} {self.hardening:g} must be ≥ 0 Pa")
 
     def response(self, strain: Array, state: GaussState, dt: float) -> Response:
         """Return stress, consistent tangent and internal variables; see `Material.response`."""
-        elastic = Isotropic3D(self.E, self.nu)
-        lam, G = elastic.lame
+        lam, G = self.elastic.lame
         K, H = lam + 2 * G / 3, self.hardening
         (eta, xi), eta_flow = _slopes(self.friction), _slopes(self.dilatancy)[0]
-        trial = (strain - state["plastic_strain"]) @ elastic.C.T
+        trial = (strain - state["plastic_strain"]) @ self.elastic.C.T
         s, p = voigt.deviator(trial), trial[..., :3].sum(axis=-1) / 3
         norm = np.sqrt(s**2 @ voigt.SHEAR_TWICE)
         q, n = norm / 2**0.5, s / np.where(norm > 0, norm, 1.0)[..., None]  # q = √J₂

@@ -9,13 +9,13 @@ from typing import ClassVar
 import numpy as np
 
 from kratos_lite.errors import MaterialError
-from kratos_lite.materials.isotropic3d import Isotropic3D
-from kratos_lite.materials.material import GaussState, Material, Response
+from kratos_lite.materials.isotropic_law import IsotropicLaw
+from kratos_lite.materials.material import GaussState, Response
 from kratos_lite.typing import Array
 
 
 @dataclass(frozen=True)
-class GeneralizedMaxwell3D(Material):
+class GeneralizedMaxwell3D(IsotropicLaw):
     """Elastic at once, and relaxing with time: C(t) = C (1 - Σ w_i (1 - exp(-t / τ_i))).
 
     Parameters
@@ -55,7 +55,6 @@ class GeneralizedMaxwell3D(Material):
     tau3: float = 1.0
     density: float = 0.0
 
-    isotropic: ClassVar[bool] = True
     rate_dependent: ClassVar[bool] = True
     internal_variables: ClassVar[Mapping[str, int]] = {
         "last_strain": 6,
@@ -65,14 +64,8 @@ class GeneralizedMaxwell3D(Material):
     }
 
     def check(self) -> None:
-        """Check the bounds of the constants.
-
-        Raises
-        ------
-        MaterialError
-            If one is beyond them.
-        """
-        Isotropic3D(self.E, self.nu)
+        """Check fractions and times."""
+        super().check()
         weights = [w for w, _ in self.terms]
         if min(weights) < 0 or sum(weights) > 1:
             raise MaterialError(f"the fractions w must be ≥ 0, and their sum ≤ 1; got {weights}")
@@ -87,7 +80,7 @@ class GeneralizedMaxwell3D(Material):
 
     def response(self, strain: Array, state: GaussState, dt: float) -> Response:
         """Return stress, tangent and internal variables; see `Material.response`."""
-        C = Isotropic3D(self.E, self.nu).C
+        C = self.elastic.C
         step = (strain - state["last_strain"]) @ C.T
         kept = 1 - sum(w for w, _ in self.terms)
         stress, new = kept * strain @ C.T, {"last_strain": strain.copy()}
@@ -100,7 +93,7 @@ class GeneralizedMaxwell3D(Material):
 
     def energy(self, strain: Array, stress: Array, state: GaussState) -> Array:
         """Return the energy of all springs; see `Material.energy`."""
-        S = np.linalg.inv(Isotropic3D(self.E, self.nu).C)
+        S = np.linalg.inv(self.elastic.C)
         total = (1 - sum(w for w, _ in self.terms)) * (strain @ np.linalg.inv(S) * strain).sum(axis=-1) / 2
         for i, (w, _) in enumerate(self.terms, start=1):
             if w:

@@ -9,13 +9,13 @@ from typing import ClassVar
 import numpy as np
 
 from kratos_lite.errors import MaterialError
-from kratos_lite.materials.isotropic3d import Isotropic3D
-from kratos_lite.materials.material import GaussState, Material, Response
+from kratos_lite.materials.isotropic_law import IsotropicLaw
+from kratos_lite.materials.material import GaussState, Response
 from kratos_lite.typing import Array
 
 
 @dataclass(frozen=True)
-class IsotropicDamage3D(Material):
+class IsotropicDamage3D(IsotropicLaw):
     """σ = (1 - d) C ε; damage d grows with the largest √(ε:C:ε) so far, exponentially or linearly.
 
     Each element dissipates the fracture energy over its length, the cube root of its volume.
@@ -55,7 +55,7 @@ class IsotropicDamage3D(Material):
     linear: float = 0.0
     density: float = 0.0
 
-    isotropic: ClassVar[bool] = True
+    positive: ClassVar[Mapping[str, str]] = {"strength": "Pa", "fracture_energy": "J/m²"}
     variables: ClassVar[dict[str, str]] = {
         "E": "YOUNG_MODULUS",
         "nu": "POISSON_RATIO",
@@ -66,17 +66,8 @@ class IsotropicDamage3D(Material):
     internal_variables: ClassVar[Mapping[str, int]] = {"damage": 1, "threshold": 1, "element_length": 1}
 
     def check(self) -> None:
-        """Check the bounds of the constants.
-
-        Raises
-        ------
-        MaterialError
-            If one is beyond them.
-        """
-        Isotropic3D(self.E, self.nu)
-        for name, unit in (("strength", "Pa"), ("fracture_energy", "J/m²")):
-            if not getattr(self, name) > 0:
-                raise MaterialError(f"{self._name(name)} {getattr(self, name):g} must be > 0 {unit}")
+        """Check that softening is linear or exponential."""
+        super().check()
         if self.linear not in (0, 1):
             raise MaterialError(
                 f"linear is 1 for linear softening or 0 for exponential one; got {self.linear:g}"
@@ -84,7 +75,7 @@ class IsotropicDamage3D(Material):
 
     def response(self, strain: Array, state: GaussState, dt: float) -> Response:
         """Return stress, tangent and internal variables; see `Material.response`."""
-        effective = strain @ Isotropic3D(self.E, self.nu).C.T
+        effective = strain @ self.elastic.C.T
         norm = np.sqrt((strain * effective).sum(axis=-1))
         first = self.strength / self.E**0.5
         old = np.maximum(state["threshold"][..., 0], first)
@@ -92,7 +83,7 @@ class IsotropicDamage3D(Material):
         d, slope = self._damage(r / first, length)
         growing = (norm > old) & (d > 0)
         rate = np.where(growing, slope / (first * np.where(norm > 0, norm, 1.0)), 0.0)
-        D = (1 - d)[..., None, None] * Isotropic3D(self.E, self.nu).C
+        D = (1 - d)[..., None, None] * self.elastic.C
         D = D - rate[..., None, None] * effective[..., :, None] * effective[..., None, :]
         new = {
             "damage": d[..., None],

@@ -10,8 +10,8 @@ import numpy as np
 
 from kratos_lite import voigt
 from kratos_lite.errors import MaterialError
-from kratos_lite.materials.isotropic3d import Isotropic3D
-from kratos_lite.materials.material import GaussState, Material, Response
+from kratos_lite.materials.isotropic_law import VonMises
+from kratos_lite.materials.material import GaussState, Response
 from kratos_lite.typing import Array
 
 CONVERGED = 1e-13
@@ -20,7 +20,7 @@ MOST_ITERATIONS = 50
 
 
 @dataclass(frozen=True)
-class J2Plasticity3D(Material):
+class J2Plasticity3D(VonMises):
     """Elastic up to the yield stress of von Mises, then plastic flow without change of volume.
 
     The yield stress grows with the accumulated plastic strain p, and its center, the back stress, with the
@@ -68,7 +68,12 @@ class J2Plasticity3D(Material):
     exponent: float = 0.0
     density: float = 0.0
 
-    isotropic: ClassVar[bool] = True
+    positive: ClassVar[Mapping[str, str]] = {"yield_stress": "Pa"}
+    not_negative: ClassVar[Mapping[str, str]] = {
+        "hardening": "Pa; for softening take J2Softening3D",
+        "kinematic": "Pa",
+        "exponent": "",
+    }
     aliases: ClassVar[tuple[str, ...]] = ("SmallStrainJ2Plasticity3DLaw", "SmallStrainJ2Plasticity3D")
     variables: ClassVar[dict[str, str]] = {
         "E": "YOUNG_MODULUS",
@@ -86,22 +91,8 @@ class J2Plasticity3D(Material):
     }
 
     def check(self) -> None:
-        """Check the bounds of the constants.
-
-        Raises
-        ------
-        MaterialError
-            If one is beyond them.
-        """
-        Isotropic3D(self.E, self.nu)
-        if not self.yield_stress > 0:
-            raise MaterialError(f"{self._name('yield_stress')} {self.yield_stress:g} must be > 0 Pa")
-        for name in ("hardening", "kinematic", "exponent"):
-            if getattr(self, name) < 0:
-                raise MaterialError(
-                    f"{self._name(name)} {getattr(self, name):g} must be ≥ 0; "
-                    "for softening take a law of damage"
-                )
+        """Check that the yield stress does not fall to its saturation."""
+        super().check()
         if self.saturation_stress and self.saturation_stress < self.yield_stress:
             raise MaterialError(
                 f"{self._name('saturation_stress')} {self.saturation_stress:g} must be ≥ the yield stress "
@@ -117,29 +108,20 @@ class J2Plasticity3D(Material):
 
     def response(self, strain: Array, state: GaussState, dt: float) -> Response:
         """Return stress, consistent tangent and internal variables; see `Material.response`."""
-        elastic = Isotropic3D(self.E, self.nu)
-        C, G = elastic.C, elastic.lame[1]
-        stress = voigt.times(strain - state["plastic_strain"], C)
-        relative = voigt.deviator(stress) - state["back_stress"]
-        norm = np.sqrt(relative**2 @ voigt.SHEAR_TWICE)
-        q, p = 1.5**0.5 * norm, state["accumulated_plastic_strain"][..., 0]
+        G = self.elastic.lame[1]
+        stress, n, q = self.trial(strain, state, state["back_stress"])
+        p = state["accumulated_plastic_strain"][..., 0]
         dp, slope = self._increment(q, p, G)
-        n = relative / np.where(norm > 0, norm, 1.0)[..., None]
         flow = (1.5**0.5 * dp)[..., None] * n
         new = {
             "plastic_strain": state["plastic_strain"] + flow * voigt.SHEAR_TWICE,
             "accumulated_plastic_strain": (p + dp)[..., None],
             "back_stress": state["back_stress"] + 2 / 3 * self.kinematic * flow,
         }
-        stress -= 2 * G * flow
         if not dp.any():
-            return stress, C, new
-        beta = 2 * G * 3 * G * dp / np.where(q > 0, q, 1.0)
-        rate = np.where(dp > 0, 2 * G * 3 * G / (3 * G + self.kinematic + slope), 0.0)
-        D = np.einsum("...i,...j->...ij", (beta - rate)[..., None] * n, n)
-        D += C
-        D -= beta[..., None, None] * voigt.DEVIATOR
-        return stress, D, new
+            return stress, self.elastic.C, new
+        growth = np.where(dp > 0, 1 / (3 * G + self.kinematic + slope), 0.0)
+        return stress - 2 * G * flow, self.tangent(n, q, dp, growth), new
 
     def _increment(self, q: Array, p: Array, G: float) -> tuple[Array, Array]:
         """Return the increment of p at which q - (3G + kinematic) Δp = σ_Y(p + Δp), and the slope of σ_Y."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from kratos_lite import voigt
 from kratos_lite.errors import MaterialError, SolveError
-from kratos_lite.materials.isotropic3d import Isotropic3D
+from kratos_lite.materials.isotropic_law import VonMises
 from kratos_lite.materials.material import GaussState, Material, Response
 from kratos_lite.typing import Array
 
@@ -21,7 +21,7 @@ MOST = 0.9999
 
 
 @dataclass(frozen=True)
-class J2Softening3D(Material):
+class J2Softening3D(VonMises):
     """Elastic up to the yield stress of von Mises, which falls with the dissipated energy: σ_Y (1 - κ).
 
     κ is the work of the stress over plastic strains relative to the fracture energy over the radius of the
@@ -67,7 +67,7 @@ class J2Softening3D(Material):
     compression: float = 0.0
     density: float = 0.0
 
-    isotropic: ClassVar[bool] = True
+    positive: ClassVar[Mapping[str, str]] = {"yield_stress": "Pa", "fracture_energy": "J/m²"}
     aliases: ClassVar[tuple[str, ...]] = ("SmallStrainIsotropicPlasticity3DVonMisesVonMises",)
     variables: ClassVar[dict[str, str]] = {
         "E": "YOUNG_MODULUS",
@@ -91,17 +91,8 @@ class J2Softening3D(Material):
         return super().from_variables(given | values)
 
     def check(self) -> None:
-        """Check the bounds of the constants.
-
-        Raises
-        ------
-        MaterialError
-            If one is beyond them.
-        """
-        Isotropic3D(self.E, self.nu)
-        for name, unit in (("yield_stress", "Pa"), ("fracture_energy", "J/m²")):
-            if not getattr(self, name) > 0:
-                raise MaterialError(f"{self._name(name)} {getattr(self, name):g} must be > 0 {unit}")
+        """Check the curve, and that compression is like tension."""
+        super().check()
         if self.curve not in (EXPONENTIAL, PERFECT):
             raise MaterialError(
                 f"{self._name('curve')} must be 1, exponential softening, or 3, perfect plasticity; "
@@ -114,19 +105,10 @@ class J2Softening3D(Material):
             )
 
     def response(self, strain: Array, state: GaussState, dt: float) -> Response:
-        """Return stress, consistent tangent and internal variables; see `Material.response`.
-
-        Raises
-        ------
-        SolveError
-            If a step or an element is so large that it would snap back.
-        """
-        elastic = Isotropic3D(self.E, self.nu)
-        C, G = elastic.C, elastic.lame[1]
-        trial = (strain - state["plastic_strain"]) @ C.T
-        s = voigt.deviator(trial)
-        norm = np.sqrt(s**2 @ voigt.SHEAR_TWICE)
-        q, kappa = 1.5**0.5 * norm, state["plastic_dissipation"][..., 0]
+        """Return stress, consistent tangent and internal variables; SolveError for what would snap back."""
+        G = self.elastic.lame[1]
+        stress, n, q = self.trial(strain, state)
+        kappa = state["plastic_dissipation"][..., 0]
         per_energy = state["element_radius"][..., 0] / self.fracture_energy  # 1/g
         soft = self.yield_stress * per_energy if self.curve == EXPONENTIAL else np.zeros_like(q)
         limit = self.yield_stress * (1 - kappa) if self.curve == EXPONENTIAL else self.yield_stress
@@ -137,7 +119,6 @@ class J2Softening3D(Material):
                 "would snap back; take a finer mesh, or smaller steps"
             )
         dp = np.where(plastic, (q - limit) / slope, 0.0)
-        n = s / np.where(norm > 0, norm, 1.0)[..., None]
         flow = (1.5**0.5 * dp)[..., None] * n
         work = (q - 3 * G * dp) * dp * per_energy
         new = {
@@ -145,8 +126,5 @@ class J2Softening3D(Material):
             "plastic_dissipation": np.minimum(kappa + work, MOST)[..., None],
             "element_radius": state["element_radius"].copy(),
         }
-        beta = 3 * G * dp / np.where(q > 0, q, 1.0)
-        rate = np.where(plastic, 3 * G * (1 + soft * dp) / slope, 0.0)
-        D = C - 2 * G * beta[..., None, None] * voigt.DEVIATOR
-        D = D - (2 * G * (rate - beta))[..., None, None] * n[..., :, None] * n[..., None, :]
-        return trial - 2 * G * flow, D, new
+        growth = np.where(plastic, (1 + soft * dp) / slope, 0.0)
+        return stress - 2 * G * flow, self.tangent(n, q, dp, growth), new

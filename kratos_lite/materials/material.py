@@ -44,7 +44,9 @@ class Material:
     variables : field name → name of the variable in `.mdpa` and JSON files.
     strain_measure : ``"small"``; or ``"finite"``: the strain is Green's, the stress the second of Piola and
         Kirchhoff, and elements are total Lagrangian.
-    internal_variables : name → numbers at each Gauss point; all are 0 at the beginning.
+    positive, not_negative : constants that must be > 0 or ≥ 0 → their units.
+    internal_variables : name → numbers at each Gauss point, 0 at the beginning; ``element_length``
+        and ``element_radius`` are cube root of the volume and farthest node from the center, in m.
     symmetric_tangent : whether the tangent is symmetric.
     rate_dependent : whether the stress depends on the length of a step.
 
@@ -78,6 +80,8 @@ class Material:
     aliases: ClassVar[tuple[str, ...]] = ()
     variables: ClassVar[dict[str, str]] = {"density": "DENSITY"}
     strain_measure: ClassVar[str] = "small"
+    positive: ClassVar[Mapping[str, str]] = {}
+    not_negative: ClassVar[Mapping[str, str]] = {}
     internal_variables: ClassVar[Mapping[str, int]] = {}
     symmetric_tangent: ClassVar[bool] = True
     rate_dependent: ClassVar[bool] = False
@@ -119,6 +123,11 @@ class Material:
             raise MaterialError(
                 f"{self._name('density')} {self.density:g} must be ≥ 0 kg/m³; reverse gravity instead"
             )
+        for bound, units in ((">", self.positive), ("≥", self.not_negative)):
+            for name, unit in units.items():
+                value = getattr(self, name)
+                if not (value > 0 or (value == 0 and bound == "≥")):
+                    raise MaterialError(f"{self._name(name)} {value:g} must be {bound} 0 {unit}")
         self.check()
 
     @classmethod

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -46,22 +47,15 @@ class MooneyRivlin3D(Material):
     density: float = 0.0
 
     isotropic: ClassVar[bool] = True
+    positive: ClassVar[Mapping[str, str]] = {"bulk": "Pa"}
     strain_measure: ClassVar[str] = "finite"
 
     def check(self) -> None:
-        """Check that both moduli are positive.
-
-        Raises
-        ------
-        MaterialError
-            If one is not.
-        """
+        """Check the shear modulus."""
         if not self.c10 + self.c01 > 0:
             raise MaterialError(
                 f"2 (c10 + c01), the shear modulus, must be > 0 Pa; got {self.c10:g}, {self.c01:g}"
             )
-        if not self.bulk > 0:
-            raise MaterialError(f"{self._name('bulk')} {self.bulk:g} must be > 0 Pa")
 
     def response(self, strain: Array, state: GaussState, dt: float) -> Response:
         """Return S, ∂S/∂E and no internal variables; see `Material.response`."""

@@ -8,13 +8,13 @@ from typing import ClassVar
 import numpy as np
 
 from kratos_lite import voigt
-from kratos_lite.materials.isotropic3d import Isotropic3D
-from kratos_lite.materials.material import GaussState, Material, Response
+from kratos_lite.materials.isotropic_law import IsotropicLaw
+from kratos_lite.materials.material import GaussState, Response
 from kratos_lite.typing import Array
 
 
 @dataclass(frozen=True)
-class NeoHookean3D(Material):
+class NeoHookean3D(IsotropicLaw):
     """Compressible neo-Hookean elasticity: W = μ/2 (I₁ - 3) - μ ln J + λ/2 (ln J)².
 
     Parameters
@@ -47,24 +47,13 @@ class NeoHookean3D(Material):
     nu: float
     density: float = 0.0
 
-    isotropic: ClassVar[bool] = True
     aliases: ClassVar[tuple[str, ...]] = ("HyperElastic3DLaw", "HyperElasticNeoHookean3DLaw")
     variables: ClassVar[dict[str, str]] = {"E": "YOUNG_MODULUS", "nu": "POISSON_RATIO", "density": "DENSITY"}
     strain_measure: ClassVar[str] = "finite"
 
-    def check(self) -> None:
-        """Check that E > 0 and -1 < nu < 0.5.
-
-        Raises
-        ------
-        MaterialError
-            If they are not.
-        """
-        Isotropic3D(self.E, self.nu)
-
     def response(self, strain: Array, state: GaussState, dt: float) -> Response:
         """Return S, ∂S/∂E and no internal variables; see `Material.response`."""
-        lam, mu = Isotropic3D(self.E, self.nu).lame
+        lam, mu = self.elastic.lame
         inverse, log_J = inverse_and_log(strain)
         stress = mu * voigt.UNIT + (lam * log_J - mu)[..., None] * inverse
         D = symmetric_product(inverse)
@@ -74,7 +63,7 @@ class NeoHookean3D(Material):
 
     def energy(self, strain: Array, stress: Array, state: GaussState) -> Array:
         """Return W; see `Material.energy`."""
-        lam, mu = Isotropic3D(self.E, self.nu).lame
+        lam, mu = self.elastic.lame
         log_J = inverse_and_log(strain)[1]
         return np.asarray(mu * (strain[..., :3].sum(axis=-1) - log_J) + lam / 2 * log_J**2)
 

@@ -7,7 +7,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from kratos_lite.errors import MaterialError
 from kratos_lite.materials.base import LinearMaterial
 from kratos_lite.typing import Array
 
@@ -52,6 +51,7 @@ class Orthotropic3D(LinearMaterial):
     density: float = 0.0
 
     aliases: ClassVar[tuple[str, ...]] = ("LinearElasticOrthotropic3DLaw",)
+    positive: ClassVar[dict[str, str]] = dict.fromkeys(("E_x", "E_y", "E_z", "G_xy", "G_yz", "G_xz"), "Pa")
     variables: ClassVar[dict[str, str]] = {
         "E_x": "YOUNG_MODULUS_X",
         "E_y": "YOUNG_MODULUS_Y",
@@ -64,19 +64,6 @@ class Orthotropic3D(LinearMaterial):
         "G_xz": "SHEAR_MODULUS_XZ",
         "density": "DENSITY",
     }
-
-    def check(self) -> None:
-        """Check that all moduli are positive and that C is positive definite.
-
-        Raises
-        ------
-        MaterialError
-            If they are not.
-        """
-        for name in ("E_x", "E_y", "E_z", "G_xy", "G_yz", "G_xz"):
-            if not getattr(self, name) > 0:
-                raise MaterialError(f"{self._name(name)} {getattr(self, name):g} must be > 0 Pa")
-        super().check()
 
     def why_unstable(self) -> str:
         """Name the pair of constants, if one, with nu_ij² ≥ E_i / E_j."""
