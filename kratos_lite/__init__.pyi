@@ -64,6 +64,7 @@ from kratos_lite.elements.b_bar_3d15n import BBar3D15N as BBar3D15N
 from kratos_lite.elements.b_bar_3d20n import BBar3D20N as BBar3D20N
 from kratos_lite.elements.b_bar_3d27n import BBar3D27N as BBar3D27N
 from kratos_lite.elements.enhanced_strain_3d8n import EnhancedStrain3D8N as EnhancedStrain3D8N
+from kratos_lite.elements.f_bar_3d8n import FBar3D8N as FBar3D8N
 from kratos_lite.elements.kinematic_linear_3d4n import KinematicLinear3D4N as KinematicLinear3D4N
 from kratos_lite.elements.kinematic_linear_3d5n import KinematicLinear3D5N as KinematicLinear3D5N
 from kratos_lite.elements.kinematic_linear_3d6n import KinematicLinear3D6N as KinematicLinear3D6N

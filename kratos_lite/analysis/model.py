@@ -32,8 +32,8 @@ class Model(Structure):
     mesh : points, elements and named parts.
     material : one material for all elements, or materials by part name or property id.
     formulation : of the elements, in place of what their names in the mesh say: ``standard``, ``enhanced``,
-        ``b_bar``, ``reduced``, ``total_lagrangian`` for large displacements, or ``non_locking``: that of each
-        shape which does not lock with its material.
+        ``b_bar``, ``reduced``, ``total_lagrangian`` for large displacements, ``f_bar`` where ν → ½ then, or
+        ``non_locking``: that of each shape which does not lock with its material.
 
     Raises
     ------

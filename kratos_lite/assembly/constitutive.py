@@ -22,7 +22,7 @@ from kratos_lite.assembly.element_groups import ElementGroup, PointStates, add_n
 from kratos_lite.assembly.gauss_point_fields import displaced, initial_strain, internal_load, volumes
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import assemble_stiffness
-from kratos_lite.elements import tables
+from kratos_lite.elements import KinematicLinear, tables
 from kratos_lite.elements import total_lagrangian as lagrange
 from kratos_lite.errors import MaterialError, SolveError
 from kratos_lite.typing import Array
@@ -142,13 +142,15 @@ class Window:
         self.place = law.place
         extra = law._dilatations[number]
         self.dilatation = None if extra is None else np.ascontiguousarray(extra[window])
-        self.kernels = compiled("constitutive", self.group.element)
+        self.f_bar = self.group.element.formulation == "f_bar"
+        self.kernels = None if self.f_bar else compiled("constitutive", self.group.element)
 
     def add(self, forces: Array, state: PointStates, dt: float) -> PointStates:
         """Add internal forces (n, 3) and stiffness; return the new states."""
         stress, D, variables = self._respond(state, dt)
-        group, finite = self.group, self.group.element.finite
+        group = self.group
         if self.kernels:
+            finite = group.element.finite
             nodes, _, dN, weights = group.tables()
             placed = self.points, nodes, dN, weights, self.u, stress
             forces += self.kernels.internal_load(*placed, self.dilatation, finite)
@@ -158,18 +160,27 @@ class Window:
                 self.kernels.add_stiffness(*placed, D, self.dilatation, finite, symmetric, *rows, self.data)
             return PointStates(stress, variables)
         for chunk in group.chunks():
-            element, s, C = group.at(self.points, chunk), stress[chunk], group.material.C
-            if finite:
-                F = np.eye(3) + lagrange.displacement_gradient(element, self.u[group.nodes[chunk]])
-                at = lagrange.Deformation(F, s, F, 1.0, 1.0)
-            nodal = lagrange.internal_force(element, at) if finite else element.internal_force(s, C)
+            element, q = group.at(self.points, chunk), self.u[group.nodes[chunk]]
+            nodal, K = self._system(element, q, stress[chunk], None if self.data is None else D[chunk])
             add_nodal(forces, group.nodes[chunk], nodal)
-            if self.data is not None and finite:
-                self._scatter(chunk, lagrange.stiffness_by_axis(element, D[chunk], at))
-            elif self.data is not None:
-                B = element._operator(C)
-                self._scatter(chunk, tables.by_axis(tables.summed(B, D[chunk] @ B, element.dV)))
+            if K is not None:
+                self._scatter(chunk, K)
         return PointStates(stress, variables)
+
+    def _system(
+        self, element: KinematicLinear, q: Array, s: Array, D: Array | None
+    ) -> tuple[Array, Array | None]:
+        """Return forces (m, k, 3) and, of a tangent, matrices (m, 3, k, 3, k) of some elements."""
+        if self.f_bar:
+            return lagrange.f_bar(element, q, s, D)
+        if element.finite:
+            F = np.eye(3) + lagrange.displacement_gradient(element, q)
+            at = lagrange.Deformation(F, s, F, 1.0, 1.0)
+            K = None if D is None else lagrange.stiffness_by_axis(element, D, at)
+            return lagrange.internal_force(element, at), K
+        C, B = self.group.material.C, element._operator(self.group.material.C)
+        K = None if D is None else tables.by_axis(tables.summed(B, D @ B, element.dV))
+        return element.internal_force(s, C), K
 
     def _scatter(self, chunk: slice, K: Array) -> None:
         """Add the matrices (m, 3, k, 3, k) of some elements."""
@@ -233,8 +244,8 @@ class Window:
                 F = np.eye(3) + lagrange.displacement_gradient(element, q)
                 found.append((lagrange.green_strain(element, q), tables.determinant(F)))
             strain, det = (np.concatenate(values) for values in zip(*found, strict=True))
-        if (det <= 0).any():
-            at, point = np.argwhere(det <= 0)[0]
+        if not (det > 0).all():
+            at, point = np.argwhere(~(det > 0))[0]
             where = f"{self.place(int(group.rows[at]))}, Gauss point {point + 1}"
             raise SolveError(f"{where}: the element is turned inside out, det F ≤ 0")
         return strain

@@ -19,7 +19,12 @@ from kratos_lite.elements.exact_rules import (
     geometries,
     interpolations,
 )
-from kratos_lite.elements.formulations import NON_LOCKING, element_of, formulations_of
+from kratos_lite.elements.formulations import (
+    NON_LOCKING,
+    element_of,
+    formulations_of,
+    is_nearly_incompressible,
+)
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.materials import Material
@@ -215,9 +220,9 @@ def _element_for(
     """Return the element class of a block with a material; plastic flow and large strains choose theirs."""
     finite = material.strain_measure == "finite"
     if finite or not material.is_linear:
-        word = "total_lagrangian" if finite else "b_bar"
-        if word == "b_bar" and word not in formulations_of(element_class(mesh, block).shape):
-            word = "standard"
+        words = ("f_bar", "total_lagrangian") if finite else ("b_bar", "standard")
+        locks = not material.is_linear and (not finite or is_nearly_incompressible(material.C))
+        word = words[not locks or words[0] not in formulations_of(element_class(mesh, block).shape)]
         formulation = word if formulation == NON_LOCKING else formulation
         unnamed = word if unnamed == NON_LOCKING else unnamed
     element = element_of(block.name, formulation, material.C, unnamed)
@@ -225,6 +230,11 @@ def _element_for(
         raise ModelError(
             f"{mesh.place(block, 0)}: {type(material).__name__} is a law of finite strains, and "
             f"{element.__name__} has small ones; take Model(…, formulation='total_lagrangian')"
+        )
+    if material.is_linear and element.formulation == "f_bar":
+        raise ModelError(
+            f"{mesh.place(block, 0)}: {type(material).__name__}, linear in Green's strain, has no "
+            "pressure of det F for f_bar; take total_lagrangian, or a law such as NeoHookean3D"
         )
     if not material.is_linear and "local_system" in element.custom:
         raise ModelError(

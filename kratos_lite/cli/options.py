@@ -12,7 +12,7 @@ BOUNDARIES = "condition on the cut faces of the moving frame (absorbing)"
 ERROR = "relative error of the energy norm below 1, such as 1%% or 0.01: statics, the mesh made finer"
 FORMULATION = (
     "instead of that of the names of elements: standard, enhanced, b_bar, reduced, "
-    "total_lagrangian or non_locking"
+    "total_lagrangian, f_bar or non_locking"
 )
 INTEGRATOR = (
     "newmark[:BETA,GAMMA], hht[:ALPHA], bossak[:ALPHA], generalized_alpha[:RHO] or central_difference"

@@ -18,6 +18,7 @@ import numpy as np
 
 from kratos_lite import voigt
 from kratos_lite.elements.kinematic_linear import KinematicLinear
+from kratos_lite.elements.tables import cofactors, determinant, summed
 from kratos_lite.typing import Array
 
 
@@ -32,9 +33,22 @@ class Deformation(NamedTuple):
 
 
 def displacement_gradient(element: KinematicLinear, q: Array) -> Array:
-    """Return H_ij = dq_i/dX_j at the Gauss points, (..., g, 3, 3), of nodal q (..., n, 3) in m."""
-    _, D = element._gauss
-    return np.swapaxes(D @ q[..., None, :, :], -1, -2)
+    """Return H_ij = dq_i/dX_j at the Gauss points, (..., g, 3, 3), of nodal q (..., n, 3) in m.
+
+    Of F-bar F̄ - 1, F̄ = (J̄ / J)^⅓ F; see `FBar3D8N`.
+    """
+    dV, D = element._gauss
+    H = np.swapaxes(D @ q[..., None, :, :], -1, -2)
+    return H + _stretch(H, dV) * (np.eye(3) + H) if element.formulation == "f_bar" else H
+
+
+def _stretch(H: Array, dV: Array) -> Array:
+    """Return (J̄ / J)^⅓ - 1 as (..., g, 1, 1), from J - 1, which small strains leave exact; nan for J ≤ 0."""
+    trace = np.trace(H, axis1=-2, axis2=-1)
+    change = trace + (trace**2 - np.einsum("...ij,...ji->...", H, H)) / 2 + determinant(H)
+    mean = (change * dV).sum(axis=-1, keepdims=True) / dV.sum(axis=-1, keepdims=True)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.expm1((np.log1p(mean) - np.log1p(change)) / 3)[..., None, None]
 
 
 def strain_change(F: Array, dF: Array) -> Array:
@@ -83,11 +97,48 @@ def stiffness_by_axis(element: KinematicLinear, C: Array, at: Deformation) -> Ar
     lead = D.shape[:-3]
     K = np.swapaxes(left.reshape(*lead, 6 * g, 3 * n), -1, -2) @ right.reshape(*lead, 6 * g, 3 * n)
     K = K.reshape(*lead, 3, n, 3, n)
-    S = voigt.tensor(at.S) * (at.rate_F * dV[..., None, None])
-    initial = (np.swapaxes(D, -1, -2) @ S @ D).sum(axis=-3)
+    return _with_stress(K, at.S * (at.rate_F * dV[..., None]), D)
+
+
+def _with_stress(K: Array, S: Array, D: Array) -> Array:
+    """Return K with what stresses times volumes (..., g, 6) add to it."""
+    initial = (np.swapaxes(D, -1, -2) @ voigt.tensor(S) @ D).sum(axis=-3)
     for i in range(3):
         K[..., i, :, i, :] += initial
     return K
+
+
+def f_bar(element: KinematicLinear, q: Array, S: Array, C: Array | None) -> tuple[Array, Array | None]:
+    """Return internal force (..., n, 3) and, of C = dS/dE, stiffness (..., 3, n, 3, n) of F-bar; S at F̄.
+
+    With dθ = d ln J = G:dq and w = dθ̄ - dθ, dĒ = r² (dE + ⅓ F^T F w), r³ = J̄ / J; S:d²Ē has d²θ = -G_ja G_ib.
+    """
+    dV, D = element._gauss
+    H = np.swapaxes(D @ q[..., None, :, :], -1, -2)
+    F, square = np.eye(3) + H, (1 + _stretch(H, dV)) ** 2
+    cofactor = np.swapaxes(cofactors(F), -1, -2)
+    J = determinant(F)[..., None, None]
+    lead, n = D.shape[:-2], D.shape[-1]
+    theta = (cofactor / J @ D).reshape(*lead, 3 * n)
+    share = J[..., 0] * dV[..., None]
+    share /= share.sum(axis=-2, keepdims=True)
+    mean = (share * theta).sum(axis=-2, keepdims=True)
+    w = mean - theta
+    right = voigt.vector(square * np.swapaxes(F, -1, -2) @ F) * voigt.SHEAR_TWICE
+    B = square * _variation(F, D) + right[..., None] * w[..., None, :] / 3
+    force = (S[..., None, :] @ B)[..., 0, :] * dV[..., None]
+    total_force = np.swapaxes(force.sum(axis=-2).reshape(*lead[:-1], 3, n), -1, -2)
+    if C is None:
+        return total_force, None
+    p = (S * right).sum(axis=-1, keepdims=True) / 3 * dV[..., None]  # of Kirchhoff's mean stress
+    total = p.sum(axis=-2, keepdims=True)
+    mixed = np.swapaxes(w, -1, -2) @ (force - p * w / 2) * (2 / 3)
+    K = summed(B, C @ B, dV) + mixed + np.swapaxes(mixed, -1, -2)
+    K += np.swapaxes(theta, -1, -2) @ (total * share * theta) - total * np.swapaxes(mean, -1, -2) @ mean
+    turned = np.swapaxes(theta, -1, -2) @ ((p - total * share) * theta)
+    K = K.reshape(*K.shape[:-2], 3, n, 3, n)
+    K += np.swapaxes(turned.reshape(K.shape), -4, -2)
+    return total_force, _with_stress(K, S * square[..., 0] * dV[..., None], D)
 
 
 def _variation(F: Array, D: Array) -> Array:

@@ -39,7 +39,8 @@ def _near_half(groups: Sequence[ElementGroup]) -> list[str]:
     """Warn of plain elements with ν near ½; ten-node tetrahedra have sound displacements."""
     replacements: dict[str, str] = {}
     for element, C in ((group.element, group.material.C) for group in groups):
-        plain = not element.custom and element.formulation == "standard"
+        large = element.formulation == "total_lagrangian" and len(element.nodes) == element.shape.corners
+        plain = not element.custom and (large or element.formulation == "standard")
         if plain and element.__name__ != "KinematicLinear3D10N" and bulk_over_shear(C) > NEAR_HALF:
             replacements[element.__name__] = better_element(element, "BBar")
     if not replacements:
@@ -56,8 +57,7 @@ def _with_apex(groups: Sequence[ElementGroup]) -> list[str]:
             counts[group.element] = counts.get(group.element, 0) + len(group)
     half = sum(map(len, groups)) / 2
     return [
-        f"{element.__name__} locks in bending (comes out far too stiff); take KinematicLinear"
-        f"{QUADRATIC[element.shape.cell]}"
+        f"{element.__name__} locks in bending (comes out far too stiff); take {better_element(element)}"
         for element, count in counts.items()
         if element.shape.cell == "tetrahedron" or count > half
     ]
@@ -66,6 +66,9 @@ def _with_apex(groups: Sequence[ElementGroup]) -> list[str]:
 def better_element(element: type[KinematicLinear], family: str = "KinematicLinear") -> str:
     """Return the name of the element to take in place of one that locks."""
     known = formulations_of(element.shape)
+    if element.finite:
+        quadratic = f"TotalLagrangianElement{QUADRATIC[element.shape.cell]}"
+        return known["f_bar"].__name__ if family == "BBar" and "f_bar" in known else quadratic
     if "enhanced" in known:
         return known["enhanced"].__name__
     family = "KinematicLinear" if element.shape.cell == "tetrahedron" else family

@@ -155,7 +155,7 @@ class Structure(Tabular):
         if not all(law.is_linear and law.strain_measure == "small" for law in laws):
             return True
         if self.formulation is not None:
-            return self.formulation == "total_lagrangian"
+            return self.formulation in ("total_lagrangian", "f_bar")
         return any(len(b) and b.name in ELEMENTS and ELEMENTS[b.name].finite for b in self.mesh.blocks)
 
     def require_linear(self, what: str) -> None:

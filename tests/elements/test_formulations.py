@@ -19,6 +19,7 @@ def test_formulations_of_a_shape_are_those_of_the_registry():
     words = {word: kind.__name__ for word, kind in formulations_of(Hexahedron8).items()}
     assert words == {
         "total_lagrangian": "TotalLagrangianElement3D8N",
+        "f_bar": "FBar3D8N",
         "standard": "KinematicLinear3D8N",
         "enhanced": "EnhancedStrain3D8N",
         "b_bar": "BBar3D8N",

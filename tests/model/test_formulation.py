@@ -81,7 +81,7 @@ def test_the_report_says_what_was_chosen_where_the_mesh_names_no_formulation(ele
         ("KinematicLinear3D4N", "enhanced", r"element 1 \(KinematicLinear3D4N\): there is no formulation"),
         ("KinematicLinear3D4N", "b_bar", "with 4 nodes .* total_lagrangian, standard, non_locking"),
         ("KinematicLinear3D20N", "enhanced", "total_lagrangian, standard, reduced, b_bar, non_locking"),
-        ("KinematicLinear3D8N", "reduced", "total_lagrangian, standard, enhanced, b_bar, non_locking"),
+        ("KinematicLinear3D8N", "reduced", "total_lagrangian, standard, f_bar, enhanced, b_bar, non_locking"),
         ("KinematicLinear3D8N", "enhnced", "must be one of b_bar, enhanced, .*Did you mean enhanced"),
         ("KinematicLinear3D8N", 3, "formulation must be one of .*; got 3"),
     ],

@@ -79,6 +79,8 @@ def test_elements_that_are_good_enough_are_not_warned_of(size, cells, elements, 
         ("KinematicLinear3D5N", "BBar3D13N"),
         ("KinematicLinear3D20N", "BBar3D20N"),
         ("KinematicLinear3D27N", "BBar3D27N"),
+        ("TotalLagrangianElement3D8N", "FBar3D8N"),
+        ("TotalLagrangianElement3D4N", "TotalLagrangianElement3D10N"),
     ],
 )
 def test_plain_elements_near_incompressibility_are_pointed_to_better_ones(element, better):

@@ -33,7 +33,7 @@ MATERIALS_TO_CHECK = [
     *(law for law, _ in LAWS),
 ]
 LINEAR = {name for name in ELEMENTS if name.endswith(("3D4N", "3D5N", "3D6N", "3D8N"))}
-OWN_STRAIN = {name for name in ELEMENTS if name.startswith(("BBar", "Enhanced"))}
+OWN_STRAIN = {name for name in ELEMENTS if name.startswith(("BBar", "Enhanced", "FBar"))}
 
 
 def show(name, findings):
@@ -69,7 +69,7 @@ def test_each_element_conforms(name):
 
 
 def test_each_element_and_shape_is_registered():
-    assert len(ELEMENTS.values()) == 26
+    assert len(ELEMENTS.values()) == 27
     assert len(SHAPES.values()) == 17
 
 
