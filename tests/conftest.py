@@ -8,10 +8,9 @@ if "PYTEST_XDIST_WORKER" in os.environ:  # workers share the processors: dense a
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import pytest
+from commands import run  # noqa: F401
 from malformed import write_malformed
 from scenes import SHARED
-
-from kratos_lite.cli import main
 
 collect_ignore = ["interop/kratos_driver.py", "interop/kratos_parts_driver.py", "fixtures/bad"]
 """Scripts that tests run, and those that must fail."""
@@ -52,34 +51,3 @@ def malformed(request, tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("malformed")
     write_malformed(folder)
     return folder
-
-
-class Outcome:
-    """Exit code, standard output and standard error of a command; its lines by their labels."""
-
-    def __init__(self, code, out, err):
-        self.code, self.out, self.err = code, out, err
-        self.rows = {line[:22].strip(): line[22:] for line in out.splitlines()}
-
-    def refuses(self, *fragments):
-        """Show that the command ends with one error that says all fragments, and nothing else."""
-        assert (self.code, self.out) == (2, "")
-        assert self.err.startswith("error: ")
-        assert "Traceback" not in self.err
-        for fragment in fragments:
-            assert fragment in self.err
-        return True
-
-
-@pytest.fixture
-def run(capsys):
-    """Run a command in this process: ``run("solve", path, …)``."""
-
-    def call(*words):
-        try:
-            code = main([str(word) for word in words])
-        except SystemExit as end:
-            code = end.code
-        return Outcome(code, *capsys.readouterr())
-
-    return call

@@ -1,9 +1,12 @@
 """Communication between ranks, tasks, and errors of one of them."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from kratos_lite.distributed.communicator import start, started
+from kratos_lite.distributed import petsc
+from kratos_lite.distributed.communicator import Ranks, _check, start, started
 from kratos_lite.errors import InputError, MeshError
 
 
@@ -67,3 +70,46 @@ def test_an_error_of_one_rank_is_that_of_all(error):
     with pytest.raises(MeshError, match="of 0"):
         ranks.run(fail_all)
     assert ranks.run(sum_of, 1, each=lambda rank: 1) == ranks.size
+
+
+@pytest.mark.parametrize(
+    ("error", "text"),
+    [
+        (KeyError("odd"), "KeyError: 'odd'"),
+        (MemoryError(), "MemoryError: "),
+        (SystemExit(0), "SystemExit: 0"),
+    ],
+)
+def test_a_defect_of_one_rank_ends_all(error, text, capfd):
+    ended = []
+    comm = SimpleNamespace(Get_rank=lambda: 0, Get_size=lambda: 1, allgather=lambda value: [value])
+    comm.Abort = ended.append
+
+    def fail(ranks):
+        raise error
+
+    Ranks(comm).run(fail)
+    assert ended == [2]
+    assert capfd.readouterr().err == f"error: rank 0: {text}\n"
+
+
+def lacking_petsc(ranks):
+    """Check the ranks, of which the last one has no PETSc."""
+    real = petsc.petsc
+    if ranks.rank == ranks.size - 1:
+        petsc.petsc = absent
+    try:
+        _check(ranks, [])
+    finally:
+        petsc.petsc = real
+
+
+def absent():
+    raise InputError("needs petsc4py")
+
+
+def test_a_rank_without_petsc_is_named():
+    ranks = started()
+    if ranks.size > 1:
+        with pytest.raises(InputError, match=f"rank {ranks.size - 1}: needs petsc4py"):
+            ranks.run(lacking_petsc)

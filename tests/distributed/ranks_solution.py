@@ -144,8 +144,12 @@ def box(cells=4, element="8N"):
     return kl.box(cells=(cells,) * 3, element=element)
 
 
+def small():
+    return box(3)
+
+
 def quadratic():
-    return box(3, "27N")
+    return box(2, "27N")
 
 
 def tetrahedra():
@@ -199,8 +203,9 @@ def same(found, expected):
 
 
 CASES = (
-    *((build, box) for build in (cube, clamped, pulled, displaced, initial, tied, tied_to_supports)),
-    *((build, box) for build in (carried, nearly_incompressible, free, free_and_tied)),
+    *((build, small) for build in (cube, clamped, pulled, displaced, initial)),
+    *((build, small) for build in (carried, nearly_incompressible, free)),
+    *((build, box) for build in (tied, tied_to_supports, free_and_tied)),
     *((pulled, make) for make in (quadratic, tetrahedra, wedges)),
     (clamped, mixed_cells),
     (two_bodies, bodies),
@@ -268,9 +273,6 @@ def test_options_of_petsc():
     found = model.solve(petsc="-ksp_type fgmres -pc_type bjacobi -pc_bjacobi_blcks 2")
     assert found.report.solver == "fgmres + bjacobi (PETSc)"
     assert any("-pc_bjacobi_blcks; they may be misspelt" in text for text in found.report.warnings)
-    for text in ("ksp_type cg", "-ksp_type cg gmres", "-ksp_type 'cg"):
-        with pytest.raises(InputError, match="PETSc options"):
-            model.solve(petsc=text)
     with pytest.raises(InputError, match="gamgg"):
         model.solve(petsc="-pc_type gamgg")
     with pytest.raises(SolveError, match="not converged after 3 iterations"):
@@ -288,7 +290,7 @@ def test_a_matrix_that_is_singular(solver, monkeypatch):
 
 
 def test_a_slender_body_is_not_taken_for_a_singular_one():
-    model = kl.Model(kl.box((1000, 1, 1), (200, 1, 1), element="Element3D20N"), STEEL)
+    model = kl.Model(kl.box((1000, 1, 1), (60, 1, 1), element="Element3D20N"), STEEL)
     model.fix("x-")
     model.add(kl.Gravity((0.0, 0.0, -9.81)))
     one, many = (model.solve(backend=backend).energy() for backend in ("own", "petsc"))
@@ -313,12 +315,6 @@ def test_progress_and_an_error_in_it():
 
 def count(ranks):
     return ranks.sum(1)
-
-
-def test_what_does_not_move_together_is_refused():
-    model = clamped(box())
-    with pytest.raises(InputError, match="own backend alone"):
-        model.solve(error=0.1, backend="petsc")
 
 
 def test_a_material_that_cannot_be_sent():

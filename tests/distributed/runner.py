@@ -17,4 +17,5 @@ if __name__ == "__main__":
     import pytest
 
     files = [str(path) for path in (*sorted(HERE.glob("ranks_*.py")), HERE / "test_cut.py")]
-    sys.exit(pytest.main(["-p", "no:cacheprovider", "--noconftest", *files, *sys.argv[1:]]))
+    words = ["-p", "no:cacheprovider", "-p", "commands", "--noconftest"]
+    sys.exit(pytest.main([*words, *files, *sys.argv[1:]]))
