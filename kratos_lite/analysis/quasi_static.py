@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from kratos_lite.analysis.nodal_loads import AppliedLoads
 from kratos_lite.analysis.prescribed_motion import PrescribedMotion
 from kratos_lite.analysis.report import Report, StepReport
 from kratos_lite.analysis.result import Result
-from kratos_lite.analysis.state import State, check_state
+from kratos_lite.analysis.state import ModelInTime, State, check_state
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.constitutive import Constitutive, States, named, unnamed
 from kratos_lite.assembly.stiffness import assemble_stiffness
@@ -40,7 +40,7 @@ SLACK, SEARCHES = 0.8, 6
 """Line search: fraction of the work of the residual that a full correction may leave, and most trials."""
 
 
-class QuasiStaticAnalysis:
+class QuasiStaticAnalysis(ModelInTime):
     """A model whose loads grow in a pseudo-time; made by `Model.quasi_static`.
 
     Each step is found by Newton's method with the consistent tangent.  A step that does not converge is cut
@@ -96,7 +96,7 @@ class QuasiStaticAnalysis:
     ) -> None:
         self.tolerance = number(tolerance, "the tolerance", least=1e-14)
         self.iterations = whole_number(iterations, "iterations")
-        self.line_search, self.model, self.progress = line_search, model, progress
+        self.line_search, self.progress = line_search, progress
         if model.motion is not None:
             raise ModelError("a model with a motion has no quasi-static analysis; leave the motion out")
         self.groups, self.warnings = model.checked()
@@ -113,8 +113,8 @@ class QuasiStaticAnalysis:
             plan = Plan("direct", "tangents beyond a limit point are not positive definite")
         self.tangents = Tangents(self.system, plan, self.law.symmetric and not arc_length, self._at_rest)
         self.arc_length = arc_length
-        self._version = self._versions()
-        self.time, self.step, self.parts, self.work = 0.0, 0, 1, 0.0
+        super().__init__(model)
+        self.work = 0.0
         self.u = np.zeros(3 * len(self.system.nodes))
         self.states = self.law.start()
         self.increment, self.speed = np.zeros_like(self.u), 0.0
@@ -123,10 +123,6 @@ class QuasiStaticAnalysis:
         self.reports: list[StepReport] = []
         if arc_length:
             self._check_factor()
-
-    def _versions(self) -> list[Any]:
-        """Return what must stay as it is; equal as long as it does."""
-        return [self.model.version, self.model.supports.value_version, *self.model.loads]
 
     def _forces(self, u: Array) -> Array:
         """Return the internal forces (3a,) of the committed states at displacements (3a,)."""
@@ -144,41 +140,15 @@ class QuasiStaticAnalysis:
 
     # ---- steps -----------------------------------------------------------------------------------
 
-    def critical_step(self) -> float:
-        """Return the longest stable step in s: infinite."""
-        return np.inf
-
     def prepare(self, h: float, parts: int) -> None:
-        """Make ready for steps; `kratos_lite.integrate` does.
-
-        Parameters
-        ----------
-        h : step in s.
-        parts : substeps into which each is divided.
-
-        Raises
-        ------
-        ModelError
-            The model has changed.
-        """
-        if self._version != self._versions():
-            raise ModelError(
-                "the model has changed since this analysis was made; make a new one and restore the state"
-            )
+        """Make ready for steps of h s in so many parts; `kratos_lite.integrate` does."""
+        self.check_unchanged()
         self.parts = parts
 
     def advance(self, h: float, count: int) -> None:
-        """Take steps; `kratos_lite.integrate` does.
+        """Take steps of h s; `kratos_lite.integrate` does.
 
-        Parameters
-        ----------
-        h : step in s.
-        count : their number.
-
-        Raises
-        ------
-        SolveError
-            A step does not converge, however much it is cut; the last converged state is kept.
+        SolveError for one that does not converge, however much it is cut; the last converged state is kept.
         """
         for _ in range(count):
             begin, before = self.time, self.u
@@ -332,20 +302,12 @@ class QuasiStaticAnalysis:
         return State("model", "quasi_static", self.time, self.step, values, self.parts)
 
     def check_state(self, state: State) -> State:
-        """Return a state of this model.
-
-        Parameters
-        ----------
-        state : any.
-
-        Returns
-        -------
-        State
+        """Return a state of a model of the same mesh, elements and laws.
 
         Raises
         ------
         InputError
-            It is of another mesh, other elements or laws, or of no quasi-static analysis.
+            It is another one.
         """
         now = self.state()
         checked = check_state(state, "model", {name: np.shape(value) for name, value in now.values.items()})
@@ -357,17 +319,7 @@ class QuasiStaticAnalysis:
         return checked
 
     def restore(self, state: State) -> None:
-        """Go on from a state of this model.
-
-        Parameters
-        ----------
-        state : of a model of the same mesh, elements and laws.
-
-        Raises
-        ------
-        InputError
-            It is no such state.
-        """
+        """Go on from a state of a model of the same mesh, elements and laws."""
         get = self.check_state(state).values
         self.u = self.system.gather(get["u"]).copy()
         self.load, self.internal, self.work = get["load"].copy(), get["internal"].copy(), float(get["work"])
@@ -383,16 +335,7 @@ class QuasiStaticAnalysis:
         return self.model.supports.supported(self._whole(self.internal - self.load))
 
     def result(self, state: State | None = None) -> Result:
-        """Return a state as a result with strains, stresses and internal variables.
-
-        Parameters
-        ----------
-        state : of this model; that of now if not given.
-
-        Returns
-        -------
-        Result
-        """
+        """Return a state of this model, or that of now, with strains, stresses and internal variables."""
         if state is not None:
             now = self.state()
             self.restore(state)

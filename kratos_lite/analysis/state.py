@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Any
 
 import numpy as np
 
 from kratos_lite.analysis.fields import Fields
 from kratos_lite.bodies.body import Body
-from kratos_lite.errors import InputError
+from kratos_lite.errors import InputError, ModelError
+from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array
 from kratos_lite.validation import finite, number, short, whole_number
 
@@ -20,18 +22,66 @@ MODEL_FIELDS = ("u", "v", "a", "reactions", "imbalance")
 STEP_FIELDS = ("u", "reactions", "load", "internal", "work")
 
 
-@runtime_checkable
-class InTime(Protocol):
-    """A model in time."""
+class Stepper(ABC):
+    """What `kratos_lite.integrate` advances: a body, a list of bodies, or a model in time."""
 
-    def state(self) -> State:
+    parts = 1  # substeps into which each step is divided
+
+    def critical_step(self) -> float:
+        """Return the longest stable step in s; infinite for implicit integrators."""
+        return np.inf
+
+    @abstractmethod
+    def prepare(self, h: float, parts: int) -> None:
+        """Make ready for steps of h s in so many parts; `kratos_lite.integrate` does."""
+
+    @abstractmethod
+    def advance(self, h: float, count: int) -> None:
+        """Take steps of h s; `kratos_lite.integrate` does."""
+
+    def diverged(self) -> bool:
+        """Return whether the motion has grown without bound."""
+        return False
+
+    @abstractmethod
+    def state(self) -> Any:
         """Return the state of now."""
 
-    def restore(self, state: State) -> None:
-        """Go on from a state."""
 
+class ModelInTime(Stepper):
+    """A model with a time, whose states can be saved and restored."""
+
+    model: Structure
+    time: float
+    step: int
+
+    def __init__(self, model: Structure) -> None:
+        self.model, self.time, self.step = model, 0.0, 0
+        self._version = self._versions()
+
+    def _versions(self) -> list[Any]:
+        """Return what must stay as it is; equal as long as it does."""
+        model = self.model
+        return [model.version, model.supports.value_version, model.motion, *model.loads]
+
+    def check_unchanged(self) -> None:
+        """Raise ModelError if the model has changed."""
+        if self._version != self._versions():
+            raise ModelError(
+                "the model has changed since this analysis was made; make a new one and restore the state"
+            )
+
+    @abstractmethod
+    def check_state(self, state: State) -> State:
+        """Return a state that is one of this model; InputError for any other."""
+
+    @abstractmethod
+    def restore(self, state: State) -> None:
+        """Go on from a state of a model of the same mesh, loaded or held otherwise perhaps."""
+
+    @abstractmethod
     def result(self, state: State | None = None) -> Fields:
-        """Return the result of a state."""
+        """Return a state of this model, or that of now, as a result with strains and stresses."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +119,7 @@ class State:
     substeps: int = 1
 
     @classmethod
-    def of(cls, subject: Body | InTime) -> State:
+    def of(cls, subject: Body | ModelInTime) -> State:
         """Return the present state of a body or of a model in time.
 
         Parameters
@@ -88,7 +138,7 @@ class State:
         _check_subject(subject)
         return subject.state() if not isinstance(subject, Body) else state_of_body(subject)
 
-    def restore(self, subject: Body | InTime) -> None:
+    def restore(self, subject: Body | ModelInTime) -> None:
         """Let a body or a model go on from this state.
 
         Parameters
@@ -121,7 +171,7 @@ class State:
 
 def _check_subject(subject: object) -> None:
     """Raise InputError for what has no states."""
-    if not isinstance(subject, (Body, InTime)):
+    if not isinstance(subject, (Body, ModelInTime)):
         raise InputError(
             f"a body, or a model in time, model.transient(), has states; got {type(subject).__name__}"
         )

@@ -6,14 +6,12 @@ import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from math import ceil, inf
-from typing import Any, TypeAlias, overload
+from typing import Any, overload
 
 import numpy as np
 
 from kratos_lite.analysis.integrators import body_integrator
-from kratos_lite.analysis.quasi_static import QuasiStaticAnalysis
-from kratos_lite.analysis.state import State, state_of_body
-from kratos_lite.analysis.transient import TransientAnalysis
+from kratos_lite.analysis.state import ModelInTime, State, Stepper, state_of_body
 from kratos_lite.bodies.batched import batch, forms_batch, groups_of
 from kratos_lite.bodies.body import Body
 from kratos_lite.bodies.constraint_projection import project_velocity
@@ -29,7 +27,7 @@ MOST_SUBSTEPS = 1_000_000  # parts of one step; more would take the time of a wh
 
 @overload
 def integrate(
-    subject: Body | TransientAnalysis | QuasiStaticAnalysis,
+    subject: Body | ModelInTime,
     dt: float,
     steps: int | None = ...,
     *,
@@ -124,7 +122,7 @@ def integrate(
 
 
 def _stepper(subject: Any) -> Stepper:
-    if isinstance(subject, (TransientAnalysis, QuasiStaticAnalysis)):
+    if isinstance(subject, ModelInTime):
         return subject
     if isinstance(subject, Body):
         return BodyStepper(subject)
@@ -148,7 +146,7 @@ def _states(
             chunk = every if count is None else min(every, count - done)
             stepper.advance(h, chunk)
             done += chunk
-            if not isinstance(stepper, ListStepper) and stepper.diverged():
+            if stepper.diverged():
                 raise _divergence(stepper, h)
             if shown and count:
                 shown("integrate", done / count)
@@ -163,7 +161,7 @@ def _states(
                 return
 
 
-def _divergence(stepper: BodyStepper | TransientAnalysis | QuasiStaticAnalysis, h: float) -> SolveError:
+def _divergence(stepper: Stepper, h: float) -> SolveError:
     with np.errstate(over="ignore", invalid="ignore"):
         state = stepper.state()
     return SolveError(
@@ -176,7 +174,7 @@ def _divergence(stepper: BodyStepper | TransientAnalysis | QuasiStaticAnalysis, 
 CHECKED = 100  # steps after which the critical step is found anew, as the tangent may have stiffened
 
 
-class BodyStepper:
+class BodyStepper(Stepper):
     """A body, or a batch of them as one, with a clock of its own."""
 
     def __init__(self, body: Body | Sequence[Body]) -> None:
@@ -248,7 +246,7 @@ class BodyStepper:
         return state_of_body(self.body, self.parts)
 
 
-class ListStepper:
+class ListStepper(Stepper):
     """Bodies of any kinds, each batch among them as one; if one fails, all stay in the states before."""
 
     def __init__(self, bodies: Sequence[Body], groups: list[list[Body]]) -> None:
@@ -296,6 +294,3 @@ class ListStepper:
     def state(self) -> list[State]:
         """Return the states of now."""
         return [state_of_body(body, self.parts) for body in self.bodies]
-
-
-Stepper: TypeAlias = BodyStepper | ListStepper | TransientAnalysis | QuasiStaticAnalysis

@@ -10,7 +10,7 @@ import numpy as np
 
 from kratos_lite.analysis.fields import FIELDS, Field, Fields, known
 from kratos_lite.analysis.peak import peak
-from kratos_lite.analysis.state import InTime, State
+from kratos_lite.analysis.state import ModelInTime, State
 from kratos_lite.errors import InputError, nearest
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.structure import Structure
@@ -47,7 +47,7 @@ def series_of(thing: Any, given: dict[str, Any], most: int) -> tuple[list[list[S
     if given["modes"] is not None:
         modes, turns = _modes(thing, given), np.exp(2j * np.pi * phases)
         return [_phase(thing, given, *modes, turn) for turn in turns], options_of(given, 1.0)
-    if isinstance(thing, InTime) and given["values"] is None:
+    if isinstance(thing, ModelInTime) and given["values"] is None:
         given["values"] = "displacement"
     things, titles = _several(thing, given)
     if len(things) > 1:
@@ -82,7 +82,7 @@ def evenly(count: int, most: int) -> list[int]:
 def _several(thing: Any, given: dict[str, Any]) -> tuple[list[Any], list[str]]:
     """Return things to draw and their titles, if any."""
     titles = given["titles"]
-    if isinstance(thing, InTime):
+    if isinstance(thing, ModelInTime):
         states = thing.state() if given["states"] is None else given["states"]
         states = [states] if isinstance(states, State) else list(states)
         if not states:

@@ -22,8 +22,8 @@ from kratos_lite.analysis.modal import critical_rates
 from kratos_lite.analysis.nonlinear_motion import NonlinearMotion
 from kratos_lite.analysis.result import Result, result_of
 from kratos_lite.analysis.solution_checks import check_deformation
-from kratos_lite.analysis.state import MODEL_FIELDS, State, check_state
-from kratos_lite.errors import InputError, ModelError
+from kratos_lite.analysis.state import MODEL_FIELDS, ModelInTime, State, check_state
+from kratos_lite.errors import InputError
 from kratos_lite.model.loads.base import equal_loads
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.direct import one_thread
@@ -37,12 +37,7 @@ OFF_SUPPORT = 1e-6  # fraction of the largest displacement by which a state may 
 OFF_BALANCE = 1e-4  # fraction of the largest force by which the accelerations of a state may miss the balance
 
 
-def _version(model: Structure) -> list[Any]:
-    """Return what must stay as it is while a model moves in time; equal as long as it does."""
-    return [model.version, model.supports.value_version, model.motion, *model.loads]
-
-
-class TransientAnalysis:
+class TransientAnalysis(ModelInTime):
     """A model that moves in time; made by `Model.transient`.
 
     Parameters
@@ -103,10 +98,9 @@ class TransientAnalysis:
         self.equations = e
         e.warnings += equal_loads(model.loads, model.named_loads)
         self.integrator.check(e)
-        self._version = _version(model)
+        super().__init__(model)
         self._monitor = CriticalRateMonitor(e)
         self._monitor.check(0.0)
-        self.time, self.step, self.parts = 0.0, 0, 1
         rest = np.zeros((e.system.n_nodes, 3))
         self.u = self._nodal(rest if displacement is None else displacement, "the initial displacement")
         self.v = self._nodal(rest if velocity is None else velocity, "the initial velocity")
@@ -134,7 +128,7 @@ class TransientAnalysis:
         off = np.abs(self.equations.prescribed.part(u) - prescribed).reshape(-1, 3)
         node, axis = np.unravel_index(int(off.argmax()), off.shape)
         if off[node, axis] > OFF_SUPPORT * np.abs(u).max(initial=0.0):
-            name = self.equations.model.supports.name(3 * int(self.equations.system.nodes[node]) + int(axis))
+            name = self.model.supports.name(3 * int(self.equations.system.nodes[node]) + int(axis))
             raise InputError(
                 f"{what} does not fit the supports: {name} is {off[node, axis]:g} m off from where it is held"
             )
@@ -159,44 +153,20 @@ class TransientAnalysis:
         return self.integrator.critical_step(self.equations)
 
     def prepare(self, h: float, parts: int) -> None:
-        """Make ready for steps; `kratos_lite.integrate` does.
-
-        Parameters
-        ----------
-        h : step in s.
-        parts : substeps into which each is divided.
-
-        Raises
-        ------
-        InputError
-            Parts are longer than the critical step.
-        ModelError
-            The model has changed.
-        """
+        """Make ready for steps of h s in so many parts; `kratos_lite.integrate` does."""
         e = self.equations
-        self._check_unchanged()
+        self.check_unchanged()
         check_stable(str(self.integrator), h / parts, self.critical_step(), "Newmark()")
         e.step, self.parts = h / parts, parts
-        if not self.step and e.model.supports.motions:
+        if not self.step and self.model.supports.motions:
             self._start(*e.prescribed.at_start(e.step))
         elif self._restored is not None:
             self._settle(self._restored)
         self._restored = None
 
     def advance(self, h: float, count: int) -> None:
-        """Take steps; `kratos_lite.integrate` does.
-
-        Parameters
-        ----------
-        h : step in s.
-        count : their number.
-
-        Raises
-        ------
-        ModelError
-            The model has changed.
-        """
-        self._check_unchanged()
+        """Take steps of h s; `kratos_lite.integrate` does."""
+        self.check_unchanged()
         e, part = self.equations, h / self.parts
         for _ in range(count):
             now, before = (self.u, self.v, self.a), e.history
@@ -214,13 +184,6 @@ class TransientAnalysis:
             self.time += h  # one after the other, so that a restart comes to the same times
             self.step += 1
 
-    def _check_unchanged(self) -> None:
-        """Raise ModelError if the model has changed."""
-        if self._version != _version(self.equations.model):
-            raise ModelError(
-                "the model has changed since this transient was made; make a new one and restore the state"
-            )
-
     def diverged(self) -> bool:
         """Return whether displacements are beyond the divergence limit, or NaN."""
         return not np.abs(self.u).max(initial=0.0) < self._limit
@@ -231,23 +194,15 @@ class TransientAnalysis:
         """Return the model as it is now."""
         residual, imbalance, _ = self._residual()
         values = {name: self._whole(getattr(self, name)).copy() for name in "uva"}
-        values["reactions"] = self.equations.model.supports.supported(self._whole(residual))
+        values["reactions"] = self.model.supports.supported(self._whole(residual))
         values["imbalance"] = np.array(imbalance)
         values |= self.equations.history_values()
         return State("model", str(self.integrator), self.time, self.step, values, self.parts)
 
     def restore(self, state: State) -> None:
-        """Go on from a state, of this model or of one that was loaded or held otherwise.
+        """Go on from a state; an acceleration that does not balance is found anew.
 
-        Parameters
-        ----------
-        state : of a model of the same mesh; an acceleration that does not balance is found anew.
-
-        Raises
-        ------
-        InputError
-            It is no state of a model, has another size, or does not lie where the supports hold the model at
-            its time.
+        InputError for one that does not lie where the supports hold the model at its time.
         """
         self.check_state(state)
         u, v, a = (self.equations.system.gather(getattr(state, name)).copy() for name in "uva")
@@ -257,22 +212,8 @@ class TransientAnalysis:
         e.history = e.history_of(state.values, u, time)
         self._restored = state
 
-    def check_state(self, state: object) -> State:
-        """Return a state that is one of a model of this mesh.
-
-        Parameters
-        ----------
-        state : to be checked.
-
-        Returns
-        -------
-        State
-
-        Raises
-        ------
-        InputError
-            It is another one, is not finite, or no state.
-        """
+    def check_state(self, state: State) -> State:
+        """Return a state that is one of a model of this mesh; InputError for any other."""
         shape = (self.equations.system.n_nodes, 3)
         history = {name: values.shape for name, values in self.equations.history_values().items()}
         fields = dict.fromkeys(MODEL_FIELDS[:4], shape)
@@ -297,20 +238,13 @@ class TransientAnalysis:
         return residual, float(np.abs(free).max(initial=0.0)), largest
 
     def result(self, state: State | None = None) -> Result:
-        """Return a state as a result with strains and stresses.
+        """Return a state of this model, or that of now, as a result with strains and stresses.
 
-        Parameters
-        ----------
-        state : of this model; that of now if not given.
-
-        Returns
-        -------
-        Result
-            With the loads of that time.  The backward error of its report is what M a + C v + K u - f leaves
-            on free nodes, relative; None for integrators that do not take the balance at the end of a step.
+        It has the loads of that time.  The backward error of its report is what M a + C v + K u - f leaves on
+        free nodes, relative; None for integrators that do not take the balance at the end of a step.
         """
         e, at, residual = self.equations, self.state() if state is None else self.check_state(state), None
-        model = e.model
+        model = self.model
         if self.integrator.balanced:
             _, free, largest = self._residual(at)
             residual = free / largest if largest else 0.0
@@ -331,7 +265,7 @@ class TransientAnalysis:
 
     def reactions(self) -> Array:
         """Return M a + C v + K u - f (n, 3) in N: forces of supports and constraints, 0 where none act."""
-        return self.equations.model.supports.supported(self._whole(self._residual()[0]))
+        return self.model.supports.supported(self._whole(self._residual()[0]))
 
     def energy(self, state: State | None = None) -> float:
         """Return ½ v·M v + ½ u·K u, K with what the motion adds: constant without loads and damping.

@@ -135,9 +135,9 @@ def test_a_change_of_the_model_before_or_during_a_run_is_refused(change):
     states = kl.integrate(transient, 1e-3, 5)
     next(states)
     change(subject)
-    with pytest.raises(ModelError, match="the model has changed since this transient was made"):
+    with pytest.raises(ModelError, match="the model has changed since this analysis was made"):
         next(states)
-    with pytest.raises(ModelError, match="the model has changed since this transient was made"):
+    with pytest.raises(ModelError, match="the model has changed since this analysis was made"):
         kl.integrate(transient, 1e-3, 2)
 
 
