@@ -95,36 +95,36 @@ def test_the_kit_names_the_mistake(change, check, says):
     assert says in found[check].detail
 
 
-@dataclass(frozen=True)
-class Timeless(kl.GeneralizedMaxwell3D):
-    def response(self, strain, state, dt):
-        return super().response(strain, state, 1.0)
+with MATERIALS.temporary():
 
+    @dataclass(frozen=True)
+    class Timeless(kl.GeneralizedMaxwell3D):
+        def response(self, strain, state, dt):
+            return super().response(strain, state, 1.0)
 
-@dataclass(frozen=True)
-class Perpetual(kl.Material):
-    """Stiff while it is pulled, soft while it goes back: it gives energy."""
+    @dataclass(frozen=True)
+    class Perpetual(kl.Material):
+        """Stiff while it is pulled, soft while it goes back: it gives energy."""
 
-    E: float
-    density: float = 0.0
-    internal_variables: ClassVar = {"last": 6}
-    symmetric_tangent: ClassVar[bool] = False
+        E: float
+        density: float = 0.0
+        internal_variables: ClassVar = {"last": 6}
+        symmetric_tangent: ClassVar[bool] = False
 
-    def response(self, strain, state, dt):
-        out = np.abs(strain) < np.abs(state["last"])
-        return self.E * strain * np.where(out, 2.0, 1.0), None, {"last": strain.copy()}
+        def response(self, strain, state, dt):
+            out = np.abs(strain) < np.abs(state["last"])
+            return self.E * strain * np.where(out, 2.0, 1.0), None, {"last": strain.copy()}
 
+    @dataclass(frozen=True)
+    class Grained(kl.NeoHookean3D):
+        aliases: ClassVar[tuple[str, ...]] = ()
 
-@dataclass(frozen=True)
-class Grained(kl.NeoHookean3D):
-    aliases: ClassVar[tuple[str, ...]] = ()
-
-    def response(self, strain, state, dt):
-        stress, D, new = super().response(strain, state, dt)
-        stress, D = stress.copy(), D.copy()
-        stress[..., 0] *= 1.001
-        D[..., 0, :] *= 1.001
-        return stress, D, new
+        def response(self, strain, state, dt):
+            stress, D, new = super().response(strain, state, dt)
+            stress, D = stress.copy(), D.copy()
+            stress[..., 0] *= 1.001
+            D[..., 0, :] *= 1.001
+            return stress, D, new
 
 
 @pytest.mark.parametrize(
