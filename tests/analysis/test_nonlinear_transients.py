@@ -54,7 +54,7 @@ def test_a_linear_law_moves_as_the_linear_model(integrator):
             model.constrain((last - 1, "x"), {(last, "y"): 0.5})
         model.add(kl.Traction("z+", (1e3, 0, 1e4)), amplitude=lambda t: 1 + t)
         transient = model.transient(integrator=integrator, rayleigh=(1.0, 1e-3))
-        state = after(transient, 2e-3, 40, substeps=4)
+        state = after(transient, 2e-3, 10, substeps=4)
         found.append([*(state.values[name] for name in ("u", "v", "a", "reactions")), transient.energy()])
     for one, other in zip(*found, strict=True):
         assert np.abs(one - other).max() < 1e-6 * np.abs(other).max() > 0
@@ -66,10 +66,10 @@ def test_order_and_energy_of_a_hyperelastic_body(integrator):
     model.fix("z-")
     z = model.mesh.points[:, 2:]
     shapes, energies = [], []
-    for count in (256, 64, 32):
+    for count in (64, 16, 8):
         transient = model.transient(velocity=np.hstack([3 * z * z, 0 * z, 8 * z]), integrator=integrator)
         start = transient.energy()
-        shapes.append(after(transient, 0.04 / count, count).u)
+        shapes.append(after(transient, 0.02 / count, count).u)
         energies.append(abs(transient.energy() / start - 1))
     fine, coarse = (np.abs(u - shapes[0]).max() for u in shapes[1:])
     assert coarse < 0.01 * np.abs(shapes[0]).max() > 1e-3
@@ -91,9 +91,9 @@ def test_one_element_of_rubber_swings_as_the_differential_equation_says(integrat
         return x[1], (3e5 - stress) / 500.0
 
     exact = solve_ivp(rate, (0, 0.1), (0, 0), rtol=1e-11, atol=1e-13).y[:, -1]
-    state = after(model.transient(integrator=integrator, lumped=True), 2e-4, 500)
-    assert abs(state.u[:, 2].max() - exact[0]) < 1e-4 * abs(exact[0])
-    assert abs(state.v[:, 2].min() - exact[1]) < 1e-3 * abs(exact[1])
+    state = after(model.transient(integrator=integrator, lumped=True), 1e-3, 100)
+    assert abs(state.u[:, 2].max() - exact[0]) < 5e-4 * abs(exact[0])
+    assert abs(state.v[:, 2].min() - exact[1]) < 5e-3 * abs(exact[1])
 
 
 @pytest.mark.parametrize("integrator", [kl.Newmark(), kl.CentralDifference()], ids=str)
@@ -107,7 +107,7 @@ def test_one_element_of_glue_dies_out_as_the_differential_equation_says(integrat
         return x[1], (1e4 - 5e5 * x[0] - x[2]) / 500.0, 5e5 * x[1] - x[2] / 0.02
 
     exact = solve_ivp(rate, (0, 0.1), (0, 0, 0), rtol=1e-11, atol=1e-13).y[:, -1]
-    state = after(model.transient(integrator=integrator, lumped=True), 2e-4, 500)
+    state = after(model.transient(integrator=integrator, lumped=True), 1e-3, 100)
     assert abs(state.u[:, 2].max() - exact[0]) < 5e-4 * abs(exact[0])
     assert abs(np.abs(state.v[:, 2]).max() - abs(exact[1])) < 5e-3 * abs(exact[1])
 
@@ -115,7 +115,7 @@ def test_one_element_of_glue_dies_out_as_the_differential_equation_says(integrat
 @pytest.mark.parametrize("integrator", [kl.CentralDifference(), kl.GeneralizedAlpha(0.5)], ids=str)
 def test_a_struck_bar_yields_behind_a_slower_wave(integrator):
     """An elastic wave of the yield stress, and a plastic one whose speed is that of the tangent modulus."""
-    E, rho, n = METAL.E, METAL.density, 160
+    E, rho, n = METAL.E, METAL.density, 100
     shear, bulk = E / 2, E / 3
     tangent = bulk + 4 / 3 * shear * H / (3 * shear + H)
     elastic, plastic = np.sqrt(E / rho), np.sqrt(tangent / rho)
@@ -148,9 +148,9 @@ def test_restart_goes_on_bit_by_bit(law, integrator):
     model.fix("z-", "xyz", lambda t: 0.02 * np.sin(1e3 * t))
     model.add(kl.Traction("z+", (3e5, 0, 1e6)))
     whole, again = (model.transient(integrator=integrator) for _ in range(2))
-    states = list(kl.integrate(whole, 5e-5, steps=40, every=10, substeps=2))
+    states = list(kl.integrate(whole, 1e-4, steps=12, every=3, substeps=2))
     states[1].restore(again)
-    last = after(again, 5e-5, 20, substeps=2)
+    last = after(again, 1e-4, 6, substeps=2)
     for name, value in last.values.items():
         assert (np.asarray(value) == np.asarray(states[-1].values[name])).all(), name
     assert np.abs(whole.equations.history.states[0].stress).max() > 0.1 * Y
@@ -169,11 +169,11 @@ def test_restart_goes_on_bit_by_bit(law, integrator):
 def test_a_block_comes_to_rest_where_statics_has_it(direct, monkeypatch):
     """Under a pressure that follows its faces."""
     monkeypatch.setattr("kratos_lite.solvers.plan.STEPPED_LIMIT", direct)
-    model = kl.Model(kl.box((1, 1, 2), (2, 2, 3), "Element3D8N"), RUBBER)
+    model = kl.Model(kl.box((1, 1, 2), (2, 2, 2), "Element3D8N"), RUBBER)
     model.fix("z-")
     model.add(kl.Pressure("x+", 6e4, follower=True))
     transient = model.transient(rayleigh=(15.0, 5e-3), integrator=kl.GeneralizedAlpha(0.2))
-    after(transient, 0.05, 100)
+    after(transient, 0.1, 40)
     result, static = transient.result(), model.solve()
     assert np.abs(static.u).max() > 1.0
     assert np.abs(result.u - static.u).max() < 1e-5
