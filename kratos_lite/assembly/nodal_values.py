@@ -10,11 +10,11 @@ from kratos_lite import voigt
 from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, as_double, compiled
 from kratos_lite.assembly.gauss_point_fields import at_gauss, displaced, value_at, volumes
 from kratos_lite.elements import KinematicLinear
-from kratos_lite.elements.tables import cofactors, determinant
 from kratos_lite.mesh.locate import Located
 from kratos_lite.quadrature import Rule
 from kratos_lite.registry import remembered
 from kratos_lite.shapes.base import at_points
+from kratos_lite.shapes.inverse import cofactors, determinant
 from kratos_lite.typing import Array, Ints
 
 

@@ -8,8 +8,9 @@ import numpy as np
 
 from kratos_lite.elements import arguments
 from kratos_lite.elements.kinematic_linear import KinematicLinear
-from kratos_lite.elements.tables import StrainTables, cofactors, determinant, strain_rows
+from kratos_lite.elements.tables import StrainTables, strain_rows
 from kratos_lite.quadrature import Rule
+from kratos_lite.shapes.inverse import cofactors, determinant
 from kratos_lite.typing import Array
 
 if TYPE_CHECKING:

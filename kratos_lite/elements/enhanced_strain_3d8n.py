@@ -8,11 +8,12 @@ import numpy as np
 
 from kratos_lite.elements import arguments
 from kratos_lite.elements.kinematic_linear import KinematicLinear
-from kratos_lite.elements.tables import StrainTables, cofactors, determinant, strain_rows
+from kratos_lite.elements.tables import StrainTables, strain_rows
 from kratos_lite.errors import InputError, MaterialError
 from kratos_lite.quadrature import Rule, hexahedron
 from kratos_lite.registry import remembered
 from kratos_lite.shapes.hexahedra import Hexahedron8
+from kratos_lite.shapes.inverse import cofactors, determinant
 from kratos_lite.typing import Array
 from kratos_lite.voigt import PAIRS
 

@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from kratos_lite.elements import arguments
-from kratos_lite.elements.tables import cofactors, determinant, tabulate
+from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import InputError, MeshError
 from kratos_lite.quadrature import Rule
 from kratos_lite.registry import remembered
 from kratos_lite.shapes import Shape
+from kratos_lite.shapes.inverse import cofactors, determinant
 from kratos_lite.tabular import Tabular
 from kratos_lite.typing import Array
 from kratos_lite.validation import short

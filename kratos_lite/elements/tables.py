@@ -23,9 +23,6 @@ class StrainTables(NamedTuple):
     fraction: float  # of the dilatation that is projected
 
 
-NEXT, AFTER = np.array([1, 2, 0]), np.array([2, 0, 1])
-
-
 @remembered
 def tabulate(shape: type[Shape], rule: Rule) -> tuple[Array, Array]:
     """Return N (g, n) and dN (g, n, 3) at the points of a rule.  Read-only, made once."""
@@ -56,22 +53,6 @@ def lumped(sums: Array, diagonal: Array, shape: type[Shape], rule: Rule) -> Arra
     if not has_positive_row_sums(shape, rule):
         return scaled
     return np.where((sums > 0).all(axis=-1, keepdims=True), sums, scaled)
-
-
-def _cross(b: Array, c: Array) -> Array:
-    """Return the vector product of (..., 3), for few vectors much faster than that of NumPy."""
-    return b[..., NEXT] * c[..., AFTER] - b[..., AFTER] * c[..., NEXT]
-
-
-def determinant(J: Array) -> Array:
-    """Return det of (..., 3, 3)."""
-    return (J[..., 0] * _cross(J[..., 1], J[..., 2])).sum(axis=-1)
-
-
-def cofactors(J: Array) -> Array:
-    """Return det(J) J^-1 of (..., 3, 3)."""
-    a, b, c = J[..., 0], J[..., 1], J[..., 2]
-    return np.stack([_cross(b, c), _cross(c, a), _cross(a, b)], axis=-2)
 
 
 def lame_constants(C: Array) -> tuple[float, float] | None:

@@ -23,9 +23,10 @@ from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import add_in_parts, assemble_stiffness
 from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear
-from kratos_lite.elements.tables import cofactors, tabulate
+from kratos_lite.elements.tables import tabulate
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.shapes import Shape
+from kratos_lite.shapes.inverse import cofactors
 from kratos_lite.solvers.coarse_level import sides_of
 from kratos_lite.typing import Array, Bsr, Csr, Ints, Progress
 

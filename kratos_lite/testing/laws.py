@@ -191,8 +191,8 @@ def dissipation(law: Material) -> Measured:
             work, gross = work + part, gross + np.abs(part)
             before, s_before = strain, stress
     gained = ((law.energy(before, s_before, state) - work) / gross).max(axis=-1)
-    where = (f"energy gained over closed paths up to {factor:g} times the elastic limit" for factor in factors)
-    return largest(dict(zip(where, gained.tolist(), strict=True)), 5e-3)
+    text = "energy gained over closed paths up to {:g} times the elastic limit"
+    return largest({text.format(f): float(g) for f, g in zip(factors, gained, strict=True)}, 5e-3)
 
 
 def isotropy(law: Material) -> Measured | str:

@@ -17,16 +17,18 @@ E, NU = 1.0, 0.3
 LAM, MU = fields.lame(E, NU)
 
 
+@cache
+def factor(power, order):
+    """Return a derivative of x (1-x) x^power, a polynomial."""
+    return np.polynomial.Polynomial([0] * (power + 1) + [1, -1]).deriv(order)
+
+
 def bump(X, orders=(0, 0, 0)):
-    """Return 64 x (1-x) y (1-y) z (1-z) (1 + 0.4 x - 0.3 y z²) or its derivatives, by NumPy's polynomials."""
-    P = np.polynomial.Polynomial
+    """Return 64 x (1-x) y (1-y) z (1-z) (1 + 0.4 x - 0.3 y z²) or its derivatives."""
     out = 0.0
-    for weight, powers in ((1.0, (0, 0, 0)), (0.4, (1, 0, 0)), (-0.3, (0, 1, 2))):
-        term = 64 * weight
-        for axis in range(3):
-            factor = P([0, 1]) * P([1, -1]) * P([0, 1]) ** powers[axis]
-            term = term * factor.deriv(orders[axis])(X[..., axis])
-        out = out + term
+    for weight, powers in ((64.0, (0, 0, 0)), (25.6, (1, 0, 0)), (-19.2, (0, 1, 2))):
+        x, y, z = (factor(*key)(X[..., axis]) for axis, key in enumerate(zip(powers, orders, strict=True)))
+        out = out + weight * x * y * z
     return out
 
 
@@ -197,7 +199,7 @@ def test_the_safe_figure_of_stresses_in_a_bent_bar_is_no_smaller_than_their_erro
     """Coarse bars, where recovered stresses at a point may be those of the elements by chance."""
     fine = fine_bar()
     result = bent_bar(kind, (8, 2, 2)).static().solve()
-    for point in np.random.default_rng(3).uniform((0.6, 0.05, 0.05), (3.4, 0.95, 0.95), (12, 3)):
+    for point in np.random.default_rng(3).uniform((0.6, 0.05, 0.05), (3.4, 0.95, 0.95), (4, 3)):
         exact = fine.at(point).stress
         for component, stress in zip(("xx", "yy", "zz", "xy", "yz", "zx"), exact, strict=True):
             error = result.error(of=kl.StressAt(point, component))
