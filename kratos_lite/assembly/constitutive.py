@@ -25,6 +25,7 @@ from kratos_lite.assembly.stiffness import assemble_stiffness
 from kratos_lite.elements import KinematicLinear, tables
 from kratos_lite.elements import total_lagrangian as lagrange
 from kratos_lite.errors import MaterialError, SolveError
+from kratos_lite.shapes.inverse import determinant
 from kratos_lite.typing import Array
 
 States: TypeAlias = "list[PointStates | None]"
@@ -242,7 +243,7 @@ class Window:
             for c in group.chunks():
                 element, q = group.at(self.points, c), self.u[group.nodes[c]]
                 F = np.eye(3) + lagrange.displacement_gradient(element, q)
-                found.append((lagrange.green_strain(element, q), tables.determinant(F)))
+                found.append((lagrange.green_strain(element, q), determinant(F)))
             strain, det = (np.concatenate(values) for values in zip(*found, strict=True))
         if not (det > 0).all():
             at, point = np.argwhere(~(det > 0))[0]

@@ -16,6 +16,7 @@ from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, as_doub
 from kratos_lite.elements import KinematicLinear, custom, tables
 from kratos_lite.elements import total_lagrangian as lagrange
 from kratos_lite.elements.tables import tabulate
+from kratos_lite.shapes.inverse import determinant
 from kratos_lite.typing import Array, Ints, Mask, Rows
 
 
@@ -225,7 +226,7 @@ def cauchy(points: Array, group: ElementGroup, u: Array, stress: Array) -> Array
     if not group.element.finite:
         return stress
     F = deformation_gradient(points, group, u)
-    J = tables.determinant(F)[..., None, None]
+    J = determinant(F)[..., None, None]
     return voigt.vector(F @ voigt.tensor(stress) @ np.swapaxes(F, -1, -2) / J)
 
 

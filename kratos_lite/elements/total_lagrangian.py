@@ -18,7 +18,8 @@ import numpy as np
 
 from kratos_lite import voigt
 from kratos_lite.elements.kinematic_linear import KinematicLinear
-from kratos_lite.elements.tables import cofactors, determinant, summed
+from kratos_lite.elements.tables import summed
+from kratos_lite.shapes.inverse import cofactors, determinant
 from kratos_lite.typing import Array
 
 
