@@ -18,7 +18,6 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.constitutive import States, named, unnamed
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.gauss_point_fields import totals
-from kratos_lite.errors import SolveError
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.newton import newton
 from kratos_lite.solvers.plan import stepped
@@ -115,13 +114,7 @@ class NonlinearMotion(EquationsOfMotion):
             return tangents.solve(K, changes, [r], jump, residuals, TOLERANCE)[0]
 
         rest, least = np.zeros(self.size), int(prescribed.any())
-        try:
-            return newton(rest, evaluate, correction, TOLERANCE, ITERATIONS, least)[0]
-        except SolveError as error:
-            raise SolveError(
-                f"the step from t = {before.time:g} s to {end:g} s has no solution: {error}; take smaller "
-                "steps"
-            ) from None
+        return newton(rest, evaluate, correction, TOLERANCE, ITERATIONS, least)[0]
 
     def commit(self, u: Array, time: float) -> None:
         """Let the states at displacements (3a,) be those from which the next step starts."""

@@ -23,11 +23,12 @@ from kratos_lite.analysis.nonlinear_motion import NonlinearMotion
 from kratos_lite.analysis.result import Result, result_of
 from kratos_lite.analysis.solution_checks import check_deformation
 from kratos_lite.analysis.state import MODEL_FIELDS, ModelInTime, State, check_state
-from kratos_lite.errors import InputError
+from kratos_lite.errors import InputError, SolveError
 from kratos_lite.model.loads.base import equal_loads
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.direct import one_thread
 from kratos_lite.solvers.linear_solver import Solution
+from kratos_lite.solvers.newton import SMALLEST_PART, in_parts
 from kratos_lite.solvers.plan import REPEATED_LIMIT
 from kratos_lite.typing import Array, ArrayLike, Progress
 from kratos_lite.validation import finite, flag, function_or_none
@@ -173,9 +174,7 @@ class TransientAnalysis(ModelInTime):
             try:
                 with one_thread(), np.errstate(over="ignore", invalid="ignore"):
                     for k in range(self.parts):
-                        start = self.time + k * part
-                        now = self.integrator.step(e, now, start, part)
-                        e.commit(now[0], start + part)
+                        now = self._step(now, self.time + k * part, part)
             except BaseException:
                 e.history = before  # the step is not taken
                 raise
@@ -183,6 +182,24 @@ class TransientAnalysis(ModelInTime):
             self.u, self.v, self.a = now
             self.time += h  # one after the other, so that a restart comes to the same times
             self.step += 1
+
+    def _step(self, now: tuple[Array, Array, Array], start: float, h: float) -> tuple[Array, Array, Array]:
+        """Return u, v, a after a step of h s, which is cut where laws do not converge."""
+
+        def advance(done: float, fraction: float) -> int:
+            nonlocal now
+            now = self.integrator.step(self.equations, now, start + done * h, (fraction - done) * h)
+            self.equations.commit(now[0], start + fraction * h)
+            return 0
+
+        if not self.model.is_nonlinear:
+            advance(0.0, 1.0)
+        elif error := in_parts(advance)[1]:
+            raise SolveError(
+                f"the step from t = {start:g} s to {start + h:g} s has no solution, cut to "
+                f"{SMALLEST_PART:.1e} of its length: {error}; take smaller steps"
+            )
+        return now
 
     def diverged(self) -> bool:
         """Return whether displacements are beyond the divergence limit, or NaN."""

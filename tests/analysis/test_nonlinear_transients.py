@@ -196,6 +196,18 @@ def test_a_step_without_a_solution_is_not_taken():
     after(transient, 1e-4, 1)
 
 
+def test_a_step_in_which_laws_do_not_converge_is_cut(caplog):
+    tops = []
+    for h in (0.02, 1e-3):
+        model = held(RUBBER, (1, 1, 2))
+        model.fix("z-")
+        model.add(kl.Traction("z+", (0, 0, -2e6)))
+        with caplog.at_level("INFO"):
+            tops.append(after(model.transient(), h, round(0.02 / h)).u[:, 2].min())
+        assert "is cut to 0.5" in caplog.text
+    assert abs(tops[0] - tops[1]) < 0.08 * abs(tops[1])  # -.684 and -.726 m
+
+
 def test_motions_of_the_material_take_linear_laws_alone():
     mesh = kl.annulus(0.3, 1.0, 0.1, cells=(1, 16, 1), element="Element3D8N")
     for law, name in ((RUBBER, "NeoHookean3D"), (METAL, "J2Plasticity3D")):
