@@ -12,6 +12,8 @@ from commands import run  # noqa: F401
 from malformed import write_malformed
 from scenes import SHARED
 
+from kratos_lite.view import canvas
+
 collect_ignore = ["interop/kratos_driver.py", "interop/kratos_parts_driver.py", "fixtures/bad"]
 """Scripts that tests run, and those that must fail."""
 
@@ -19,6 +21,8 @@ collect_ignore = ["interop/kratos_driver.py", "interop/kratos_parts_driver.py", 
 signal.signal(
     signal.SIGINT, signal.default_int_handler
 )  # a shell in the background ignores it, and so would children
+
+canvas.DPI = 40  # pictures of tests are small
 
 SOURCES = ["fixtures", "shared"] if (SHARED / "cases").is_dir() else ["fixtures"]
 
