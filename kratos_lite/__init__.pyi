@@ -106,6 +106,7 @@ from kratos_lite.materials.neo_hookean3d import NeoHookean3D as NeoHookean3D
 from kratos_lite.materials.ogden3d import Ogden3D as Ogden3D
 from kratos_lite.materials.orthotropic3d import Orthotropic3D as Orthotropic3D
 from kratos_lite.materials.saint_venant_kirchhoff3d import SaintVenantKirchhoff3D as SaintVenantKirchhoff3D
+from kratos_lite.materials.umat import UMAT as UMAT
 from kratos_lite.mesh import Block as Block
 from kratos_lite.mesh import Mesh as Mesh
 from kratos_lite.mesh import Part as Part

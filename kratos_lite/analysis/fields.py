@@ -187,13 +187,14 @@ def known(groups: Sequence[ElementGroup]) -> dict[str, Field]:
     if all(group.is_linear for group in groups):
         return FIELDS
     energy = replace(FIELDS["strain_energy_density"], where=EVERYWHERE, sampled=True)
-    laws = dict.fromkeys(type(group.material) for group in groups if group.states is not None)
+    laws = [group.material for group in groups if group.states is not None]
     sizes = [(law, name, size) for law in laws for name, size in law.internal_variables.items()]
     found = FIELDS | {"strain_energy_density": energy}
     for law, name, size in sizes:
         field = variable(name, size)
         known_as = found.get(name, field)
-        key = name if (known_as.name, known_as.kind) == (field.name, field.kind) else f"{law.__name__}_{name}"
+        alike = (known_as.name, known_as.kind) == (field.name, field.kind)
+        key = name if alike else f"{type(law).__name__}_{name}"
         found[key] = field
     return found
 
