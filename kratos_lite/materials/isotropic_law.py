@@ -37,6 +37,8 @@ class VonMises(IsotropicLaw, family=True):
     Source: Simo & Hughes, Computational Inelasticity (1998), section 3.3.
     """
 
+    keeps_volume: ClassVar[bool] = True
+
     def trial(
         self, strain: Array, state: GaussState, center: Array | float = 0.0
     ) -> tuple[Array, Array, Array]:

@@ -48,6 +48,7 @@ class Material:
     internal_variables : name → numbers at each Gauss point, 0 at the beginning; ``element_length``
         and ``element_radius`` are cube root of the volume and farthest node from the center, in m.
     symmetric_tangent : whether the tangent is symmetric.
+    keeps_volume : whether the stress is bounded but for its mean, as in plastic flow of metals.
     rate_dependent : whether the stress depends on the length of a step.
 
     Raises
@@ -84,6 +85,7 @@ class Material:
     not_negative: ClassVar[Mapping[str, str]] = {}
     internal_variables: ClassVar[Mapping[str, int]] = {}
     symmetric_tangent: ClassVar[bool] = True
+    keeps_volume: ClassVar[bool] = False
     rate_dependent: ClassVar[bool] = False
     is_linear: ClassVar[bool] = False
 

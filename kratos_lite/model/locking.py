@@ -26,7 +26,7 @@ QUADRATIC = {"tetrahedron": "3D10N", "wedge": "3D15N", "pyramid": "3D13N", "hexa
 
 def check_locking(mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
     """Return a warning for each element class that will lock, with the better choice."""
-    warnings = [*_near_half(groups), *_with_apex(groups)]
+    warnings = [*_in_constant_volume(groups), *_with_apex(groups)]
     for element in dict.fromkeys(group.element for group in groups if _shears(group.element)):
         warnings += _in_bending(mesh, element, [group for group in groups if group.element is element])
     return warnings
@@ -35,18 +35,31 @@ def check_locking(mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
 # ---- by element and material ---------------------------------------------------------------------------
 
 
-def _near_half(groups: Sequence[ElementGroup]) -> list[str]:
-    """Warn of plain elements with ν near ½; ten-node tetrahedra have sound displacements."""
-    replacements: dict[str, str] = {}
-    for element, C in ((group.element, group.material.C) for group in groups):
-        large = element.formulation == "total_lagrangian" and len(element.nodes) == element.shape.corners
-        plain = not element.custom and (large or element.formulation == "standard")
-        if plain and element.__name__ != "KinematicLinear3D10N" and bulk_over_shear(C) > NEAR_HALF:
-            replacements[element.__name__] = better_element(element, "BBar")
-    if not replacements:
-        return []
-    names, better = ", ".join(sorted(replacements)), ", ".join(sorted(set(replacements.values())))
-    return [f"Poisson's ratio lies so near 0.5 that {names} may lock (come out far too stiff); take {better}"]
+def _in_constant_volume(groups: Sequence[ElementGroup]) -> list[str]:
+    """Warn of plain elements with ν near ½, and of linear ones whose plastic flow keeps the volume.
+
+    Ten-node tetrahedra have sound displacements.
+    """
+    replacements: dict[str, dict[str, str]] = {}
+    for element, law in ((group.element, group.material) for group in groups):
+        linear = len(element.nodes) == element.shape.corners
+        plain = element.formulation == "standard" or (element.formulation == "total_lagrangian" and linear)
+        if element.custom or not plain or element.__name__ == "KinematicLinear3D10N":
+            continue
+        if bulk_over_shear(law.C) > NEAR_HALF:
+            why, better = "Poisson's ratio lies so near 0.5", better_element(element, "BBar")
+        elif law.keeps_volume and linear:
+            why = f"{type(law).__name__} flows without change of volume"
+            flowing = formulations_of(element.shape).get("b_bar")
+            better = flowing.__name__ if flowing else better_element(element)
+        else:
+            continue
+        replacements.setdefault(why, {})[element.__name__] = better
+    return [
+        f"{why}: {', '.join(sorted(names))} may lock (come out far too stiff); take "
+        f"{', '.join(sorted(set(names.values())))}"
+        for why, names in replacements.items()
+    ]
 
 
 def _with_apex(groups: Sequence[ElementGroup]) -> list[str]:
