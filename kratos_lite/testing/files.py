@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import is_dataclass
 from inspect import get_annotations
-from math import inf, nan
+from math import inf
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -84,10 +84,12 @@ def _check_all(defined: dict[str, Any], kinds: list[type]) -> list[tuple[str, li
     results += [(k.__name__, check_shape(k)) for k in kinds if issubclass(k, Shape) and k not in used]
     results += [(f"{name} ({type(v).__name__})", check_material(v)) for name, v in materials.items()]
     for kind in kinds:
-        if issubclass(kind, Material) and kind not in made:
+        if not issubclass(kind, Material) or _lacks_decorator(kind):
+            continue
+        if not any(issubclass(each, kind) for each in made):
             text = "a material is checked as an instance: make one at the top level of the file, for example "
             text += f"soil = {kind.__name__}(…) with its constants"
-            results.append((kind.__name__, [Finding("instance", False, nan, nan, text, skipped=True)]))
+            results.append((kind.__name__, [Finding("instance", False, inf, 0, text)]))
     return results
 
 
