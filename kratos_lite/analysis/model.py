@@ -124,7 +124,7 @@ class Model(Structure):
                 if backend == "petsc" or petsc is not None:
                     self.require_linear("backend='petsc'")
                 check_arguments(solver, tolerance)
-                return solve_nonlinear(self, tolerance, shown)
+                return solve_nonlinear(self, solver, tolerance, shown)
             analysis = StaticAnalysis(self, solver, tolerance, shown, backend=backend, petsc=petsc)
             try:
                 return analysis.solve()

@@ -55,6 +55,7 @@ class QuasiStaticAnalysis(ModelInTime):
     arc_length : whether steps after the first, which is one of the load, have its length along the path of
         equilibrium, through limit points: the time is the load factor then, and may fall.  Loads are
         proportional to the time, ``amplitude=lambda t: t``, or constant.
+    solver : of the corrections, as for `Model.solve`; with the arc length always ``"direct"``.
     progress : called with the phase and the fraction done, 0 … 1.
 
     Attributes
@@ -92,6 +93,7 @@ class QuasiStaticAnalysis(ModelInTime):
         iterations: int = 25,
         line_search: bool = False,
         arc_length: bool = False,
+        solver: str = "auto",
         progress: Progress | None = None,
     ) -> None:
         self.tolerance = number(tolerance, "the tolerance", least=1e-14)
@@ -108,7 +110,7 @@ class QuasiStaticAnalysis(ModelInTime):
         self.applied = AppliedLoads(model, self.system, self.groups, initial=False)
         self.prescribed = PrescribedMotion(supports, self.system)
         self.law = law_of(model, self.system)
-        plan = stepped(len(self.system.constraint_map.free))
+        plan = stepped(len(self.system.constraint_map.free), solver)
         if arc_length:
             plan = Plan("direct", "tangents beyond a limit point are not positive definite")
         self.tangents = Tangents(self.system, plan, self.law.symmetric and not arc_length, self._at_rest)
@@ -375,9 +377,9 @@ def law_of(model: Structure, system: ConstrainedSystem) -> Constitutive:
     return Constitutive(system.points, system.groups, system.pattern, place, gathered)
 
 
-def solve_nonlinear(model: Structure, tolerance: float, progress: Progress | None) -> Result:
+def solve_nonlinear(model: Structure, solver: str, tolerance: float, progress: Progress | None) -> Result:
     """Return the result of one step from the undeformed body to the loads of the time 1 s."""
-    analysis = QuasiStaticAnalysis(model, tolerance=max(tolerance, 1e-8), progress=progress)
+    analysis = QuasiStaticAnalysis(model, tolerance=max(tolerance, 1e-8), solver=solver, progress=progress)
     analysis.prepare(1.0, 1)
     analysis.advance(1.0, 1)
     return analysis.result()

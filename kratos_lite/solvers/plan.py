@@ -166,8 +166,10 @@ def repeated(solver: str, unknowns: int, symmetric: bool) -> Plan:
     return Plan("amg", f"{unknowns} unknowns > {REPEATED_LIMIT}: multigrid takes least memory")
 
 
-def stepped(unknowns: int) -> Plan:
+def stepped(unknowns: int, solver: str = "auto") -> Plan:
     """Return how to solve the equations of a step in time, whose matrix serves many times."""
+    if choice(solver, "solver", METHODS) != "auto":
+        return Plan("amg" if solver == "amg" else "direct", REQUESTED)
     if unknowns <= STEPPED_LIMIT:
         return Plan("direct", f"{unknowns} unknowns ≤ {STEPPED_LIMIT}: factors are fastest over many steps")
     return Plan("amg", f"{unknowns} unknowns > {STEPPED_LIMIT}: few iterations from the last state")
