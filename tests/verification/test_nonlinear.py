@@ -174,6 +174,24 @@ def test_cook_s_membrane_approaches_its_finest_mesh(law):
     assert errors[1] < 0.6 * errors[0]
 
 
+@pytest.mark.parametrize("n", [5, 10, 20])
+def test_a_bar_that_cracks_does_not_depend_on_the_mesh(n):
+    """Linear softening of one element: σ = (2 G/f - u) / (2 G/f² - L/E), whatever its length."""
+    E, f, energy, length = 30e9, 3e6, 400.0, 1.0
+    mesh = kl.box((length, length / n, length / n), (n, 1, 1))
+    model = kl.Model(mesh, kl.IsotropicDamage3D(E, 0.0, 1.5 * f, energy, linear=1))
+    model.assign(kl.IsotropicDamage3D(E, 0.0, f, energy, linear=1), [n // 2])
+    for side in "xyz":
+        model.fix(f"{side}-", side)
+    model.fix("x+", "x", lambda t: t)
+    for state in kl.integrate(model.quasi_static(), dt=2e-5, steps=12):
+        u, stress = state.time, state.reactions[mesh.nodes("x+"), 0].sum() / (length / n) ** 2
+        exact = (
+            E * u / length if u < f * length / E else (2 * energy / f - u) / (2 * energy / f**2 - length / E)
+        )
+        assert abs(stress - exact) < 1e-8 * f
+
+
 def test_f_bar_does_not_lock_at_large_strains():
     """Cook's membrane of rubber, ν = 0.4999: series of 20N, 27N and F-bar approach 1.50 (27N, 24: 1.484)."""
     tips = {}
