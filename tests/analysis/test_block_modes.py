@@ -51,7 +51,7 @@ def random_model(seed):
     return model, bool(rng.integers(2))
 
 
-@pytest.mark.parametrize("seeds", np.split(np.arange(100), 10))
+@pytest.mark.parametrize("seeds", np.split(np.arange(50), 5))
 def test_random_models_have_the_modes_of_lapack(seeds, monkeypatch):
     for seed in seeds:
         model, lumped = random_model(seed)
@@ -66,7 +66,7 @@ def test_random_models_have_the_modes_of_lapack(seeds, monkeypatch):
         np.testing.assert_allclose(squares, exact, rtol=4e-8, atol=roundoff, err_msg=f"seed {seed}")
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(7))
 def test_modes_near_a_frequency_are_those_of_lapack(seed, monkeypatch):
     """At a mode, between two, and below all of them: the same distances, to the rounding of the stiffness."""
     model, lumped = random_model(seed)
@@ -212,21 +212,21 @@ def struck(element, cells, **options):
 
 @pytest.mark.parametrize(
     ("element", "cells"),
-    [("8N", (9, 9, 18)), ("10N", (5, 5, 9)), ("27N", (4, 5, 9))],
+    [("8N", (4, 4, 8)), ("10N", (2, 2, 4)), ("27N", (2, 2, 3))],
 )
-def test_energy_is_kept_by_iterations(element, cells):
+def test_energy_is_kept_by_iterations(element, cells, monkeypatch):
+    monkeypatch.setattr("kratos_lite.solvers.plan.STEPPED_LIMIT", 0)
     transient, period = struck(f"KinematicLinear3D{element}", cells)
-    assert transient.u.size > 4_000
     energy = transient.energy()
-    *_, end = kl.integrate(transient, period / 20, 60, every=60)
+    *_, end = kl.integrate(transient, period / 20, 30, every=30)
     assert abs(transient.energy(end) / energy - 1) < 1e-9
 
 
 def test_iterations_and_factors_come_to_the_same(monkeypatch):
     ends = []
-    for limit in (4_000, 40_000):
+    for limit in (0, 40_000):
         monkeypatch.setattr("kratos_lite.solvers.plan.STEPPED_LIMIT", limit)
-        transient, period = struck("KinematicLinear3D20N", (4, 4, 8), rayleigh=(3.0, 1e-6))
+        transient, period = struck("KinematicLinear3D20N", (2, 2, 4), rayleigh=(3.0, 1e-6))
         *_, end = kl.integrate(transient, period / 20, 20, every=20)
         ends.append(end.u)
     assert np.abs(ends[0] - ends[1]).max() < 1e-8 * np.abs(ends[1]).max()

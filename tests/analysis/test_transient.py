@@ -60,7 +60,7 @@ def test_order_two(name):
     model, integrator = bar(), INTEGRATORS[name]
     omega, mode = wave(4, lumped=name == "central"), shape(bar())
     errors = []
-    for steps in (64, 128, 256):
+    for steps in (32, 64, 128):
         transient = model.transient(integrator=integrator, displacement=mode, velocity=0.5 * omega * mode)
         end = last(transient, 1.3 / omega / steps * 4, steps)
         t = omega * end.time
@@ -69,7 +69,7 @@ def test_order_two(name):
         errors.append(np.hypot(np.abs(end.u - u).max(), np.abs(end.v - v).max() / omega))
     rates = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
     assert (np.abs(rates - 2) < 0.15).all()
-    assert errors[-1] < 2e-3
+    assert errors[-1] < 8e-3
 
 
 @pytest.mark.parametrize(
@@ -133,7 +133,7 @@ def test_critical_step():
         kl.integrate(transient, 2 / omega * 1.3, 10)
     v = np.random.default_rng(0).standard_normal(model.mesh.points.shape)
     safe = model.transient(integrator=CentralDifference(), velocity=v)
-    assert np.abs(last(safe, 0.5 / omega, 2000).u).max() < 1.0
+    assert np.abs(last(safe, 0.5 / omega, 400).u).max() < 1.0
 
 
 # ---- energy and damping --------------------------------------------------------------------------------
@@ -145,7 +145,7 @@ def test_energy_of_the_trapezoidal_rule():
     x, y, z = model.mesh.points.T
     transient = model.transient(velocity=np.column_stack([z * z, x * z, y * z]))
     start = transient.energy()
-    energies = [transient.energy() for _ in kl.integrate(transient, 2.0**-9, 1000, every=100)]
+    energies = [transient.energy() for _ in kl.integrate(transient, 2.0**-9, 300, every=50)]
     assert np.abs(np.array(energies) / start - 1).max() < 1e-12
 
 
@@ -161,7 +161,7 @@ def test_rayleigh_damping(alpha, beta, name):
         integrator=INTEGRATORS[name], displacement=mode, velocity=-xi * omega * mode, rayleigh=(alpha, beta)
     )
     period = 2 * np.pi / damped
-    n = 400 if name == "trapezoidal" else 2000
+    n = 200 if name == "trapezoidal" else 1000
     end = last(transient, 2 * period / n, n)
     exact = np.exp(-xi * omega * 2 * period)
     np.testing.assert_allclose(
@@ -182,9 +182,9 @@ def pulled(factor) -> kl.Model:
 def test_load_at_once():
     """A load put on at rest swings about the static answer: u = (F / k)(1 - cos ωt) of one cell."""
     model, omega = pulled(None), wave(1, lumped=False)
-    for state in kl.integrate(model.transient(), 0.01 / omega, 600, every=60):
+    for state in kl.integrate(model.transient(), 0.02 / omega, 300, every=60):
         exact = 1e3 / E * (1 - np.cos(omega * state.time))
-        assert state.u[:, 2].max() == pytest.approx(exact, abs=2e-7)
+        assert state.u[:, 2].max() == pytest.approx(exact, abs=1e-6)
 
 
 def test_harmonic_load():
@@ -192,10 +192,10 @@ def test_harmonic_load():
     omega = wave(1, lumped=False)
     drive = 0.6 * omega
     model = pulled(lambda t: np.sin(drive * t))
-    end = last(model.transient(), 0.005 / omega, 1500)
+    end = last(model.transient(), 0.02 / omega, 375)
     t = end.time
     exact = 1e3 / E / (1 - 0.36) * (np.sin(drive * t) - 0.6 * np.sin(omega * t))
-    assert end.u[model.mesh.nodes("z+"), 2] == pytest.approx(exact, abs=3e-8)
+    assert end.u[model.mesh.nodes("z+"), 2] == pytest.approx(exact, abs=5e-7)
 
 
 def test_ramp_by_a_table():
@@ -203,8 +203,8 @@ def test_ramp_by_a_table():
     omega = wave(1, lumped=False)
     T = 10 / omega
     model = pulled(TimeSeries([0.0, T], [0.0, 1.0]))
-    end = last(model.transient(), T / 1000, 1000)
-    assert end.u[:, 2].max() == pytest.approx(1e-3 * (1 - np.sin(10.0) / 10), abs=1e-7)
+    end = last(model.transient(), T / 200, 200)
+    assert end.u[:, 2].max() == pytest.approx(1e-3 * (1 - np.sin(10.0) / 10), abs=2e-6)
     shifted = pulled(TimeSeries([0.0, T], [0.25, 1.0]))
     assert shifted.solve().u[:, 2].max() == pytest.approx(0.25e-3, rel=1e-12)
 
@@ -218,13 +218,13 @@ def test_support_that_moves(name):
     model = kl.Model(kl.box((1, 1, LENGTH)), kl.Isotropic3D(E=E, nu=0.0, density=RHO))
     model.fix(lambda X: np.ones(len(X), dtype=bool), "xy")
     model.fix("z-", "z", lambda t: amplitude * np.sin(drive * t))
-    h = 0.004 / omega
-    end = last(model.transient(integrator=INTEGRATORS[name]), h, 2000)
+    h = 0.016 / omega
+    end = last(model.transient(integrator=INTEGRATORS[name]), h, 250)
     t, m = end.time, RHO / (2 if lumped else 3)
     push = E + (0 if lumped else RHO / 6 * drive**2)
     A = amplitude * push / (E - m * drive**2)
     exact = A * (np.sin(drive * t) - drive / omega * np.sin(omega * t))
-    assert end.u[:, 2].max() == pytest.approx(max(exact, amplitude * np.sin(drive * t)), abs=2e-7)
+    assert end.u[:, 2].max() == pytest.approx(max(exact, amplitude * np.sin(drive * t)), abs=3e-6)
     bottom = model.mesh.nodes("z-")
     np.testing.assert_allclose(end.u[bottom, 2], amplitude * np.sin(drive * t), atol=1e-15)
     velocity = amplitude * drive * np.cos(drive * t)
@@ -283,15 +283,15 @@ def test_restart_is_the_same_bit_by_bit(name, tmp_path):
         model.fix("z-", "z", lambda t: 1e-4 * np.sin(30 * t), override=True)
         return model.transient(integrator=INTEGRATORS[name], rayleigh=(1.0, 1e-4))
 
-    whole = last(made(), 1e-3, 60)
-    first = last(made(), 1e-3, 25)
+    whole = last(made(), 1e-3, 12)
+    first = last(made(), 1e-3, 5)
     kl.write(tmp_path / "state.npz", first)
     again = made()
     kl.read_state(tmp_path / "state.npz").restore(again)
-    second = last(again, 1e-3, 35)
+    second = last(again, 1e-3, 7)
     for field in ("u", "v", "a", "reactions", "imbalance"):
         assert (getattr(second, field) == getattr(whole, field)).all()
-    assert (second.time, second.step) == (whole.time, 60)
+    assert (second.time, second.step) == (whole.time, 12)
 
 
 @pytest.mark.parametrize("name", ["newmark", "central_difference"])
@@ -319,7 +319,7 @@ def test_lumped_mass_is_another_frequency():
     mode = shape(bar())
     for lumped in (False, True):
         omega = wave(4, lumped)
-        end = last(bar().transient(displacement=mode, lumped=lumped), 2 * np.pi / omega / 1000, 1000)
+        end = last(bar().transient(displacement=mode, lumped=lumped), 2 * np.pi / omega / 200, 200)
         np.testing.assert_allclose(end.u, mode, atol=1e-4)
 
 
