@@ -81,7 +81,7 @@ with ELEMENTS.temporary():
 BBARS = [BbarOfOne, BbarOfMany, BbarSystem, BbarSystems]
 
 
-def cantilever(name, cells=(4, 2, 2), nu=0.4, shift=0.1):
+def cantilever(name, cells=(3, 2, 1), nu=0.4, shift=0.1):
     """Return a clamped beam under its weight, with corners moved."""
     mesh = kl.box((4, 1, 1), cells, name)
     points = mesh.points + shift * np.sin(7 * mesh.points[:, [1, 2, 0]]) * (mesh.points[:, :1] > 0)
@@ -111,8 +111,9 @@ def solved(K, model, loads):
 # ---- static ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("kind", BBARS)
-@pytest.mark.parametrize("solver", ["dense", "direct", "amg"])
+@pytest.mark.parametrize(
+    ("solver", "kind"), [*(("dense", kind) for kind in BBARS), ("direct", BbarOfMany), ("amg", BbarSystems)]
+)
 def test_a_model_of_a_custom_element_is_solved_with_it(kind, solver):
     model = cantilever(kind.__name__)
     result = model.solve(solver=solver)
