@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from computing import compiled, same_on_all_threads
 from meshes import joined
-from rounding import close, round_off
+from rounding import close, factorized
 from systems import stiffness_of, system_of
 
 import kratos_lite as kl
@@ -185,11 +185,6 @@ MODELS = {
     "nearly incompressible": lambda: clamped(box(), kl.Isotropic3D(E=2e11, nu=0.49, density=7850.0)),
     "wood": lambda: clamped(box(), WOOD),
 }
-
-
-def factorized(model):
-    """Return the displacements of a factorization, and their round-off."""
-    return model.solve("direct").u, round_off(model)
 
 
 @cache
