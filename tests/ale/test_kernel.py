@@ -1,10 +1,10 @@
-"""M, G and H: compiled as in NumPy for every element, whatever the threads and the instruction set."""
+"""M, G and H: compiled as in NumPy for every element, whatever the threads."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from computing import compiled, each_instruction_set, printed, same_on_all_threads
+from computing import compiled, same_on_all_threads
 from rounding import all_close, close
 
 import kratos_lite as kl
@@ -62,23 +62,6 @@ def test_only_what_is_asked_for_is_made_and_nothing_else_changes(names):
     assert "".join(some) == names
     for name in names:
         np.testing.assert_array_equal(some[name], every[name])
-
-
-@compiled
-@each_instruction_set
-def test_every_instruction_set_gives_the_same_to_rounding(isa, tmp_path):
-    kinds = (4, 8, 13, 27)
-    code = (
-        "import numpy as np\nfrom tests.ale.test_kernel import *\n"
-        f"made = {{f'{{kind}}{{name}}': data for kind in {kinds}\n"
-        "        for name, data in inertia_matrices(*parts(kind), 'MGH', VELOCITY).items()}\n"
-        f"np.savez({str(tmp_path / 'made.npz')!r}, **made)"
-    )
-    printed(code, KRATOS_LITE_ISA=isa)
-    with np.load(tmp_path / "made.npz") as made:
-        for kind in kinds:
-            here = inertia_matrices(*parts(kind), "MGH", VELOCITY)
-            all_close({name: made[f"{kind}{name}"] for name in "MGH"}, here, 1e-13)
 
 
 def test_velocity_is_linear_in_its_numbers():

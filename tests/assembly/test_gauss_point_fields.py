@@ -1,11 +1,8 @@
 """Fields at Gauss points: the compiled way and the element's own methods give the same."""
 
-import json
-from functools import cache
-
 import numpy as np
 import pytest
-from computing import compiled, printed, same_on_all_threads
+from computing import compiled, same_on_all_threads
 from meshes import changed_at, joined, with_block
 from rounding import all_close, close
 from systems import stiffness_of
@@ -92,32 +89,6 @@ def test_results_do_not_depend_on_the_number_of_threads(name, cells):
     mesh = distorted(name, (cells, cells, cells))
     assert mesh.n_elements > 16384 or cells < 14  # more than are added together
     same_on_all_threads(lambda: of_mesh(mesh))
-
-
-SCRIPT = """
-import json, numpy as np, kratos_lite as kl
-mesh = kl.box(cells=(3, 3, 3), element="KinematicLinear3D10N")
-mesh = mesh.replace(points=mesh.points + 0.02 * np.sin(9 * mesh.points[:, [1, 2, 0]]))
-model = kl.Model(mesh, kl.Isotropic3D(1e9, 0.3, 2000.0))
-model.fix("z-")
-model.add(kl.Gravity((1.0, 2.0, -9.81)))
-result = model.solve()
-print(json.dumps([*result.totals(), *result.stress("node").sum(axis=0), *result.stress("element")[5]]))
-"""
-
-
-@cache
-def solved_by_a_process(variable=""):
-    return np.array(json.loads(printed(SCRIPT, **dict([variable.split("=")] if variable else []))))
-
-
-@compiled
-@pytest.mark.parametrize(
-    "variable", ["KRATOS_LITE_ISA=base", "KRATOS_LITE_ISA=avx2", "KRATOS_LITE_KERNELS=numpy"]
-)
-def test_other_instruction_sets_and_numpy_give_the_same_solution(variable):
-    best, other = solved_by_a_process(), solved_by_a_process(variable)
-    np.testing.assert_allclose(other, best, rtol=1e-9, atol=1e-9 * np.abs(best).max())
 
 
 # ---- elements that do not lock ------------------------------------------------------------------------

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from computing import EITHER, compiled, each_instruction_set, printed, same, same_on_all_threads
+from computing import EITHER, compiled, same, same_on_all_threads
 from own_elements import tetrahedron_of_seven_nodes
 from rounding import close
 from systems import pattern_of, stiffness_of
@@ -90,7 +90,7 @@ def test_nodes_that_are_not_there_are_refused(wrong):
 @pytest.mark.parametrize("distortion", [0.0, 0.02], ids=["straight", "distorted"])
 @pytest.mark.parametrize("name", NAMES)
 def test_stiffness_is_the_sum_of_the_elements(path, name, distortion, material):
-    assert_sum(*scene(name, (3, 3, 1), distortion, material))
+    assert_sum(*scene(name, (2, 2, 1), distortion, material))
 
 
 @pytest.mark.parametrize("count", [1, 7, 8, 9, 17])
@@ -135,20 +135,6 @@ def test_stiffness_does_not_depend_on_the_number_of_threads(name, cells, order):
         group.nodes = group.nodes[np.random.default_rng(6).permutation(len(group))]
     pattern = pattern_of(points, [group])
     same_on_all_threads(lambda: assemble_stiffness(points, [group], pattern).data)
-
-
-@compiled
-@each_instruction_set
-def test_every_instruction_set_gives_the_same_to_rounding(isa):
-    code = (
-        "from tests.assembly import test_stiffness as t\n"
-        "for name in t.NAMES:\n"
-        "    for material in (t.STEEL, t.CRYSTAL):\n"
-        "        t.assert_sum(*t.scene(name, (3, 1, 1), 0.0, material))\n"
-        "        t.assert_sum(*t.scene(name, (3, 1, 1), 0.02, material))\n"
-        "print(t.MODULE.isa())"
-    )
-    assert printed(code, KRATOS_LITE_ISA=isa).split()[0] in ("baseline", "AVX2", "AVX-512")
 
 
 @compiled
