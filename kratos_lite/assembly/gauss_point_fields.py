@@ -78,7 +78,7 @@ def body_force_by_function(
     for part in by_mass_rule(points, group, factors):
         N, _ = tabulate(part.element.shape, part.rule)
         for chunk in part.chunks():
-            nodes, dV = part.nodes[chunk], part.at(points, chunk).dV
+            nodes, dV = part.nodes[chunk], part.at(points, chunk)._volumes(part.rule)
             X = N @ points[nodes]
             add_nodal(total, nodes, N.T @ (b(X.reshape(-1, 3)).reshape(X.shape) * dV[..., None]))
     return total

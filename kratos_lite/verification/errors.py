@@ -18,6 +18,8 @@ DEGREE, FINE_DEGREE = 8, 5
 """Of the rule for the integrals of the error; the lower one for linear elements on fine meshes."""
 FINE = 20_000
 """Elements from which a mesh of linear elements counts as fine: their error is quadratic in each then."""
+FINE_OF_SMOOTH = 500
+"""The same where the exact field has no peaks."""
 CHUNK = 64
 """Elements at a time: their B at all points, 35 MB of 27-node ones, stays near the processor."""
 
@@ -36,21 +38,23 @@ def errors(scene: Scene, u: Array) -> dict[str, float]:
 
 
 def norms(
-    field: fields.Field, points: Array, groups: Sequence[ElementGroup], u: Array
+    field: fields.Field, points: Array, groups: Sequence[ElementGroup], u: Array, fine: int = FINE
 ) -> tuple[float, float]:
     """Return the relative errors of nodal displacements u (n, 3): L2 norm, and energy norm."""
     integrals = np.zeros(4)
     for group in groups:
         for start in range(0, len(group), CHUNK):
-            integrals += _integrals(points, field, group, slice(start, start + CHUNK), u)
+            integrals += _integrals(points, field, group, slice(start, start + CHUNK), u, fine)
     return float(np.sqrt(integrals[0] / integrals[1])), float(np.sqrt(integrals[2] / integrals[3]))
 
 
-def _integrals(points: Array, field: fields.Field, group: ElementGroup, chunk: slice, u: Array) -> Array:
+def _integrals(
+    points: Array, field: fields.Field, group: ElementGroup, chunk: slice, u: Array, fine: int
+) -> Array:
     """Return ∫ |u_h - u|², ∫ |u|², ∫ e:C:e of the error and of the exact strain, over some elements."""
     shape, nodes = group.element.shape, group.nodes[chunk]
-    fine = len(group) >= FINE and len(shape.nodes) == shape.corners
-    rule = rule_for(shape.cell, FINE_DEGREE if fine else DEGREE)
+    is_fine = len(group) >= fine and len(shape.nodes) == shape.corners
+    rule = rule_for(shape.cell, FINE_DEGREE if is_fine else DEGREE)
     N, _ = tabulate(shape, rule)
     placed = group.element(points[nodes], rule)
     X, dV = N @ points[nodes], placed.dV

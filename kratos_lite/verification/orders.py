@@ -10,7 +10,7 @@ import numpy as np
 from kratos_lite.analysis.model import Model
 from kratos_lite.analysis.result import Result
 from kratos_lite.verification import fields, scenes
-from kratos_lite.verification.errors import norms
+from kratos_lite.verification.errors import FINE, FINE_OF_SMOOTH, norms
 from kratos_lite.verification.meshes import is_quadratic, kind_of
 from kratos_lite.verification.problem import Models, Of, Problem
 
@@ -27,7 +27,8 @@ def error_of(field: fields.Field, norm: int = DISPLACEMENT) -> Callable[[Result]
 @lru_cache(maxsize=2)
 def _norms(field: fields.Field, result: Result) -> tuple[float, float]:
     """Return both norms: rows of the two share them."""
-    return norms(field, result.mesh.points, result.groups, result.u)
+    fine = FINE_OF_SMOOTH if field is fields.manufactured else FINE
+    return norms(field, result.mesh.points, result.groups, result.u, fine)
 
 
 def order_of(field: fields.Field, norm: int) -> Callable[[Result, Result], float]:
