@@ -48,8 +48,6 @@ def run(case: Case, progress: Progress | None = None) -> Outcome:
     steps, parts = analysis.step - start.step, len(analysis.reports)
     rows = [
         ("time", f"{start.time:.6g} … {analysis.time:.6g} s, {steps} steps in {parts} parts"),
-        ("iterations", f"{sum(report.iterations for report in analysis.reports)} of Newton's method"),
-        ("work", f"{analysis.work:.6e} J of loads and supports"),
         ("time per step", f"{seconds / max(steps, 1):.3g} s, {seconds:.3g} s in all"),
     ]
     return Outcome(case, [*rows, *result.table()], result)
