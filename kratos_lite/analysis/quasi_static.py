@@ -120,7 +120,8 @@ class QuasiStaticAnalysis(ModelInTime):
         self.u = np.zeros(3 * len(self.system.nodes))
         self.states = self.law.start()
         self.increment, self.speed = np.zeros_like(self.u), 0.0
-        self.load = np.zeros_like(self.u)
+        self.load, self.rate, self.curvature = (np.zeros_like(self.u) for _ in range(3))
+        self.last = 0.0  # s, duration of the last part
         self.internal = self._forces(self.u)
         self.reports: list[StepReport] = []
         if arc_length:
@@ -229,6 +230,11 @@ class QuasiStaticAnalysis(ModelInTime):
     def _commit(self, u: Array, known: Response, report: StepReport) -> int:
         """Keep what has converged; return the iterations."""
         internal, force, _, _, states = known
+        h, old = report.time - self.time, self.rate
+        if not self.arc_length:
+            self.rate = (u - self.u) / h
+            self.curvature = (self.rate - old) / (h + self.last) if self.last else 0.0 * old
+            self.last = h
         self.work += float((internal + self.internal) @ (u - self.u)) / 2
         self.u, self.states, self.load, self.internal, self.time = u, states, force, internal, report.time
         self.reports.append(report)
@@ -249,9 +255,24 @@ class QuasiStaticAnalysis(ModelInTime):
     def _newton(
         self, load: Callable[[Array], Load], field: Array, dt: float
     ) -> tuple[Array, Response, list[float]]:
-        """Return displacements, what the law says there, and residuals under a load and a field."""
+        """Return displacements, what the law says there, and residuals under a load and a field.
+
+        The iteration begins on the parabola through the last three states, or else at the last one.
+        """
+        guess = self.u + dt * (self.rate + (dt + self.last) * self.curvature)
+        jump, closer = (field - self.prescribed.part(u) for u in (self.u, guess))
+        if np.abs(closer).max(initial=0.0) <= 0.5 * np.abs(jump).max(initial=0.0) and self.last:
+            try:
+                return self._newton_from(guess, closer, load, dt)
+            except SolveError:
+                pass  # the load does not go on as it did
+        return self._newton_from(self.u, jump, load, dt)
+
+    def _newton_from(
+        self, start: Array, jump: Array, load: Callable[[Array], Load], dt: float
+    ) -> tuple[Array, Response, list[float]]:
+        """Return the same from a start, with a jump of what is prescribed."""
         reduce = self.system.constraint_map.reduce
-        jump = field - self.prescribed.part(self.u)
 
         def evaluate(u: Array) -> tuple[float, Response]:
             return self._balance(u, load(u), dt)
@@ -264,7 +285,7 @@ class QuasiStaticAnalysis(ModelInTime):
             exact = moved.any() or not self.line_search
             return du if exact else self._shortened(u, du, reduce(r), load, dt)
 
-        return newton(self.u, evaluate, correction, self.tolerance, self.iterations, int(jump.any()))
+        return newton(start, evaluate, correction, self.tolerance, self.iterations, int(jump.any()))
 
     def _at_rest(self) -> LinearSolver:
         """Return what solves the body at rest."""
@@ -298,6 +319,7 @@ class QuasiStaticAnalysis(ModelInTime):
         """Return the model as it is now."""
         values = {"u": self._whole(self.u).copy(), "reactions": self._reactions(), "load": self.load.copy()}
         values |= {"internal": self.internal.copy(), "work": np.array(self.work)}
+        values |= {"rate": self.rate.copy(), "curvature": self.curvature.copy(), "last": np.array(self.last)}
         if self.arc_length:
             values |= {"increment": self.increment.copy(), "speed": np.array(self.speed)}
         values |= named(self.states)
@@ -325,6 +347,7 @@ class QuasiStaticAnalysis(ModelInTime):
         get = self.check_state(state).values
         self.u = self.system.gather(get["u"]).copy()
         self.load, self.internal, self.work = get["load"].copy(), get["internal"].copy(), float(get["work"])
+        self.rate, self.curvature, self.last = get["rate"].copy(), get["curvature"].copy(), float(get["last"])
         if self.arc_length:
             self.increment, self.speed = get["increment"].copy(), float(get["speed"])
         self.states = unnamed(get, self.states)

@@ -6,6 +6,7 @@ and half the memory, and else from SuperLU, which comes with SciPy.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from functools import cache
@@ -259,10 +260,8 @@ def reserve_buffers(of_scipy: bool = False) -> None:
 
 
 @cache
-def _controller() -> Any:
-    """Return what limits threads, or None where it is not installed."""
-    import scipy.linalg.lapack  # noqa: F401 (a library that is loaded later would not heed the limit)
-
+def _controller(of_scipy: bool) -> Any:
+    """Return what limits the threads of NumPy, and SciPy if it is loaded; None where it is not installed."""
     try:
         from threadpoolctl import ThreadpoolController
     except ImportError:
@@ -275,7 +274,7 @@ def one_thread() -> AbstractContextManager[Any]:
 
     Threads that wait for the next small product take time from others, and their sums may differ each time.
     """
-    controller = _controller()
+    controller = _controller("scipy.linalg" in sys.modules)  # libraries that come later do not heed it
     if controller is None:
         return nullcontext()
     return cast("AbstractContextManager[Any]", controller.limit(limits=1, user_api="blas"))
