@@ -7,11 +7,11 @@ from meshes import elsewhere
 import kratos_lite as kl
 from kratos_lite.ale import Rotation, Translation
 from kratos_lite.bodies.rotations import exp
-from kratos_lite.elements.exact_rules import AFFINE, exact_rule
 from kratos_lite.elements.surface import area_vectors
 from kratos_lite.quadrature import rule_for
 
-KINDS = list(kl.ELEMENTS)
+KINDS = [f"KinematicLinear3D{n}N" for n in (4, 5, 6, 8, 10, 13, 15, 20, 27)]
+"""One of each shape: other formulations have the same mass and transport."""
 UNIT = kl.Isotropic3D(E=1.0, nu=0.3, density=1.0)
 
 
@@ -174,26 +174,6 @@ def test_symmetric_part_is_the_flux_through_the_boundary(kind, motion, wheels):
     m = wheels.matrices(motion, model)
     np.testing.assert_allclose(m.G + m.G.T, boundary_flux(model, motion), atol=1e-13 * scaled(m.G))
     np.testing.assert_allclose(m.S, (m.G - m.G.T) / 2, atol=1e-16)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("motion", MOTIONS.values(), ids=MOTIONS)
-def test_the_rule_is_exact_on_affine_cells(kind, motion):
-    """(c·grad N_i)(c·grad N_j) by the rule in use and by a much finer one."""
-    element = kl.ELEMENTS[kind]
-    shape = element.shape
-    X = shape.nodes @ np.array([[1.0, 0.2, 0.1], [0.0, 0.9, -0.3], [0.1, 0.0, 1.1]]) + (0.5, -1.0, 2.0)
-
-    def matrices_by(rule) -> tuple[np.ndarray, np.ndarray]:
-        cell = element(X, rule)
-        dV, D = cell._gauss
-        N = np.array([shape.N(xi) for xi in rule.points])
-        along = (motion.field(cell.gauss_points())[:, None, :] @ D)[:, 0]
-        return (N.T * dV) @ along, (along.T * dV) @ along
-
-    used, fine = matrices_by(exact_rule(shape, 2, AFFINE, flow=True)), matrices_by(rule_for(shape.cell, 10))
-    for a, b in zip(used, fine, strict=True):
-        assert scaled(a - b) <= 2e-13 * scaled(b)
 
 
 @pytest.mark.parametrize("kind", ["KinematicLinear3D8N", "KinematicLinear3D10N"])

@@ -134,14 +134,14 @@ def test_the_link_of_a_pendulum_pulls_with_three_weights_at_the_lowest_point():
 
 @each_body
 def test_a_fixed_direction_leaves_the_others_free(kind, integrator):
-    body = cube(kind, integrator)
+    body = cube(kind, integrator, E=1e5)
     corners = body.mesh.points
     feet = corners[corners[:, 2] < 0]
     rail = kl.FixDirection(feet, (0, 0, 2.0))
     body.constrain(rail)
     body.add(kl.Gravity((2.0, 0, -G)))
     body.set_velocity((1, -1, 0))
-    end(body, 1e-3, 100)
+    end(body, 4e-3, 25)
     np.testing.assert_allclose(body.position(feet)[:, 2], feet[:, 2], atol=1e-13)
     assert body.mass_center()[0] == pytest.approx(0.1 + 0.01, rel=1e-10)
     assert body.mass_center()[1] == pytest.approx(-0.1, rel=1e-10)
@@ -174,12 +174,12 @@ def test_reactions_are_those_of_statics(kind):
 
 @each_body
 def test_a_prescribed_displacement_is_met_at_every_step(kind, integrator):
-    body = cube(kind, integrator)
+    body = cube(kind, integrator, E=1e5)
     corners = body.mesh.points
     path = kl.TimeSeries([0, 0.02, 0.05], [0.0, 0.004, 0.001])
     body.constrain(kl.PrescribedDisplacement(corners[[0, 1, 2, 3]], (0, 0, 1), path))
     body.constrain(kl.PrescribedDisplacement(corners[[0, 1, 2, 3]], (1, 0, 0), lambda t: t * t))
-    for state in kl.integrate(body, 1e-3, 60):
+    for state in kl.integrate(body, 3e-3, 20):
         moved = body.position(corners[:4]) - corners[:4]
         np.testing.assert_allclose(moved[:, 2], path(state.time), atol=1e-13)
         np.testing.assert_allclose(moved[:, 0], state.time**2, atol=1e-13)
@@ -211,11 +211,11 @@ PRESCRIBED = {
 def test_prescribed_velocities_and_accelerations_are_met_at_every_step(
     kind, integrator, make, nodes, way, given, expected, start
 ):
-    body = cube(kind, integrator)
+    body = cube(kind, integrator, E=1e5)
     body.set_velocity((start, 0, 0))
     points, unit = body.mesh.points[nodes], np.array(way) / np.linalg.norm(way)
     body.constrain(make(points, way, given))
-    for state in kl.integrate(body, 1e-3, 60):
+    for state in kl.integrate(body, 3e-3, 20):
         np.testing.assert_allclose(body.velocity(points) @ unit, expected(state.time), rtol=1e-11, atol=1e-12)
 
 
@@ -254,10 +254,10 @@ def test_work_of_reactions_counts():
 
 @each_body
 def test_a_spring_swings_with_its_frequency(kind, integrator):
-    body = cube(kind, integrator, E=2e6)
+    body = cube(kind, integrator, E=5e5)
     k = 8.0 * (2 * np.pi) ** 2  # 1 Hz
     body.add(kl.Spring((0, 0, 0), (0, 0, 1), k, length=0.9))
-    h = 1e-2 if integrator != "DEF_EXP" else 1e-3
+    h = 2e-2 if integrator != "DEF_EXP" else 2e-3
     count = round(1 / h)
     start = float(body.energy())
     end(body, h, count // 2)
