@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pages import run_scripts
+from pages import DOCS, run_scripts, text_of
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 README = (EXAMPLES.parent / "README.md").read_text()
@@ -63,7 +63,6 @@ def python_blocks(text):
     return re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
 
 
-DOCS = EXAMPLES.parent / "docs"
 PAGES = sorted(
     str(page.relative_to(DOCS))
     for folder in (DOCS, DOCS / "howto", DOCS / "reference", DOCS / "topics")
@@ -78,7 +77,7 @@ def test_pages_with_python_are_found():
 
 def test_python_of_the_readme_and_of_each_page_runs(tmp_path):
     readme = {f"README {number}": block for number, block in enumerate(python_blocks(README))}
-    pages = {page: "\n".join(python_blocks((DOCS / page).read_text())) for page in PAGES}
+    pages = {page: "\n".join(python_blocks(text_of(page))) for page in PAGES}
     del pages["howto/moving-material.md"]  # runs before its commands
     printed = run_scripts(tmp_path, readme | pages)
     (sunk,) = (printed[name] for name, block in readme.items() if "0.1322" in block)
@@ -88,7 +87,7 @@ def test_python_of_the_readme_and_of_each_page_runs(tmp_path):
 @pytest.mark.parametrize("page", ["moving-material.md", "run-bodies.md", "models-in-time.md", "modes.md"])
 def test_command_lines_of_each_page_run(page, script, command, tmp_path):
     pytest.importorskip("matplotlib")
-    text = (DOCS / "howto" / page).read_text().replace("\\\n", "")
+    text = text_of(f"howto/{page}").replace("\\\n", "")
     lines = re.findall(r"^kratos-lite ([^#\n]*)", text, re.M)
     assert lines
     (tmp_path / "examples").symlink_to(EXAMPLES)

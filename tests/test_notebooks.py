@@ -2,19 +2,17 @@
 
 import re
 from itertools import pairwise
-from pathlib import Path
 
 import pytest
-from pages import run_scripts
+from pages import DOCS, run_scripts, text_of
 
-DOCS = Path(__file__).resolve().parents[1] / "docs"
 SOLUTIONS = DOCS / "exercises" / "solutions"
 NOTEBOOKS = sorted([*(DOCS / "tutorials").glob("[0-9]*.md"), *SOLUTIONS.glob("*.md")])
 
 
 def cells(page):
     """Return the code of a notebook, cell by cell."""
-    return re.findall(r"(?ms)^```\{code-cell\}[^\n]*\n(.*?)^```$", page.read_text())
+    return re.findall(r"(?ms)^```\{code-cell\}[^\n]*\n(.*?)^```$", text_of(page.relative_to(DOCS).as_posix()))
 
 
 @pytest.mark.parametrize("folder", [DOCS / "tutorials", SOLUTIONS], ids=lambda folder: folder.name)
