@@ -13,11 +13,11 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion, Solve
-from kratos_lite.analysis.quasi_static import law_of
+from kratos_lite.analysis.quasi_static import assembly_of
 from kratos_lite.assembly.block_matrix import BlockMatrix
-from kratos_lite.assembly.constitutive import States, named, unnamed
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.gauss_point_fields import totals
+from kratos_lite.assembly.nonlinear_assembly import States, named, unnamed
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.newton import newton
 from kratos_lite.solvers.plan import stepped
@@ -52,16 +52,16 @@ class NonlinearMotion(EquationsOfMotion):
 
     def __init__(self, model: Structure, **options: Any) -> None:
         super().__init__(model, **options)
-        self.law = law_of(model, self.system)
+        self.assembly = assembly_of(model, self.system)
         self._found: History | None = None  # of the last evaluation
         rest = np.zeros(self.size)
-        self.history = History(0.0, rest, rest, self.law.start())
+        self.history = History(0.0, rest, rest, self.assembly.start())
 
     def _evaluate(
         self, u: Array, time: float, tangent: bool = False
     ) -> tuple[History, BlockMatrix | None, Changes]:
         h, before = time - self.history.time, self.history.states
-        forces, K, states = self.law.evaluate(u, before, h, tangent=tangent)
+        forces, K, states = self.assembly.evaluate(u, before, h, tangent=tangent)
         more, changes = self.applied.following(time, u)
         self._found = History(time, u, forces - more, states)
         return self._found, K, changes
@@ -80,7 +80,7 @@ class NonlinearMotion(EquationsOfMotion):
         tangents = Tangents(
             self.system,
             plan,
-            self.law.symmetric,
+            self.assembly.symmetric,
             lambda: made(time, m, c, k, h).args[0],  # type: ignore[attr-defined]
         )
         return partial(self._newton, tangents, self.matrix(time, m, c, 0.0), k, self.history.time + h)
@@ -126,7 +126,7 @@ class NonlinearMotion(EquationsOfMotion):
     def stored_energy(self, u: Array, time: float) -> float:
         """Return the energy in J that the laws store."""
         groups = self._with_states(self.system.groups)
-        return totals(self.system.points, groups, self.law.strained(u))[0]
+        return totals(self.system.points, groups, self.assembly.strained(u))[0]
 
     def load_of_result(self, u: Array, time: float) -> Array:
         """Return the nodal forces (3a,) at a time, those among them that follow the faces."""

@@ -15,7 +15,7 @@ from kratos_lite.analysis.report import Report, StepReport
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.state import ModelInTime, State, check_state
 from kratos_lite.assembly.block_matrix import BlockMatrix
-from kratos_lite.assembly.constitutive import Constitutive, States, named, unnamed
+from kratos_lite.assembly.nonlinear_assembly import NonlinearAssembly, States, named, unnamed
 from kratos_lite.assembly.stiffness import assemble_stiffness
 from kratos_lite.errors import InputError, ModelError, SolveError
 from kratos_lite.mesh.mesh import place_of
@@ -109,16 +109,16 @@ class QuasiStaticAnalysis(ModelInTime):
         )
         self.applied = AppliedLoads(model, self.system, self.groups, initial=False)
         self.prescribed = PrescribedMotion(supports, self.system)
-        self.law = law_of(model, self.system)
+        self.assembly = assembly_of(model, self.system)
         plan = stepped(len(self.system.constraint_map.free), solver)
         if arc_length:
             plan = Plan("direct", "tangents beyond a limit point are not positive definite")
-        self.tangents = Tangents(self.system, plan, self.law.symmetric and not arc_length, self._at_rest)
+        self.tangents = Tangents(self.system, plan, self.assembly.symmetric and not arc_length, self._at_rest)
         self.arc_length = arc_length
         super().__init__(model)
         self.work = 0.0
         self.u = np.zeros(3 * len(self.system.nodes))
-        self.states = self.law.start()
+        self.states = self.assembly.start()
         self.increment, self.speed = np.zeros_like(self.u), 0.0
         self.load, self.rate, self.curvature = (np.zeros_like(self.u) for _ in range(3))
         self.last = 0.0  # s, duration of the last part
@@ -129,7 +129,7 @@ class QuasiStaticAnalysis(ModelInTime):
 
     def _forces(self, u: Array) -> Array:
         """Return the internal forces (3a,) of the committed states at displacements (3a,)."""
-        return self.law.evaluate(u, self.states, 0.0, tangent=False)[0]
+        return self.assembly.evaluate(u, self.states, 0.0, tangent=False)[0]
 
     def _check_factor(self) -> None:
         """Refuse loads that are no constant ones and a factor times others, and supports that move."""
@@ -242,7 +242,7 @@ class QuasiStaticAnalysis(ModelInTime):
 
     def _balance(self, u: Array, load: Load, dt: float) -> tuple[float, Response]:
         """Return the relative residual at displacements (3a,), and what is known there."""
-        (internal, K, states), (force, tangent) = self.law.evaluate(u, self.states, dt), load
+        (internal, K, states), (force, tangent) = self.assembly.evaluate(u, self.states, dt), load
         assert K is not None
         scale = max(float(np.linalg.norm(v)) for v in (force, internal, self.load, self.internal))
         residual = float(np.linalg.norm(self.system.constraint_map.reduce(force - internal)))
@@ -302,7 +302,7 @@ class QuasiStaticAnalysis(ModelInTime):
         q, s = du[constraints.free], 1.0
         before = float(q @ r)
         for _ in range(SEARCHES):
-            forces = self.law.evaluate(u + s * du, self.states, dt, tangent=False)[0]
+            forces = self.assembly.evaluate(u + s * du, self.states, dt, tangent=False)[0]
             after = float(q @ constraints.reduce(load(u + s * du)[0] - forces))
             if after * before >= 0 or abs(after) <= SLACK * abs(before):
                 break
@@ -392,12 +392,12 @@ class QuasiStaticAnalysis(ModelInTime):
         return Result(model.mesh, groups, self._whole(self.u).copy(), reactions, loads, report, u0)
 
 
-def law_of(model: Structure, system: ConstrainedSystem) -> Constitutive:
+def assembly_of(model: Structure, system: ConstrainedSystem) -> NonlinearAssembly:
     """Return the laws of a model in its equations."""
     u0 = model.initial_displacement
     gathered = None if u0 is None else system.gather(u0)
     place = partial(place_of, model.mesh)
-    return Constitutive(system.points, system.groups, system.pattern, place, gathered)
+    return NonlinearAssembly(system.points, system.groups, system.pattern, place, gathered)
 
 
 def solve_nonlinear(model: Structure, solver: str, tolerance: float, progress: Progress | None) -> Result:

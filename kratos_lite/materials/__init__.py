@@ -5,7 +5,7 @@ The file ``isotropic3d.py`` holds the class ``Isotropic3D``.
 
 import os
 
-from kratos_lite.materials.base import LinearMaterial
+from kratos_lite.materials.linear_material import LinearMaterial
 from kratos_lite.materials.material import MATERIALS, Material
 
 __all__ = ["MATERIALS", "LinearMaterial", "Material"]

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from kratos_lite.materials.base import LinearMaterial
+from kratos_lite.materials.linear_material import LinearMaterial
 from kratos_lite.typing import Array
 
 

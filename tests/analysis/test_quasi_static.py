@@ -198,7 +198,7 @@ def test_an_element_turned_inside_out_is_named(law):
     u = np.zeros_like(model.mesh.points)
     u[:, 2] = -1.25 * model.mesh.points[:, 2]
     with pytest.raises(SolveError, match=r"element 1 \(.*\), Gauss point 1: .* inside out"):
-        model.quasi_static().law.evaluate(u.ravel(), model.quasi_static().states, 1.0)
+        model.quasi_static().assembly.evaluate(u.ravel(), model.quasi_static().states, 1.0)
 
 
 def test_what_comes_back_to_rest_converges():

@@ -17,7 +17,7 @@ F = np.array([[1.2, 0.3, -0.1], [0.1, 0.9, 0.2], [-0.2, 0.1, 1.1]])
 
 def law(model):
     """Return what evaluates a model, and a random large deformation (3n,)."""
-    found = model.quasi_static().law
+    found = model.quasi_static().assembly
     u = found.points @ (F - np.eye(3)).T + 0.02 * np.random.default_rng(3).normal(size=found.points.shape)
     return found, u.ravel()
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.analysis.quasi_static import law_of
+from kratos_lite.analysis.quasi_static import assembly_of
 from kratos_lite.errors import SolveError
 from kratos_lite.verification import scenes
 from kratos_lite.verification.meshes import nearest, on_boundary, warped
@@ -46,7 +46,7 @@ def test_a_turned_element_has_no_stress_and_six_rigid_modes(element):
     mesh = kl.Mesh(whole.mesh.points[rows], {group.element.__name__: np.arange(len(rows))[None]})
     model = kl.Model(mesh, kl.NeoHookean3D(1.0, 0.3))
     model.fix(np.arange(3), "xyz")
-    law = law_of(model, model.quasi_static().system)
+    law = assembly_of(model, model.quasi_static().system)
     turn = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
     turn *= np.linalg.det(turn)
     forces, K, states = law.evaluate((mesh.points @ (turn - np.eye(3))).ravel(), law.start(), 1.0)

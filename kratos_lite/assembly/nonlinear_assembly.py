@@ -38,7 +38,7 @@ MODES_MAX, MODES_CONVERGED = 30, 1e-10
 """Iterations for the amplitudes of enhanced strains, and the fraction of the forces that they may miss."""
 
 
-class Constitutive:
+class NonlinearAssembly:
     """Internal forces, tangent and states of all elements of a model, stress-free at a displacement u0."""
 
     def __init__(
@@ -81,16 +81,18 @@ class Constitutive:
         data = K.data.copy() if tangent else None
         if any(map(len, self._lagrange)):
             for place in np.flatnonzero([len(group) for group in self._lagrange]):
-                Window(self, int(place), slice(None), u, None).strain()  # which looks for inverted elements
+                ElementRange(
+                    self, int(place), slice(None), u, None
+                ).strain()  # which looks for inverted elements
             forces += finite_strain.internal_load(self.points, self._lagrange, u)
             if data is not None:
                 data += finite_strain.stiffness(self.points, self._lagrange, self.pattern, u).data
         new: States = []
         for number, (group, state) in enumerate(zip(self.groups, states, strict=True)):
             parts = []
-            for window in group.chunks(WINDOW_BYTES) if state is not None else ():
-                part = Window(self, number, window, u, data)
-                before = state.take(window)  # type: ignore[union-attr]
+            for elements in group.chunks(WINDOW_BYTES) if state is not None else ():
+                part = ElementRange(self, number, elements, u, data)
+                before = state.take(elements)  # type: ignore[union-attr]
                 add = part.add if before.modes is None else part.add_enhanced
                 parts.append(add(forces, before, dt))
             new.append(_joined(parts) if parts else None)
@@ -132,17 +134,19 @@ def dilatation(points: Array, group: ElementGroup) -> Array | None:
     return np.concatenate(parts)
 
 
-class Window:
+class ElementRange:
     """Some elements of a group at displacements u (n, 3), whose forces and stiffness are added to totals."""
 
-    def __init__(self, law: Constitutive, number: int, window: slice, u: Array, data: Array | None) -> None:
-        chosen = np.zeros(len(law.groups[number]), dtype=bool)
-        chosen[window] = True
-        self.group, self.u, self.points = law.groups[number].take(chosen), as_double(u), law.points
-        self.pattern, self.number, self.window, self.data = law.pattern, number, window, data
-        self.place = law.place
-        extra = law._dilatations[number]
-        self.dilatation = None if extra is None else np.ascontiguousarray(extra[window])
+    def __init__(
+        self, assembly: NonlinearAssembly, number: int, elements: slice, u: Array, data: Array | None
+    ) -> None:
+        chosen = np.zeros(len(assembly.groups[number]), dtype=bool)
+        chosen[elements] = True
+        self.group, self.u, self.points = assembly.groups[number].take(chosen), as_double(u), assembly.points
+        self.pattern, self.number, self.elements, self.data = assembly.pattern, number, elements, data
+        self.place = assembly.place
+        extra = assembly._dilatations[number]
+        self.dilatation = None if extra is None else np.ascontiguousarray(extra[elements])
         self.f_bar = self.group.element.formulation == "f_bar"
         self.kernels = None if self.f_bar else compiled("constitutive", self.group.element)
 
@@ -186,7 +190,7 @@ class Window:
     def _scatter(self, chunk: slice, K: Array) -> None:
         """Add the matrices (m, 3, k, 3, k) of some elements."""
         assert self.data is not None
-        first = self.window.start
+        first = self.elements.start
         place = slice(first + chunk.start, first + chunk.stop)
         self.pattern.add(self.data, self.number, place, K.transpose(0, 2, 4, 1, 3))
 
