@@ -19,8 +19,7 @@ def one(kind: str) -> kl.Model:
     """Return one element on the unit cube or the unit simplex, with density 1."""
     shape = kl.ELEMENTS[kind].shape
     X = (shape.nodes + 1) / 2 if shape.cell == "hexahedron" else shape.nodes
-    block = kl.Block(kind, np.arange(len(X))[None], np.array([1]), np.array([1]), shape)
-    return kl.Model(kl.Mesh(X, [block]), UNIT)
+    return kl.Model(kl.Mesh(X, {kind: [range(len(X))]}), UNIT)
 
 
 def distorted(kind: str) -> kl.Model:

@@ -9,6 +9,7 @@ from functools import cache
 import motions
 import numpy as np
 import pytest
+from meshes import four_cells
 from motions import end
 
 import kratos_lite as kl
@@ -24,37 +25,8 @@ ALL = [f"KinematicLinear3D{n}N" for n in (4, 5, 6, 8, 10, 13, 15, 20, 27)]
 
 
 def one_element(name, X, E=1.0, **options):
-    kind = ELEMENTS[name]
-    nodes = np.arange(len(X), dtype=np.int32)[None]
-    block = kl.Block(name, nodes, np.array([1]), np.array([1]), kind.shape)
     material = kl.Isotropic3D(E=E, nu=0.3, density=1.0)
-    return kl.FiniteElementBody(kl.Mesh(np.array(X, dtype=float), [block]), material, **options)
-
-
-def mixed(**options):
-    """Return a body of a hexahedron, a pyramid, a wedge and a tetrahedron that share faces."""
-    cube = ELEMENTS["KinematicLinear3D8N"].nodes
-    points = np.vstack([cube, [[0.1, -0.1, 2.5], [3.0, -1.0, -1.0], [3.0, -1.0, 1.0]]])
-    points = np.vstack([points, [2.0, 0.3, 2.5]])
-    cells = {
-        "KinematicLinear3D8N": [0, 1, 2, 3, 4, 5, 6, 7],
-        "KinematicLinear3D5N": [4, 5, 6, 7, 8],
-        "KinematicLinear3D6N": [1, 9, 2, 5, 10, 6],
-        "KinematicLinear3D4N": [5, 10, 6, 11],
-    }
-    blocks = [
-        kl.Block(
-            name,
-            np.array([nodes], dtype=np.int32),
-            np.array([number]),
-            np.array([1]),
-            ELEMENTS[name].shape,
-        )
-        for number, (name, nodes) in enumerate(cells.items(), 1)
-    ]
-    return kl.FiniteElementBody(
-        kl.Mesh(points, blocks), kl.Isotropic3D(E=1e5, nu=0.3, density=100.0), **options
-    )
+    return kl.FiniteElementBody(kl.Mesh(X, {name: [range(len(X))]}), material, **options)
 
 
 # ---- free flight with spin -------------------------------------------------------------------------
@@ -203,7 +175,8 @@ def test_every_element_spins_freely(name, integrator, brick, drift):
 @pytest.mark.parametrize("lumped", [False, True])
 @each_integrator
 def test_a_mesh_of_four_kinds_of_elements_spins_freely(integrator, lumped, drift):
-    body = mixed(integrator=integrator, lumped=lumped)
+    soft = kl.Isotropic3D(E=1e5, nu=0.3, density=100.0)
+    body = kl.FiniteElementBody(four_cells(), soft, integrator=integrator, lumped=lumped)
     body.set_velocity(FLIGHT, (0.5, 3.0, -1.0))
     L, p, start = body.angular_momentum(), body.linear_momentum(), total(body)
     if not lumped:

@@ -303,10 +303,9 @@ def unstructured(aspect):
     nodes[volume < 0] = nodes[volume < 0][:, [1, 0, 2, 3]]
     nodes = nodes[np.abs(volume) > 1e-5]
     used, nodes = np.unique(nodes, return_inverse=True)
-    nodes = nodes.reshape(-1, 4).astype(np.int32)
-    shape, n = kl.KinematicLinear3D4N.shape, len(nodes)
-    block = kl.Block("KinematicLinear3D4N", nodes, np.arange(1, n + 1), np.ones(n, int), shape)
-    model = kl.Model(kl.Mesh(points[used] * [1, 1, 1 / aspect], [block]), kl.Isotropic3D(E=1e9, nu=0.3))
+    nodes = nodes.reshape(-1, 4)
+    mesh = kl.Mesh(points[used] * [1, 1, 1 / aspect], {"KinematicLinear3D4N": nodes})
+    model = kl.Model(mesh, kl.Isotropic3D(E=1e9, nu=0.3))
     model.fix(np.flatnonzero(points[used, 2] < 0.1))
     return model
 

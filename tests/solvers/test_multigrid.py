@@ -48,17 +48,9 @@ def clamped(mesh, material=STEEL, held=lambda p: p[:, 0] <= p[:, 0].min()):
     return model
 
 
-def mesh_of(points, *cells):
-    """Return a mesh of (kind, nodes) pairs."""
-    blocks, first = [], 1
-    for kind, nodes in cells:
-        name = f"KinematicLinear3D{kind}"
-        ids = np.arange(first, first + len(nodes))
-        blocks.append(
-            kl.Block(name, np.asarray(nodes, np.int32), ids, np.zeros_like(ids), kl.ELEMENTS[name].shape)
-        )
-        first += len(nodes)
-    return kl.Mesh(points, blocks)
+def mesh_of(points, **cells):
+    """Return a mesh of nodes by the kinds of cells, such as n8=…."""
+    return kl.Mesh(points, {f"KinematicLinear3D{kind[1:]}N": nodes for kind, nodes in cells.items()})
 
 
 def mixed():
@@ -68,14 +60,14 @@ def mixed():
     corners = ([0, 1, 3, 4], [1, 2, 3, 6], [1, 3, 4, 6], [1, 4, 5, 6], [3, 4, 6, 7])
     tetrahedra = np.vstack([cells[:1, c] for c in corners])
     wedges = np.vstack([cells[-6:][:, [0, 1, 2, 4, 5, 6]], cells[-6:][:, [0, 2, 3, 4, 6, 7]]])
-    return clamped(mesh_of(mesh.points, ("8N", cells[1:-6]), ("4N", tetrahedra), ("6N", wedges)))
+    return clamped(mesh_of(mesh.points, n8=cells[1:-6], n4=tetrahedra, n6=wedges))
 
 
 def orders():
     """Return quadratic bricks beside linear ones on the same points."""
     mesh = box(kind="20N", cells=(4, 2, 2))
     cells = mesh.blocks[0].nodes
-    return clamped(mesh_of(mesh.points, ("20N", cells[:8]), ("8N", cells[8:, :8])))
+    return clamped(mesh_of(mesh.points, n20=cells[:8], n8=cells[8:, :8]))
 
 
 def bodies(count, stiffer=1.0, cells=(2, 2, 2), kind="8N"):
@@ -138,7 +130,7 @@ def scattered():
     """Return a block with nodes that no element uses, before and behind its own."""
     mesh = box()
     points = np.vstack([[[9.0, 9, 9]], mesh.points, [[7.0, 7, 7]]])
-    return clamped(mesh_of(points, ("8N", mesh.blocks[0].nodes + 1)), held=np.flatnonzero(points[:, 0] == 0))
+    return clamped(mesh_of(points, n8=mesh.blocks[0].nodes + 1), held=np.flatnonzero(points[:, 0] == 0))
 
 
 def distorted(kind="8N"):
