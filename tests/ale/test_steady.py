@@ -36,8 +36,12 @@ def with_softening(r, rate, c_p, clamped):
 
 
 def free_hub(wheels, element, radial, around):
-    """Return a wheel held by its symmetry: at four points of the hub along their tangents."""
-    model = wheels.disk(element, radial, around, hub="free")
+    """Return a wheel held by its symmetry."""
+    return held_by_symmetry(wheels, wheels.disk(element, radial, around, hub="free"))
+
+
+def held_by_symmetry(wheels, model):
+    """Hold four points of the hub along their tangents; return the model."""
     r, angle, *_ = wheels.polar(model.mesh, np.zeros_like(model.mesh.points))
     for k, axis in enumerate("yxyx"):
         turned = np.abs(np.angle(np.exp(1j * (angle - k * np.pi / 2)))) < 1e-9
@@ -93,6 +97,24 @@ def test_h_is_there_with_its_sign(wheels):
     assert gap == pytest.approx(0.0095, abs=1e-4)
 
 
+def test_a_long_cylinder_with_free_ends(wheels):
+    """The load alone, in generalized plane strain: ε_z = -ν ρ rate² (A² + B²) / 2 E."""
+    spinning = wheels.disk("20N", 2, 16)
+    spinning.add(Rotation("z", rate=30.0))
+    e, mesh = EquationsOfMotion(spinning), spinning.mesh
+    model = held_by_symmetry(wheels, kl.Model(mesh, wheels.steel))
+    model.fix("z-", "z")
+    top, *others = mesh.nodes("z+").tolist()
+    for node in others:
+        model.constrain((node, "z"), {(top, "z"): 1.0})
+    model.add(kl.NodalForces(e.system.scatter(e.inertia_load(0.0))))
+    u, strain = model.solve().u, -0.3 * RHO * 30.0**2 * (A * A + B * B) / 2 / 210e6
+    assert u[top, 2] / 0.2 == pytest.approx(strain, rel=5e-3)
+    assert u[np.argmax(mesh.points[:, 0]), 0] == pytest.approx(
+        spinning_load(B, 30.0) - 0.3 * strain, rel=5e-3
+    )
+
+
 def test_orders_of_growth(wheels):
     """Halved cells: errors fall by 4 for hex8 (order 2), and by 8 and more for hex20."""
     for element, sizes, order in (("8N", (4, 8), 1.7), ("20N", (2, 4), 2.8)):
@@ -137,11 +159,11 @@ WAVES = [(1, 30.0, 0.0), (2, 0.0, 0.0), (2, 60.0, 0.0), (4, 60.0, 0.0), (2, 30.0
 @pytest.mark.parametrize(("n", "rate", "damping"), WAVES)
 def test_pressure_waves_fixed_in_space(n, rate, damping, wheels):
     """Imaginary parts, which damping alone gives, have another sign if G has: to their own digits."""
-    mesh, u = under_rim_load(wheels, "20N", 4, 32, lambda a: 1e5 * np.cos(n * a), rate, damping)
+    mesh, u = under_rim_load(wheels, "20N", 3, 24, lambda a: 1e5 * np.cos(n * a), rate, damping)
     radial, tangential = amplitudes(wheels, mesh, u, n)
     expected = waves(n, wheels.steel).steady(rate, 1e5, damping)
-    assert abs(radial - expected[0]) < 1.3e-3 * abs(expected[0])
-    assert abs(tangential - expected[1]) < 1.3e-3 * abs(expected[0])
+    assert abs(radial - expected[0]) < 4e-3 * abs(expected[0])
+    assert abs(tangential - expected[1]) < 4e-3 * abs(expected[0])
     if damping:
         assert radial.imag == pytest.approx(expected[0].imag, rel=1e-2)
         assert tangential.real == pytest.approx(expected[1].real, rel=1e-2)
@@ -157,7 +179,7 @@ def test_the_reference_has_the_figures_of_a_spectral_code(wheels):
 def test_the_answer_changes_sign_at_the_critical_rate(n, critical, wheels):
     found = []
     for share in (0.995, 1.005):
-        mesh, u = under_rim_load(wheels, "20N", 4, 32, lambda a: 1e5 * np.cos(n * a), share * critical)
+        mesh, u = under_rim_load(wheels, "20N", 3, 24, lambda a: 1e5 * np.cos(n * a), share * critical)
         found.append(amplitudes(wheels, mesh, u, n)[0].real)
     assert found[0] < -4e-3
     assert found[1] > 4e-3
@@ -166,6 +188,18 @@ def test_the_answer_changes_sign_at_the_critical_rate(n, critical, wheels):
 def contact(angle):
     """A localised pressure at the lowest point."""
     return 1e5 * np.exp(-((angle + np.pi / 2) ** 2) / (2 * 0.15**2))
+
+
+def test_a_localised_contact_fixed_in_space(wheels):
+    mesh, u = under_rim_load(wheels, "20N", 4, 32, contact, 30.0, damping=20.0)
+    _, angle, *of_mesh = wheels.polar(mesh, u)
+    rim, grid = mesh.nodes("outer"), np.linspace(-np.pi, np.pi, 512, endpoint=False)
+    exact = np.zeros((2, len(rim)))
+    for n in range(25):
+        push = (1 if n == 0 else 2) * (contact(grid) * np.exp(-1j * n * grid)).mean()
+        answer = waves(n, wheels.steel).steady(30.0, push, 20.0)
+        exact += np.outer(answer, np.exp(1j * n * angle[rim])).real
+    assert np.abs(np.array(of_mesh)[:, rim] - exact).max() < 1.5e-2 * np.abs(exact).max()
 
 
 def test_the_report_names_the_way_of_solving(wheels):

@@ -324,8 +324,8 @@ def test_frequencies_of_cubes_with_lumped_mass_are_those_of_solfec(n, lowest):
     np.testing.assert_allclose(shapes.T @ (M @ shapes), np.eye(len(omega)), atol=1e-10)
 
 
-def bar(**options):
-    mesh = kl.box((0.1, 0.1, 1.0), (2, 2, 20), "KinematicLinear3D8N", origin=(-0.05, -0.05, -0.5))
+def bar(cells=(2, 2, 20), element="KinematicLinear3D8N", **options):
+    mesh = kl.box((0.1, 0.1, 1.0), cells, element, origin=(-0.05, -0.05, -0.5))
     return kl.FiniteElementBody(mesh, kl.Isotropic3D(E=2e6, nu=0.26, density=7800.0), **options)
 
 
@@ -333,6 +333,12 @@ def test_frequencies_of_the_free_bar():
     omega, _ = bar(lumped=True).modes(15)
     solfec = (10.456338329, 25.847889375, 27.026114106, 27.026114106, 49.099502585, 49.099502585, 50.22525595)
     np.testing.assert_allclose(omega[7:14], solfec, rtol=1e-8)
+    ritz = (*(9.9984938,) * 2, *(26.0679989,) * 2, 29.1039369, *(47.6794252,) * 2, 50.2775903)
+    coarse, fine = (bar((1, 1, n), "KinematicLinear3D20N").modes(14)[0][6:] / ritz - 1 for n in (5, 10))
+    bending = [0, 1, 2, 3, 5, 6, 7]  # that of torsion converges with the cells of the section
+    assert (fine[bending] > -1e-9).all()
+    assert (fine[bending] < coarse[bending]).all()
+    assert (fine[bending] < [2.5e-3, 2.5e-3, 8.5e-3, 8.5e-3, 1.7e-2, 1.7e-2, 1e-5]).all()
 
 
 @pytest.mark.parametrize("lumped", [False, True])
