@@ -6,6 +6,7 @@ that it imports, unless a path through other packages leads there, too.
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 DOCS = Path(__file__).resolve().parent
@@ -46,9 +47,16 @@ def modules() -> Iterator[tuple[str, Path]]:
             yield name, path
 
 
+@cache
+def statements(path: Path) -> list[ast.stmt]:
+    """Return the imports of a file: at the top, in functions, and for type checking."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    return [node for node in ast.walk(tree) if isinstance(node, (ast.Import, ast.ImportFrom))]
+
+
 def imports(path: Path, names: set[str]) -> Iterator[str]:
-    """Yield the modules that a file imports: at the top, in functions, and for type checking."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    """Yield the modules of the package that a file imports."""
+    for node in statements(path):
         if isinstance(node, ast.ImportFrom) and f"{node.module}.".startswith("kratos_lite."):
             home = str(node.module).removeprefix("kratos_lite").removeprefix(".")
             for alias in node.names:

@@ -129,6 +129,19 @@ def test_a_page_opens_without_a_message_or_a_request(browser, written):
     assert browser.logged() == ([], [written.as_uri()])
     colors, _ = browser.pixels()
     assert colors > 100
+    # the picture that is saved has the legend
+    top, bottom, body = browser("""
+        const canvas = page.legend.over(page.stage.renderer.domElement), pen = canvas.getContext("2d");
+        const view = document.getElementById("view").getBoundingClientRect();
+        const box = ramp.getBoundingClientRect();
+        const pixel = (x, y) => pen.getImageData(x - view.left, y - view.top, 1, 1).data;
+        const color = (x, y) => Array.from(pixel(x, y).slice(0, 3));
+        return [color(box.left + 8, box.top + 1), color(box.left + 8, box.bottom - 2),
+                color(view.left + view.width / 2, view.top + view.height / 2)];
+    """)
+    assert abs(np.array(top) - (253, 231, 37)).max() < 8
+    assert abs(np.array(bottom) - (68, 1, 84)).max() < 8
+    assert min(body) < 200
 
 
 def test_controls_change_the_picture(page):
@@ -195,10 +208,7 @@ def test_the_legend_has_unit_and_range(page, result):
     assert page("return ticks.children[2].textContent") == "1.25"
     page.click("refit")
     assert page("return page.range[1] > 7.6e6")
-
-
-def test_what_rounding_leaves_is_0_in_the_legend(page):
-    page.set("low", "1e-14")
+    page.set("low", "1e-14")  # what rounding leaves
     assert page("return [low.value, ticks.children[0].textContent]") == ["0", "0"]
 
 
@@ -211,7 +221,7 @@ def test_deformation_moves_the_surface(page, result):
     assert page("return document.getElementById('scale-name').textContent") == f"× {2 * base:g}"
 
 
-@pytest.mark.parametrize("element", ["KinematicLinear3D8N", "KinematicLinear3D10N", "KinematicLinear3D15N"])
+@pytest.mark.parametrize("element", ["KinematicLinear3D8N", "KinematicLinear3D15N"])
 def test_a_cut_shows_the_section_and_its_values(browser, element, tmp_path):
     model = kl.Model(kl.box((3, 2, 1), (3, 2, 2), element=element), kl.Isotropic3D(E=1e6, nu=0.0))
     model.fix("x-")
@@ -275,22 +285,6 @@ def test_the_pointer_sees_the_section_behind_what_is_cut_away(page):
     assert abs(found["point"][0] - page("return page.offset")) < 1e-4
 
 
-def test_a_saved_picture_has_the_legend(page):
-    page.pixels()
-    top, bottom, body = page("""
-        const canvas = page.legend.over(page.stage.renderer.domElement), pen = canvas.getContext("2d");
-        const view = document.getElementById("view").getBoundingClientRect();
-        const box = ramp.getBoundingClientRect();
-        const pixel = (x, y) => pen.getImageData(x - view.left, y - view.top, 1, 1).data;
-        const color = (x, y) => Array.from(pixel(x, y).slice(0, 3));
-        return [color(box.left + 8, box.top + 1), color(box.left + 8, box.bottom - 2),
-                color(view.left + view.width / 2, view.top + view.height / 2)];
-    """)
-    assert abs(np.array(top) - (253, 231, 37)).max() < 8
-    assert abs(np.array(bottom) - (68, 1, 84)).max() < 8
-    assert min(body) < 200
-
-
 def test_animation_moves_the_body_and_stops(page):
     page.click("play")
     seen = {page.pixels() for _ in range(5)}
@@ -313,7 +307,7 @@ def test_modes_swing_to_both_sides(browser, model, tmp_path):
     assert len(seen) == 3
     browser.click("play")
     wait = WebDriverWait(browser.driver, 30, 0.02)
-    for sign in (-1, 1):
+    for sign in (1, -1):
         wait.until(lambda _, sign=sign: sign * browser("return page.phase") > 0.2)
 
 
