@@ -141,6 +141,7 @@ VARIABLES = {
     "plastic_strain": ("PLASTIC_STRAIN_VECTOR", ""),
     "accumulated_plastic_strain": ("ACCUMULATED_PLASTIC_STRAIN", ""),
     "back_stress": ("BACK_STRESS_VECTOR", "Pa"),
+    "plastic_dissipation": ("PLASTIC_DISSIPATION", ""),
     "damage": ("DAMAGE", ""),
     "element_length": ("element_length", "m"),
 }

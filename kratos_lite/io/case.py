@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -135,6 +135,34 @@ class Outputs:
         return [*self.results, *(path for path in single if path is not None)]
 
 
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """A comparison with expected values after some steps, or at the end of a model."""
+
+    what: str
+    times: Sequence[float]  # s, of the steps after which it is
+    end: float  # s, of a model without steps
+    # by how much a result at a time exceeds the tolerance at worst, and the numbers; ValueError says why not
+    compare: Callable[[Result, float], tuple[float, str]]
+
+    def __call__(self, result: Result) -> str:
+        """Return the line of a result at the end."""
+        return self.line([self.found(result, self.end)])
+
+    def found(self, result: Result, time: float) -> tuple[float, str]:
+        """Return by how much a result exceeds the tolerance, and the words for it."""
+        try:
+            excess, text = self.compare(result, time)
+        except ValueError as error:
+            return np.inf, f"not evaluated: {error}"
+        return excess, f"{'passed' if excess <= 0 else 'failed'} ({text})"
+
+    def line(self, found: Sequence[tuple[float, str]]) -> str:
+        """Return a line of the worst that was found."""
+        steps = f" after {len(found)} steps" if len(found) > 1 else ""
+        return f"check {self.what} {max(found, key=lambda pair: pair[0])[1]}{steps}"
+
+
 @dataclass
 class Case:
     """A model or body with all that an input says about its analysis, outputs and expected values.
@@ -149,7 +177,8 @@ class Case:
     modes : number of requested natural frequencies, or 0.
     solver, tolerance, error, backend, petsc : of a model at rest, as for `Model.solve`.
     outputs : files to write.
-    expected : comparisons of the end of a model with expected values; each returns a line.
+    expected : comparisons of the end of a model with expected values, each of which returns a line, or a
+        `Comparison` after some steps.
     files : files that were read.
     """
 
@@ -207,16 +236,23 @@ class Case:
             raise ModelError("this is a case of a model; it has no body")
         return self.subject  # type: ignore[return-value]
 
-    def compare(self, result: Result) -> list[str]:
+    def compare(
+        self, result: Result, found: Mapping[int, list[tuple[float, str]]] | None = None
+    ) -> list[str]:
         """Return a line for each expected value: passed, failed or not evaluated, with the numbers.
 
         Parameters
         ----------
         result : of the model, at its end.
+        found : what was found after steps, by the numbers of comparisons.
 
         Returns
         -------
         list of str
             Such as ``check … passed (…)``.
         """
-        return [comparison(result) for comparison in self.expected]
+        steps = found or {}
+        return [
+            each.line(steps[i]) if isinstance(each, Comparison) and i in steps else each(result)
+            for i, each in enumerate(self.expected)
+        ]

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 from run_files import CLAMP, box_mdpa, materials, process, run_file, run_kratos, write
 
+from kratos_lite.elements import ELEMENTS
 from kratos_lite.io.files import read_case
-from kratos_lite.io.run import prepare
+from kratos_lite.io.kratos.expected_values import ORDER_OF_POINTS
+from kratos_lite.io.run import prepare, run
 
 for wheel in ("Multiphysics", "StructuralMechanicsApplication", "ConstitutiveLawsApplication"):
     try:
@@ -113,3 +115,51 @@ def test_loads_on_faces_follow_the_body_as_in_kratos(tmp_path, prefix):
     vector = "assign_vector_variable_to_conditions_process"
     traction = process(vector, "Structure.Top", "SURFACE_LOAD", value=["1e8*t", 0.0, "2e8*t"])
     compare(tmp_path, run_file([CLAMP], [pressure, traction], step=0.25, end=0.95, **EXACT), 4)
+
+
+@pytest.mark.parametrize(
+    ("name", "variables", "tolerance"),
+    [
+        ("J2", ["CAUCHY_STRESS_VECTOR"], 1.0),
+        ("J2", ["GREEN_LAGRANGE_STRAIN_VECTOR"], 1e-9),
+        ("von Mises", ["PLASTIC_DISSIPATION"], 1e-6),
+        ("neo-Hooke", ["CAUCHY_STRESS_VECTOR", "PK2_STRESS_VECTOR"], 1.0),
+    ],
+)
+def test_values_at_gauss_points_are_those_that_kratos_writes(tmp_path, name, variables, tolerance):
+    element, law, constants, size = CASES[name]
+    (tmp_path / "box.mdpa").write_text(box_mdpa().replace("SmallDisplacementElement", element))
+    write(tmp_path, materials("Structure.Body", 7850.0, 2e9, 0.3, law, **constants), "materials.json")
+    common = {"model_part_name": "Structure.Body", "time_frequency": 0.15}
+    written = {"gauss_points_output_variables": variables, "output_file_name": "results.json"}
+    checked = {"gauss_points_check_variables": variables, "input_file_name": "results.json"}
+    module, supports = "json_output_process", [CLAMP, moved("Z", f"{size}*t*t"), moved("X", f"{size / 2}*t")]
+    output = {"python_module": module, "kratos_module": "KratosMultiphysics", "Parameters": common | written}
+    write(tmp_path, run_file(supports, [], step=0.1, end=0.95, checks=[output], **EXACT))
+    run_kratos(tmp_path)
+    common |= {"tolerance": tolerance, "relative_tolerance": 0.0}
+    check = {"python_module": "from_json_check_result_process", "Parameters": common | checked}
+    path = write(tmp_path, run_file(supports, [], step=0.1, end=0.95, checks=[check], **EXACT))
+    lines = run(read_case(path)).compare()
+    assert len(lines) == len(variables)
+    for line in lines:
+        assert " passed (element " in line, line
+        assert line.endswith(" after 5 steps")
+
+
+@pytest.mark.parametrize("nodes", [4, 6, 8, 10, 20, 27])
+def test_gauss_points_in_the_order_of_kratos(nodes):
+    import KratosMultiphysics as KM
+    import KratosMultiphysics.StructuralMechanicsApplication as SMA
+
+    element = ELEMENTS[f"KinematicLinear3D{nodes}N"]
+    part = KM.Model().CreateModelPart("Part")
+    steel = part.CreateNewProperties(1)
+    steel.SetValue(KM.CONSTITUTIVE_LAW, SMA.LinearElastic3DLaw())
+    for i, place in enumerate(element.nodes.tolist(), start=1):
+        part.CreateNewNode(i, *place)
+    name = f"SmallDisplacementElement3D{nodes}N"
+    cell = part.CreateNewElement(name, 1, list(range(1, nodes + 1)), steel)
+    cell.Initialize(part.ProcessInfo)
+    places = cell.CalculateOnIntegrationPoints(KM.INTEGRATION_COORDINATES, part.ProcessInfo)
+    assert np.abs(element.rule.points[ORDER_OF_POINTS[nodes]] - np.array(places)).max() < 1e-8

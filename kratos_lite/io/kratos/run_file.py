@@ -5,16 +5,18 @@ Solids at rest, in quasi-static steps or in time, in the style of 2019 and in th
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+from kratos_lite.analysis.result import Result
 from kratos_lite.errors import Problems, nearest
 from kratos_lite.io.case import Case
 from kratos_lite.io.formats import read_document
 from kratos_lite.io.formats.document import Document
 from kratos_lite.io.formats.part_files import part_files, read_part
 from kratos_lite.io.kratos.context import RunContext, module_of, times_of
-from kratos_lite.io.kratos.expected_values import COMPARISONS, Comparison
+from kratos_lite.io.kratos.expected_values import COMPARISONS
 from kratos_lite.io.kratos.laws import is_nonlinear, make_linear, quasi_static_of
 from kratos_lite.io.kratos.motion import add_motion
 from kratos_lite.io.kratos.processes import PROCESSES, Action, actions_of, run
@@ -161,10 +163,10 @@ def _use_materials(solver: Settings, context: RunContext, document: Document, no
 
 def _read_processes(
     settings: Settings, context: RunContext, notes: list[str]
-) -> tuple[list[Action], list[Comparison]]:
+) -> tuple[list[Action], list[Callable[[Result], str]]]:
     """Return what the processes do and check; all that are unknown are reported together."""
     actions: list[Action] = []
-    checks: list[Comparison] = []
+    checks: list[Callable[[Result], str]] = []
     problems = Problems()
     for section in (settings.section("processes"), settings.section("output_processes")):
         # Kratos keeps the lists in alphabetical order; later processes replace earlier values.

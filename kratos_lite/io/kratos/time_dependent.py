@@ -102,7 +102,7 @@ class ProcessesInTime:
                 '"interval": [0.0, "End"], or give "constrained": false for an initial value'
             )
             is_support = action.fixed and name.startswith("DISPLACEMENT")
-            expect(not is_support or self._acts_always(action), "interval", text)
+            expect(not is_support or self._in_turn(action), "interval", text)
         for name, fixed in values.fixed.items() if self.dynamic else ():
             if name.startswith(UNPRESCRIBED) and fixed.any():
                 raise InputError(f"{values.mesh.source}: {name} is fixed; only DISPLACEMENT can be")
@@ -136,16 +136,40 @@ class ProcessesInTime:
         if not len(indices) or self._acts(action) == 0:
             return
         text = f"{name} of a support changes in a part of the run only; give it as one function of t"
-        expect(self._acts_always(action), "interval", text + ' with the interval [0.0, "End"]')
+        turns = self._in_turn(action)
+        expect(turns, "interval", text + ' with the interval [0.0, "End"]')
+        if turns[0] is not action:
+            return
         for later in self.actions[i + 1 :]:
             if later.component == name and later.factors and self._acts_always(later):
                 indices = np.setdiff1d(indices, later.indices)
-        if not action.mentions("t") or not len(indices):
+        if not len(indices) or not (action.mentions("t") or turns[1:]):
             return
         text = f"{name}: a support may move with x, y, z or with t, not with both; "
-        expect(not action.mentions("xyzXYZ"), "value", text + "give each part a process of its own")
-        point = np.zeros((1, 3))
-        self._moving.append((indices, name[-1].lower(), lambda t: float(action.value(point, t))))
+        mixed = any(each.mentions("xyzXYZ") for each in turns)
+        expect(not mixed, "value", text + "give each part a process of its own")
+        point, times = np.zeros((1, 3)), self.context.times
+
+        def motion(time: float) -> float:
+            last = [_last_time(each, times, time) for each in turns]
+            when, i = max(((t, i) for i, t in enumerate(last) if t is not None), default=(time, 0))
+            return float(turns[i].value(point, when))
+
+        self._moving.append((indices, name[-1].lower(), motion))
+
+    def _in_turn(self, action: Action) -> list[Action]:
+        """Return the actions that act in turn from start to end, one of them here; [] if none do."""
+        if self._acts_always(action):
+            return [action]
+        kind = action.component, action.fixed, bool(action.factors)
+        alike = [
+            each
+            for each in self.actions
+            if (each.component, each.fixed, bool(each.factors)) == kind
+            and np.array_equal(each.indices, action.indices)
+        ]
+        steps = {step for each in alike for step in each.steps if step}
+        return alike if len(steps) == len(self.context.times) - 1 else []
 
     def _acts(self, action: Action) -> int:
         """Return the number of steps, without the start, in which an action acts."""

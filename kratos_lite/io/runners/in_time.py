@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from kratos_lite.errors import InputError
-from kratos_lite.io.case import Case, TimeIntegration
+from kratos_lite.io.case import Case, Comparison, TimeIntegration
 from kratos_lite.io.writers.series import SeriesWriter, make_folder
 from kratos_lite.io.writers.state import read_state, write_state
 
@@ -38,12 +38,14 @@ def restart(path: str, subject: Any) -> None:
         raise InputError(f"{path}: {error}") from None
 
 
-def follow(case: Case, subject: Any, start: Any, states: Iterator[Any], monitor: Monitor) -> None:
-    """Take all steps of a case, and write its series and its last state.
+def follow(
+    case: Case, subject: Any, start: Any, states: Iterator[Any], monitor: Monitor
+) -> dict[int, list[tuple[float, str]]]:
+    """Take all steps of a case, and write its series and its last state; return what comparisons found.
 
     After an error or Ctrl-C the series hold the states up to there, and the last of them is written too.
     """
-    outputs, last = case.outputs, [start]
+    outputs, last, found = case.outputs, [start], dict[int, list[tuple[float, str]]]()
     for path in outputs.paths():
         make_folder(path)
     with ExitStack() as stack:
@@ -59,6 +61,10 @@ def follow(case: Case, subject: Any, start: Any, states: Iterator[Any], monitor:
         for last[0] in states:
             for recorder in (*series, monitor):
                 recorder.add(last[0])
+            for i, each in enumerate(case.expected):
+                if isinstance(each, Comparison) and np.isclose(last[0].time, each.times, 1e-9, 1e-12).any():
+                    found.setdefault(i, []).append(each.found(subject.result(), last[0].time))
+    return found
 
 
 def _save(last: list[Any], path: str) -> None:

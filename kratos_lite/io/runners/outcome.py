@@ -22,12 +22,14 @@ class Outcome:
     rows : the summary: labels and values; those of the result where there are none.
     result : of a model at its end, or None.
     lines : a table instead of the summary, as of natural frequencies.
+    found : what comparisons found after steps, by their numbers.
     """
 
     case: Case
     rows: list[tuple[str, str]]
     result: Result | None = None
     lines: list[str] = field(default_factory=list)
+    found: dict[int, list[tuple[float, str]]] = field(default_factory=dict)
 
     def __str__(self) -> str:
         return "\n".join(self.summary())
@@ -56,7 +58,7 @@ class Outcome:
         list of str
             Nothing where there is no result.
         """
-        return [] if self.result is None else self.case.compare(self.result)
+        return [] if self.result is None else self.case.compare(self.result, self.found)
 
     def write(self) -> list[str]:
         """Write what the end gives; return all files of the case, also those written before.

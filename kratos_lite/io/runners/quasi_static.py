@@ -40,7 +40,7 @@ def run(case: Case, progress: Progress | None = None) -> Outcome:
     analysis, states = prepare(case, progress)
     kept, clock, picture = _Kept(is_film(case.outputs.picture)), perf_counter(), case.outputs.picture
     start = analysis.state()
-    follow(case, analysis, start, states, kept)
+    found = follow(case, analysis, start, states, kept)
     seconds, result = perf_counter() - clock, analysis.result()
     if picture is not None:
         film = {"states": kept.states} if kept.all else {"values": "displacement"}
@@ -50,7 +50,7 @@ def run(case: Case, progress: Progress | None = None) -> Outcome:
         ("time", f"{start.time:.6g} … {analysis.time:.6g} s, {steps} steps in {parts} parts"),
         ("time per step", f"{seconds / max(steps, 1):.3g} s, {seconds:.3g} s in all"),
     ]
-    return Outcome(case, [*rows, *result.table()], result)
+    return Outcome(case, [*rows, *result.table()], result, found=found)
 
 
 class _Kept:

@@ -62,14 +62,14 @@ def run(case: Case, progress: Progress | None = None) -> Outcome:
     start = transient.state()
     picture = case.outputs.picture
     summary, clock = _Summary(transient, keep=is_film(picture)), perf_counter()
-    follow(case, transient, start, states, summary)
+    found = follow(case, transient, start, states, summary)
     rows, result = summary.rows(case, perf_counter() - clock), transient.result(summary.last)
     if picture is not None and is_film(picture):
         write_picture(picture, transient, states=summary.states)
     elif picture is not None:
         title = f"displacement at t = {summary.last.time:g} s"
         write_picture(picture, result, values="displacement", title=title)
-    return Outcome(case, rows, result)
+    return Outcome(case, rows, result, found=found)
 
 
 class _Summary:

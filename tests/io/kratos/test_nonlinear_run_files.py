@@ -144,6 +144,96 @@ def test_linear_takes_elements_and_laws_of_small_strains(tmp_path, run):
     assert run("solve", path, "--linear").code == 0
 
 
+def cube(folder, intervals, checks=(), law="SmallStrainJ2Plasticity3DLaw", **settings):
+    """Write a cube of 1 m on rollers, pulled by 0.01 t along z, as a folder of Kratos's tests is made."""
+    (folder / "box.mdpa").write_text(cell_mdpa())
+    steel = {"YIELD_STRESS": 200e6, "ISOTROPIC_HARDENING_MODULUS": 400e6, "HARDENING_EXPONENT": 0.0}
+    steel |= {"EXPONENTIAL_SATURATION_YIELD_STRESS": 200e6}
+    write(folder, materials("Structure.Body", 0.0, 200e9, 0.3, law, **steel), "materials.json")
+    vector = "assign_vector_variable_process"
+    supports = [
+        process(vector, f"Structure.{axis}-", "DISPLACEMENT", **held("XYZ".index(axis), 0.0))
+        for axis in "XYZ"
+    ]
+    for value, interval in intervals:
+        supports.append(process(vector, "Structure.Top", "DISPLACEMENT", interval=interval, **held(2, value)))
+    content = run_file(supports, [], step=0.2, end=2.0, checks=checks, analysis_type="non_linear", **settings)
+    return write(folder, content)
+
+
+def cell_mdpa():
+    """Return a cube of one element and its faces as .mdpa text."""
+    corners = kl.KinematicLinear3D8N.nodes / 2 + 0.5
+    nodes = "".join(f"{i} {x} {y} {z}\n" for i, (x, y, z) in enumerate(corners, start=1))
+    text = f"Begin Properties 0\nEnd Properties\nBegin Nodes\n{nodes}End Nodes\n"
+    text += "Begin Elements SmallDisplacementElement3D8N\n1 0 1 2 3 4 5 6 7 8\nEnd Elements\n"
+    faces = {"X-": corners[:, 0] == 0, "Y-": corners[:, 1] == 0, "Z-": corners[:, 2] == 0}
+    for name, chosen in (faces | {"Top": corners[:, 2] == 1, "Body": corners[:, 0] >= 0}).items():
+        rows = "".join(f"{i + 1}\n" for i in np.flatnonzero(chosen))
+        text += f"Begin SubModelPart {name}\nBegin SubModelPartNodes\n{rows}End SubModelPartNodes\n"
+        text += "Begin SubModelPartElements\n1\nEnd SubModelPartElements\n" if name == "Body" else ""
+        text += "End SubModelPart\n"
+    return text
+
+
+def held(axis, value):
+    """Return what a process needs to prescribe one component."""
+    return {
+        "constrained": [i == axis for i in range(3)],
+        "value": [value if i == axis else None for i in range(3)],
+    }
+
+
+def in_file(**variables):
+    """Return a check of a file of values at Gauss points or nodes."""
+    settings = {"input_file_name": "results.json", "model_part_name": "Structure.Body", **variables}
+    return {"python_module": "from_json_check_result_process", "Parameters": settings}
+
+
+IN_TURN = [("0.01*t", [0.0, 1.0]), ("0.01+0.01*(t-1.0)", [1.0, 4.1])]
+
+
+@pytest.mark.parametrize("factor", [1.0, 1 + 2e-6])
+def test_stresses_of_kratos_at_gauss_points_after_each_step(tmp_path, factor):
+    """Its J2 cube, whose upper face is moved by two processes in turn: values of Kratos's own test."""
+    known = [201996007.98403203, 204391217.56487054, 206786427.14570904]
+    series = [[0, 0, factor * stress if i == 1 else stress, 0, 0, 0] for i, stress in enumerate(known)]
+    results = {"CAUCHY_STRESS_VECTOR": {str(point): series for point in range(8)}}
+    write(tmp_path, {"TIME": [0.6, 1.2, 1.8], "ELEMENT_1": results}, "results.json")
+    check = in_file(gauss_points_check_variables=["CAUCHY_STRESS_VECTOR"], time_frequency=0.5)
+    (line,) = kl.run(read_case(cube(tmp_path, IN_TURN, [check]))).compare()
+    assert line.endswith("after 3 steps")
+    assert f" {'passed' if factor == 1 else 'failed'} (element 1, point " in line
+
+
+@pytest.mark.parametrize("order", [[0, 1, 2, 3, 4, 5, 6, 7], [0, 1, 3, 2, 4, 5, 6, 7]])
+def test_gauss_points_are_those_of_kratos(tmp_path, order):
+    """Strains of a deformation that is not homogeneous, at the points in the order of Kratos."""
+    loop = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) / 3**0.5
+    x, y, z = np.array([[a, b, c] for c in (-(3**-0.5), 3**-0.5) for a, b in loop])[order].T / 2 + 0.5
+    strain = np.stack(
+        [y * z, 2 * x * z, 3 * x * y, x * z + 2 * y * z, 2 * x * y + 3 * x * z, 3 * y * z + x * y]
+    )
+    entries = {str(i): [[float(1e-4 * e) for e in strain[:, i]]] * 2 for i in range(8)}
+    write(
+        tmp_path, {"TIME": [0.0, 3.0], "ELEMENT_1": {"GREEN_LAGRANGE_STRAIN_VECTOR": entries}}, "results.json"
+    )
+    check = in_file(gauss_points_check_variables=["GREEN_LAGRANGE_STRAIN_VECTOR"], tolerance=1e-9)
+    path = cube(tmp_path, [], [check], "LinearElastic3DLaw")
+    content = json.loads(path.read_text())
+    values = [f"1e-4*{factor}*x*y*z" for factor in (1, 2, 3)]
+    field = process("assign_vector_variable_process", "Structure", "DISPLACEMENT", value=values)
+    content["processes"]["constraints_process_list"] = [field]
+    (line,) = kl.run(read_case(write(tmp_path, content))).compare()
+    assert f" {'passed' if order == sorted(order) else 'failed'} (element 1, point " in line
+
+
+def test_a_support_in_a_part_of_the_run_is_refused(tmp_path):
+    for intervals in ([IN_TURN[0]], [IN_TURN[0], ("0.02", [1.5, 2.0])]):
+        with pytest.raises(InputError, match="DISPLACEMENT_Z is fixed in a part of the run only"):
+            read_case(cube(tmp_path, intervals))
+
+
 BAD = [
     ({"solving_strategy_settings": {"type": "arc_length"}}, "strategy 'arc_length' is not supported"),
     ({"convergence_criterion": "energy"}, "convergence_criterion 'energy' is not supported"),

@@ -189,13 +189,17 @@ def test_options_change_a_dynamic_run_file(write, run):
     assert "20 steps of 0.01 s by bossak(-0.3), no errors" in run("check", "run.json").out
 
 
-@pytest.mark.parametrize(("value", "word", "code"), [(0.0, "failed", 3), (None, "passed", 0)])
-def test_expected_values_are_compared_at_the_end_of_the_run(write, run, value, word, code):
+@pytest.mark.parametrize(
+    ("value", "start", "word", "code"),
+    [(0.0, 0.195, "failed", 3), (None, 0.195, "passed", 0), (None, 0.0, "failed", 3)],
+)
+def test_expected_values_are_compared_after_the_steps_of_their_interval(write, run, value, start, word, code):
     push = ("Top", "SURFACE_LOAD_X", "1e5*t")
     end = states(read_case(write(*CLAMP, push)))[-1]
     mesh = kl.read("mesh.mdpa").mesh
     found = float(end.u[mesh.nodes("Top"), 0].mean())
     settings = {"value": found if value is None else value, "tolerance_rank": 6}
+    settings["interval"] = [start, "End"]
     check = process("check_scalar_to_nodes_process", "Top", "DISPLACEMENT_X", **settings)
     done = run("solve", write(*CLAMP, push, processes=[check]))
     assert f"check DISPLACEMENT_X on Top {word}" in done.out
