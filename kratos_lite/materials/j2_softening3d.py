@@ -14,7 +14,7 @@ from kratos_lite.materials.isotropic_law import VonMises
 from kratos_lite.materials.material import GaussState, Material, Response
 from kratos_lite.typing import Array
 
-EXPONENTIAL, PERFECT = 1, 3
+LINEAR, EXPONENTIAL, PERFECT = 0, 1, 3
 """HARDENING_CURVE of Kratos."""
 MOST = 0.9999
 """Fraction of the fracture energy that is dissipated at most."""
@@ -25,14 +25,15 @@ class J2Softening3D(VonMises):
     """Elastic up to the yield stress of von Mises, which falls with the dissipated energy: σ_Y (1 - κ).
 
     κ is the work of the stress over plastic strains relative to the fracture energy over the radius of the
-    element, from its center to its farthest node; in a bar the stress falls exponentially.
+    element, from its center to its farthest node; in a bar the stress falls exponentially, or linearly, with
+    σ_Y √(1 - κ).
 
     Parameters
     ----------
     E, nu : Young's modulus in Pa and Poisson's ratio.
     yield_stress : σ_Y in Pa, > 0.
     fracture_energy : J/m², > 0.
-    curve : 1 to soften, 3 for perfect plasticity.
+    curve : 0 to soften linearly, 1 exponentially, 3 for perfect plasticity.
     compression : yield stress of compression in Pa, the same; 0 if not given.
     density : kg/m³.
 
@@ -43,11 +44,11 @@ class J2Softening3D(VonMises):
 
     Notes
     -----
-    The plastic strain of a step is Δp = (q - σ_Y (1 - κ)) / (3 G - σ_Y q / g) with the equivalent stress q
-    of the elastic trial and g, fracture energy over radius: it takes the softening at the trial stress, and
-    meets the yield condition to the second order in Δp.  Source: Oller, Nonlinear Dynamics of Structures
-    (2014), and GenericConstitutiveLawIntegratorPlasticity of KratosConstitutiveLawsApplication, which does
-    the same.
+    The plastic strain of a step of exponential softening is Δp = (q - σ_Y (1 - κ)) / (3 G - σ_Y q / g) with
+    the equivalent stress q of the elastic trial and g, fracture energy over radius: it takes the softening at
+    the trial stress, and meets the yield condition to the second order in Δp.  Source: Oller, Nonlinear
+    Dynamics of Structures (2014), and GenericConstitutiveLawIntegratorPlasticity of
+    KratosConstitutiveLawsApplication, which does the same.
 
     Examples
     --------
@@ -93,10 +94,10 @@ class J2Softening3D(VonMises):
     def check(self) -> None:
         """Check the curve, and that compression is like tension."""
         super().check()
-        if self.curve not in (EXPONENTIAL, PERFECT):
+        if self.curve not in (LINEAR, EXPONENTIAL, PERFECT):
             raise MaterialError(
-                f"{self._name('curve')} must be 1, exponential softening, or 3, perfect plasticity; "
-                f"got {self.curve:g}"
+                f"{self._name('curve')} must be 0, linear softening, 1, exponential softening, or 3, perfect "
+                f"plasticity; got {self.curve:g}"
             )
         if self.compression not in (0, self.yield_stress):
             raise MaterialError(
@@ -110,8 +111,9 @@ class J2Softening3D(VonMises):
         stress, n, q = self.trial(strain, state)
         kappa = state["plastic_dissipation"][..., 0]
         per_energy = state["element_radius"][..., 0] / self.fracture_energy  # 1/g
-        soft = self.yield_stress * per_energy if self.curve == EXPONENTIAL else np.zeros_like(q)
-        limit = self.yield_stress * (1 - kappa) if self.curve == EXPONENTIAL else self.yield_stress
+        power = {LINEAR: 0.5, EXPONENTIAL: 1.0, PERFECT: 0.0}[int(self.curve)]
+        limit = self.yield_stress * (1 - kappa) ** power
+        soft = power * limit / (1 - kappa) * per_energy
         plastic, slope = q > limit * (1 + 1e-10), 3 * G - soft * q
         if (plastic & (slope <= 0)).any():
             raise SolveError(

@@ -44,6 +44,7 @@ PERFECT = SOFTENING | {"HARDENING_CURVE": 3}
 CASES = {
     "J2": ("SmallDisplacementElement", "SmallStrainJ2Plasticity3DLaw", PLASTIC, 0.01),
     "von Mises": ("SmallDisplacementElement", VON_MISES, SOFTENING, 0.01),
+    "linear softening": ("SmallDisplacementElement", VON_MISES, SOFTENING | {"HARDENING_CURVE": 0}, 0.01),
     "perfect": ("SmallDisplacementElement", VON_MISES, PERFECT, 0.01),
     "neo-Hooke": ("TotalLagrangianElement", "HyperElastic3DLaw", {}, 0.3),
     "Saint Venant": ("TotalLagrangianElement", "KirchhoffSaintVenant3DLaw", {}, 0.3),

@@ -14,6 +14,7 @@ LAWS = [
     (kl.J2Plasticity3D(200e9, 0.3, 250e6, 1e9, 2e9, 400e6, 20.0), 3e-3),
     (kl.J2Softening3D(200e9, 0.3, 250e6, 4e6), 3e-3),
     (kl.J2Softening3D(200e9, 0.3, 250e6, 4e5, curve=3), 3e-3),
+    (kl.J2Softening3D(200e9, 0.3, 250e6, 4e6, curve=0), 3e-3),
     (kl.DruckerPrager3D(20e6, 0.3, 1e4, 30.0), 2e-3),
     (kl.DruckerPrager3D(20e6, 0.3, 1e4, 30.0, 10.0, 1e5), 2e-3),
     (kl.DruckerPrager3D(20e6, 0.3, 1e4, 30.0, 30.0, 1e5), 2e-3),
@@ -159,17 +160,18 @@ def test_damage_dissipates_the_fracture_energy(linear):
         assert abs(energy - 100.0) < 0.01 * 100.0
 
 
-def test_softening_is_exponential_and_dissipates_the_fracture_energy():
-    """σ = σ_Y exp(-σ_Y p / g) of a bar, to the first order in the steps; then the energy is g."""
+@pytest.mark.parametrize("curve", [0, 1])
+def test_softening_is_linear_or_exponential_and_dissipates_the_fracture_energy(curve):
+    """σ = σ_Y exp(-σ_Y p / g) or σ_Y (1 - σ_Y p / 2g) of a bar, to the first order in the steps."""
     errors = []
     for steps in (400, 800):
-        law = kl.J2Softening3D(200e9, 0.3, 250e6, 4e5)
+        law = kl.J2Softening3D(200e9, 0.3, 250e6, 4e5, curve=curve)
         g = 4e5 / 0.1
-        strains = np.linspace(0, 0.1, steps)
+        strains = np.linspace(0, 0.1 if curve else 0.025, steps)
         stress, state = uniaxial(law, strains, start(law))
         p = strains - stress / 200e9
         flowing = p > 1e-6
-        exact = 250e6 * np.exp(-250e6 * p / g)
+        exact = 250e6 * (np.exp(-250e6 * p / g) if curve else 1 - 250e6 * p / (2 * g))
         errors.append(np.abs(stress - exact)[flowing].max() / 250e6)
         energy = np.diff(strains) @ (stress[1:] + stress[:-1]) / 2
         assert abs(energy / g - state["plastic_dissipation"][0]) < 0.01

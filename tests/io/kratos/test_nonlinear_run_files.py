@@ -290,7 +290,10 @@ def test_softening_bar_takes_the_steps_of_kratos():
     ("changes", "words"),
     [
         ({"YIELD_STRESS_COMPRESSION": 3e6}, "must be that of tension"),
-        ({"HARDENING_CURVE": 2}, "HARDENING_CURVE) must be 1, exponential softening, or 3"),
+        (
+            {"HARDENING_CURVE": 2},
+            "HARDENING_CURVE) must be 0, linear softening, 1, exponential softening, or 3",
+        ),
         ({}, ""),
     ],
 )
