@@ -8,7 +8,7 @@ import numpy as np
 
 from kratos_lite.elements import arguments
 from kratos_lite.elements.kinematic_linear import KinematicLinear
-from kratos_lite.elements.tables import StrainTables, strain_rows
+from kratos_lite.elements.tables import StrainTables
 from kratos_lite.quadrature import Rule
 from kratos_lite.shapes.inverse import cofactors, determinant
 from kratos_lite.typing import Array
@@ -65,7 +65,8 @@ class BBar(KinematicLinear):
         """Return Π(mᵀB) (..., g, 3n) at points (g, 3)."""
         P = self._polynomials(self.rule.points)
         weighted = np.swapaxes(P * self.dV[..., None], -1, -2)
-        dilatation = _trace(strain_rows(self._gauss[1]))
+        gradients = np.swapaxes(self._gauss[1], -1, -2)  # (..., g, n, 3), the rows mᵀB
+        dilatation = gradients.reshape(*gradients.shape[:-2], -1)
         return self._polynomials(xi) @ np.linalg.solve(weighted @ P, weighted @ dilatation)
 
     @classmethod

@@ -96,7 +96,8 @@ def l_domain(E: float, nu: float) -> Field:
         x, y, _ = np.moveaxis(X, -1, 0)
         r, direction = np.hypot(x, y), np.arctan2(x + y, x - y)
         # `direction` is the angle of (x - y, x + y), that is 45° more than that of (x, y)
-        f = np.angle(np.exp(1j * (direction - np.pi / 2)))
+        f = direction - np.pi / 2
+        f += 2 * np.pi * (f < -np.pi)
         k = r**power / (2 * mu)
         radial = k * (
             -(power + 1) * np.cos((power + 1) * f) + (c2 - power - 1) * c1 * np.cos((power - 1) * f)
@@ -137,8 +138,9 @@ def hole(E: float, nu: float, a: float, tension: float) -> Field:
 
     def field(X: Array) -> Array:
         x, y, _ = np.moveaxis(X, -1, 0)
-        r, angle = np.hypot(x, y) / a, np.arctan2(y, x)
-        c, s, c3, s3 = np.cos(angle), np.sin(angle), np.cos(3 * angle), np.sin(3 * angle)
+        r = np.hypot(x, y) / a
+        c, s = x / (r * a), y / (r * a)
+        c3, s3 = c * (4 * c * c - 3), s * (3 - 4 * s * s)  # of three times the angle
         u = r * (k + 1) * c + 2 / r * ((1 + k) * c + c3) - 2 / r**3 * c3
         v = r * (k - 3) * s + 2 / r * ((1 - k) * s + s3) - 2 / r**3 * s3
         return scale * np.stack([u, v, np.zeros_like(r)], axis=-1)
