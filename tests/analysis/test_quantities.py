@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from meshes import KINDS
 
 import kratos_lite as kl
 from kratos_lite.analysis.error_estimate import SAFETY
@@ -12,7 +13,6 @@ from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.verification import fields, scenes
 from kratos_lite.verification.meshes import on_boundary, straight
 
-KINDS = ["4N", "5N", "6N", "8N", "10N", "13N", "15N", "20N", "27N"]
 E, NU = 1.0, 0.3
 LAM, MU = fields.lame(E, NU)
 

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from computing import compiled, same_on_all_threads
+from meshes import NAMES
 from rounding import close
 from systems import pattern_of
 
@@ -20,7 +21,6 @@ from kratos_lite.quadrature import hexahedron, rule_for, tetrahedron
 from kratos_lite.shapes.faces import Quadrilateral4, Quadrilateral8, Quadrilateral9, Triangle3, Triangle6
 from kratos_lite.solvers.mass import Mass
 
-KINDS = [f"KinematicLinear3D{n}N" for n in (4, 5, 6, 8, 10, 13, 15, 20, 27)]
 FACES = (Triangle3, Triangle6, Quadrilateral4, Quadrilateral8, Quadrilateral9)
 GEOMETRIES = ("ideal", "affine", "straight", "curved")
 SHEAR = np.array([[1.0, 0.2, 0.1], [0.0, 0.9, -0.3], [0.1, 0.0, 1.1]])
@@ -53,7 +53,7 @@ def fine(shape, X):
 
 
 @pytest.mark.parametrize("geometry", GEOMETRIES)
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", NAMES)
 def test_mass_body_force_and_volume_are_those_of_a_rule_of_much_higher_degree(kind, geometry):
     X = cell(kind, geometry)
     element = kl.ELEMENTS[kind](X)
@@ -86,7 +86,7 @@ def test_lumped_mass_of_a_quadratic_cell_is_the_scaled_diagonal():
 
 
 @pytest.mark.parametrize("geometry", GEOMETRIES)
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", NAMES)
 def test_convective_matrix_is_exact_and_the_second_is_exact_on_affine_cells(kind, geometry):
     """H is a rational function elsewhere: measured up to 3e-3 of its largest entry for this distortion."""
     X = cell(kind, geometry)
@@ -103,7 +103,7 @@ def test_convective_matrix_is_exact_and_the_second_is_exact_on_affine_cells(kind
     close(H, 2 * (along.T * dV) @ along, 1e-13 if geometry in ("ideal", "affine") else 5e-3)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", NAMES)
 def test_the_rule_follows_the_geometry_of_each_cell(kind):
     shape = kl.ELEMENTS[kind].shape
     X = np.stack([cell(kind, geometry) for geometry in GEOMETRIES])
@@ -152,7 +152,7 @@ def computed(at):
 
 
 @compiled
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", NAMES)
 def test_a_mesh_of_cells_of_all_geometries_is_the_same_compiled_and_in_numpy(kind, monkeypatch):
     at = mixed(kind)
     ours = computed(at)

@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 import pytest
 from computing import EITHER, compiled, same_on_all_threads
+from meshes import NAMES
 from rounding import all_close, close
 from scipy.linalg import eigh
 from systems import pattern_of
@@ -16,7 +17,6 @@ from kratos_lite.assembly.stiffness import assemble_stiffness
 from kratos_lite.bodies.rotations import exp
 from kratos_lite.testing.patches import patch
 
-NAMES = [f"KinematicLinear3D{n}N" for n in (4, 5, 6, 8, 10, 13, 15, 20, 27)]
 WOOD = kl.Orthotropic3D(11e3, 0.9e3, 0.5e3, 0.4, 0.3, 0.4, 0.7e3, 0.05e3, 0.7e3, 450.0)
 SOIL = kl.Isotropic3D(2e3, 0.3, 700.0)
 UNIT = kl.Isotropic3D(1.0, 0.3, 1.0)

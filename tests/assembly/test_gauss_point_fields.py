@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from computing import compiled, same_on_all_threads
-from meshes import changed_at, joined, with_block
+from meshes import NAMES, changed_at, joined, with_block
 from rounding import all_close, close
 from systems import stiffness_of
 
@@ -14,7 +14,6 @@ from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.model import checks
 from kratos_lite.quadrature import Rule, hexahedron
 
-NAMES = [f"KinematicLinear3D{n}N" for n in (4, 5, 6, 8, 10, 13, 15, 20, 27)]
 CONDENSED = [name for name in sorted(kl.ELEMENTS) if kl.ELEMENTS[name].formulation in ("enhanced", "b_bar")]
 WOOD = kl.Orthotropic3D(11e9, 0.9e9, 0.5e9, 0.4, 0.3, 0.4, 0.7e9, 0.05e9, 0.7e9, 450.0)
 SOIL = kl.Isotropic3D(210e6, 0.3, 7620.0)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from computing import compiled, same_on_all_threads
+from meshes import KINDS
 
 import kratos_lite as kl
 from kratos_lite import voigt
@@ -17,7 +18,6 @@ from kratos_lite.verification import scenes
 from kratos_lite.verification.errors import errors
 from kratos_lite.verification.meshes import element, split, warped
 
-KINDS = ("4N", "5N", "6N", "8N", "10N", "13N", "15N", "20N", "27N")
 STEEL = kl.Isotropic3D(E=210e9, nu=0.3)
 
 

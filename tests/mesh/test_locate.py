@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from meshes import four_cells, joined
+from meshes import NAMES, four_cells, joined
 
 import kratos_lite as kl
 from kratos_lite.bodies.rotations import exp
@@ -10,7 +10,6 @@ from kratos_lite.mesh.boxes import BoxTree, cell_boxes
 from kratos_lite.shapes.faces import Quadrilateral4
 from kratos_lite.shapes.inverse import inverse_map
 
-NAMES = [f"KinematicLinear3D{n}N" for n in (4, 5, 6, 8, 10, 13, 15, 20, 27)]
 TURN = exp([0.3, -0.8, 0.5])
 
 each_element = pytest.mark.parametrize("name", NAMES)

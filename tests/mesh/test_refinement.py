@@ -5,12 +5,12 @@ import pickle
 
 import numpy as np
 import pytest
+from meshes import KINDS
 
 import kratos_lite as kl
 from kratos_lite.elements.surface import area_vectors, face_rule
 from kratos_lite.mesh.refinement import raised, refine
 
-KINDS = ("4N", "5N", "6N", "8N", "10N", "13N", "15N", "20N", "27N")
 QUADRATIC = ("10N", "13N", "15N", "20N", "27N")
 UNIT = kl.Isotropic3D(E=1.0, nu=0.3)
 SLOPE = np.array([[0.1, 0.02, 0.03], [0.04, -0.1, 0.02], [0.01, 0.05, 0.2]])

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from computing import EITHER, compiled, same_on_all_threads
+from meshes import NAMES, named
 
 import kratos_lite as kl
 from kratos_lite.mesh import Faces, components, equal_sets, topology
@@ -53,7 +54,7 @@ def test_equal_sets_are_paired_with_the_next_one_across_groups(way):
 def test_faces_of_mixed_cells(way):
     """A brick with a wedge on its side and a pyramid on top of it."""
     cells = {8: range(8), 6: (1, 8, 2, 5, 9, 6), 5: (4, 5, 6, 7, 10)}
-    blocks = [kl.Block(f"KinematicLinear3D{n}N", [nodes]) for n, nodes in cells.items()]
+    blocks = [kl.Block(named(n), [nodes]) for n, nodes in cells.items()]
     faces = Faces(blocks)
     pairs = {
         tuple(sorted(faces.element[[a, b]].tolist())) for a, b in zip(faces.one, faces.other, strict=True)
@@ -66,7 +67,7 @@ def test_faces_of_mixed_cells(way):
     assert [len(rows) for rows in faces.non_conforming()] == [0, 0]
 
 
-@pytest.mark.parametrize("element", list(kl.ELEMENTS))
+@pytest.mark.parametrize("element", NAMES)
 def test_both_ways_find_the_same_faces(element, monkeypatch):
     mesh = kl.box(cells=(3, 2, 2), element=element)
     rng = np.random.default_rng(7)

@@ -30,13 +30,13 @@ def hold(model, corner):
 
 
 def test_a_chain_on_corners_can_turn_about_all_axes():
-    model = staircase(500, (1, 1, 1))
+    model = staircase(200, (1, 1, 1))
     hold(model, (0, 0, 0))
     with pytest.raises(kl.ModelError, match=r"can still move: rotation about x, y, z \(it hangs"):
         model.check()
 
 
-@pytest.mark.parametrize("n", [30, 400])
+@pytest.mark.parametrize("n", [30, 200])
 def test_a_chain_on_edges_can_turn_about_them(n):
     model = staircase(n)
     hold(model, (0, 0, 0))
@@ -50,7 +50,7 @@ def test_a_chain_on_edges_can_turn_about_them(n):
 
 @pytest.mark.parametrize("step", [(1, 0, 1), (1, 1, 1)])
 def test_a_chain_whose_cells_are_all_held_is_none(step):
-    model = staircase(600, step)
+    model = staircase(200, step)
     model.fix(lambda X: np.ones(len(X), dtype=bool), "xyz"[: 3 if step[1] else 2])
     if not step[1]:
         model.fix(lambda X: X[:, 1] == 0, "z")
@@ -58,11 +58,11 @@ def test_a_chain_whose_cells_are_all_held_is_none(step):
 
 
 def test_one_free_hinge_among_hundreds_of_held_cells_is_found():
-    model = staircase(600)
-    model.fix(lambda X: np.abs(X[:, 0] - 300.5) > 0.6, "xyz")
+    model = staircase(200)
+    model.fix(lambda X: np.abs(X[:, 0] - 100.5) > 0.6, "xyz")
     model.check()  # held on both of its edges
-    model = staircase(600)
-    model.fix(lambda X: X[:, 0] + X[:, 2] < 1199, "xyz")
+    model = staircase(200)
+    model.fix(lambda X: X[:, 0] + X[:, 2] < 399, "xyz")
     with pytest.raises(kl.ModelError) as error:
         model.check()
     assert str(error.value).count("can still move") == 1
@@ -79,7 +79,7 @@ def ring(n):
     return cells([(x, 0, z) for x, z in corners[:-1]])
 
 
-@pytest.mark.parametrize("n", [4, 120])
+@pytest.mark.parametrize("n", [4, 50])
 def test_a_closed_ring_of_hinges_is_a_mechanism(n):
     """A linkage of 4 n bars in a plane: all but three of its angles are free."""
     model = ring(n)
@@ -89,14 +89,14 @@ def test_a_closed_ring_of_hinges_is_a_mechanism(n):
 
 
 def test_a_closed_ring_of_hinges_that_is_held_in_its_plane_is_none():
-    model = ring(120)
+    model = ring(50)
     model.fix(lambda X: X[:, 1] == 0, "xyz")
     model.check()
 
 
 def test_chains_and_blocks_mixed():
     """Blocks of two cells that share a face turn as one; their hinges stay hinges."""
-    model = cells([(2 * i + j, 0, i) for i in range(400) for j in (0, 1)])
+    model = cells([(2 * i + j, 0, i) for i in range(150) for j in (0, 1)])
     hold(model, (0, 0, 0))
     with pytest.raises(kl.ModelError, match=r"\(12 nodes\) can still move: rotation about y \(it hangs"):
         model.check()
@@ -115,7 +115,7 @@ def test_the_cost_grows_with_the_number_of_cells(monkeypatch):
     sizes = []
     plain = np.linalg.svd
     monkeypatch.setattr(np.linalg, "svd", lambda A, **k: sizes.append(np.shape(A)[-1]) or plain(A, **k))
-    model = staircase(2000)
+    model = staircase(800)
     hold(model, (0, 0, 0))
     with pytest.raises(kl.ModelError, match="can still move"):
         model.check()

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from meshes import KINDS
 
 import kratos_lite as kl
 
-KINDS = ["4N", "5N", "6N", "8N", "10N", "13N", "15N", "20N", "27N"]
 DEGREES = [(kind, d) for kind in KINDS for d in range(1, 4 + (int(kind[:-1]) > 8))]
 """Up to two above that of the shape functions."""
 LAW = kl.Isotropic3D(E=210e9, nu=0.3, density=7620.0)

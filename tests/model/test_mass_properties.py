@@ -4,7 +4,7 @@ from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
 import pytest
-from meshes import four_cells
+from meshes import NAMES, four_cells
 
 import kratos_lite as kl
 from kratos_lite.assembly.element_groups import ElementGroup
@@ -12,8 +12,6 @@ from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.model.mass_properties import MassProperties
 from kratos_lite.shapes.faces import FACE_SHAPES
-
-NAMES = [f"KinematicLinear3D{n}N" for n in (4, 5, 6, 8, 10, 13, 15, 20, 27)]
 
 each_element = pytest.mark.parametrize("name", NAMES)
 

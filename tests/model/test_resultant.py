@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from meshes import KINDS
 
 import kratos_lite as kl
 
 LAW = kl.Isotropic3D(E=210e9, nu=0.3)
-KINDS = ["4N", "5N", "6N", "8N", "10N", "13N", "15N", "20N", "27N"]
 FORCE, MOMENT = np.array([10.0, -20.0, 30.0]), np.array([1.0, 2.0, -3.0])
 
 

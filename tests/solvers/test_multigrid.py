@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 from computing import compiled, same_on_all_threads
-from meshes import joined
+from meshes import KINDS, joined
 from rounding import close, factorized
 from systems import stiffness_of, system_of
 
@@ -17,7 +17,6 @@ from kratos_lite.solvers.coarse_level import p_coarse_level
 
 STEEL = kl.Isotropic3D(E=2e11, nu=0.3, density=7850.0)
 GRAVITY = kl.Gravity((1.0, 2.0, -9.81))
-KINDS = ("4N", "5N", "6N", "8N", "10N", "13N", "15N", "20N", "27N")
 MODULE = kernels("multigrid")
 
 
