@@ -1,4 +1,4 @@
-"""Matrices of models and elements: solved by SciPy, summed up from elements, and from plain NumPy."""
+"""Matrices of models and elements: solved by SciPy, and summed up from elements; see tests/reference."""
 
 import numpy as np
 import pytest
@@ -83,33 +83,6 @@ def test_residuals_of_elements_balance_at_the_solution():
     free = model.matrices().free
     assert np.abs(total[free]).max() < 1e-10 * np.abs(total).max()
     assert np.abs(total + model.solve().reactions.ravel()).max() < 1e-9 * np.abs(total).max()
-
-
-def test_local_system_is_that_of_a_loop_over_gauss_points():
-    model = mixed_model()
-    mesh, kind = model.mesh, kl.KinematicLinear3D6N
-    u = 1e-3 * np.cos(np.arange(mesh.points.size)).reshape(-1, 3)
-    nodes = mesh.blocks[1].nodes[1]
-    X, strained = mesh.points[nodes], (u - model.initial_displacement)[nodes]
-    E, nu, rho = 3e4, 0.1, 7.0
-    lam, mu = E * nu / (1 + nu) / (1 - 2 * nu), E / 2 / (1 + nu)
-    C = np.diag([2 * mu] * 3 + [mu] * 3) + np.pad(np.full((3, 3), lam), (0, 3))
-    b, start = rho * np.array([1.0, 2.0, -9.81]), np.array([5.0, -3.0, 2.0, 1.0, 4.0, -2.0])
-    K, r = np.zeros((18, 18)), np.zeros(18)
-    for xi, gamma in kind.rule:
-        J = X.T @ kind.shape.dN(xi)
-        D, dV = kind.shape.dN(xi) @ np.linalg.inv(J), gamma * np.linalg.det(J)
-        B = np.zeros((6, 6, 3))
-        for row, (i, j) in enumerate([(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)]):
-            B[row, :, i], B[row, :, j] = D[:, j], D[:, i]
-        B = B.reshape(6, 18)
-        K += B.T @ C @ B * dV
-        r += np.outer(kind.shape.N(xi), b).ravel() * dV
-        r -= B.T @ (C @ B @ strained.ravel() + start) * dV
-    local = model.local_system(8, u)
-    assert np.abs(local.K - K).max() < 1e-13 * np.abs(K).max()
-    # the body force of element row 5 alone does not act on this one
-    assert np.abs(local.r - r).max() < 1e-12 * np.abs(r).max()
 
 
 def test_damping_and_lumped_mass():

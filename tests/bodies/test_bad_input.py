@@ -109,7 +109,7 @@ AS_MANY, ASCEND = "as many values as times", "times of a series must ascend"
     *((lambda m=m: elastic(formulation="modal", modes=m), WHOLE_MODES) for m in (6.5, "many", True)),
     (lambda: elastic(formulation=3), "unknown formulation of a finite-element body 3"),
     (lambda: kl.FixedBody(None), "a mesh must be a Mesh, such as"),
-    *((lambda no=no: kl.integrate(no, 1e-3, 3), "bod", kl.KratosLiteError) for no in (3, "body", None, {}, [])),
+    *((lambda no=no: kl.integrate(no, 1e-3, 3), "a sequence of bodies is") for no in (3, "body", None, {})),
     (lambda: kl.convert(kl.FixedBody(kl.box()), kl.RigidBody), "a fixed body has no mass", kl.ModelError),
     (lambda: elastic().position((2, 0, 0)), "outside the mesh", kl.MeshError),
     (lambda: kl.TimeSeries([0, 1], [0]), AS_MANY),
