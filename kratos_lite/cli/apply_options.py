@@ -93,7 +93,11 @@ def _time(options: Namespace, of_file: TimeIntegration | None) -> TimeIntegratio
     """Return the time integration that the options and a file ask for."""
     time = of_file
     if options.time is not None:
-        time = replace(of_file, **options.time, place="") if of_file else TimeIntegration(**options.time)
+        time = (
+            replace(of_file, **options.time, place="", sizes=())
+            if of_file
+            else TimeIntegration(**options.time)
+        )
     if time is None:
         refuse(options, only("time"), "belongs to a time integration; add --time STEP:STEPS")
         return None

@@ -58,6 +58,7 @@ class TimeIntegration:
     place : of the step in its file, for messages.
     quasi_static : of models: options of `Model.quasi_static`, whose steps are taken; None for a transient.
     start : s, of quasi-static steps.
+    sizes : s, of quasi-static steps that are not alike, in place of `step`; further ones are as the last.
     """
 
     step: float
@@ -74,6 +75,7 @@ class TimeIntegration:
     place: str = ""
     quasi_static: dict[str, Any] | None = None
     start: float = 0.0
+    sizes: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         positive_step(self.step)

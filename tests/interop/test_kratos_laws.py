@@ -164,3 +164,17 @@ def test_gauss_points_in_the_order_of_kratos(nodes):
     cell.Initialize(part.ProcessInfo)
     places = cell.CalculateOnIntegrationPoints(KM.INTEGRATION_COORDINATES, part.ProcessInfo)
     assert np.abs(element.rule.points[ORDER_OF_POINTS[nodes]] - np.array(places)).max() < 1e-8
+
+
+def test_steps_of_a_table_and_supports_in_turn_are_those_of_kratos(tmp_path):
+    element, law, constants, size = CASES["J2"]
+    (tmp_path / "box.mdpa").write_text(box_mdpa().replace("SmallDisplacementElement", element))
+    write(tmp_path, materials("Structure.Body", 7850.0, 2e9, 0.3, law, **constants), "materials.json")
+    supports = [CLAMP]
+    for value, interval in ((f"{size}*t", [0.0, 0.5]), (f"{size / 2}", [0.5, 0.8]), ("0.0", [0.8, "End"])):
+        supports.append(
+            process("assign_scalar_variable_process", "Structure.Top", "DISPLACEMENT_Z", value=value)
+        )
+        supports[-1]["Parameters"]["interval"] = interval
+    table = {"time_step_table": [[0.05, 0.06], [0.5, 0.15], [0.9, 0.1]]}
+    compare(tmp_path, run_file(supports, [], end=1.0, time_stepping=table, **EXACT), 11)

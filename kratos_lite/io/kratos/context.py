@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from bisect import bisect_left
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import numpy as np
 from kratos_lite.errors import nearest
 from kratos_lite.io.settings import Settings, is_number, shown
 from kratos_lite.mesh import Mesh, Part
+from kratos_lite.validation import finite
 
 FOREVER = 1e30
 """What Kratos takes for "End" of an interval."""
@@ -71,19 +73,36 @@ class RunContext:
 def times_of(problem: Settings, solver: Settings) -> list[float]:
     """Return the start time and the time of every step, as Kratos' loop makes them."""
     stepping = solver.section("time_stepping", required=True)
-    table = "time_step_table" in stepping and "time_step" not in stepping
-    stepping.expect(not table, "time_step_table", "time_step_table is not supported; give time_step")
-    step = stepping.number("time_step")
+    key = "time_step_table" if "time_step" not in stepping and "time_step_table" in stepping else "time_step"
+    step_at = _steps_of_table(stepping) if key == "time_step_table" else None
+    step = 0.0 if step_at else stepping.number(key)
     time, end = problem.number("start_time"), problem.number("end_time")
-    stepping.expect(step > 0, "time_step", f"must be > 0 s; got {step:g}")
     text = f"no step is solved: end_time {end:g} must be > start_time {time:g}"
     problem.expect(time < end, "end_time", text)
-    text = f"time_step {step:g} s makes more than {MAX_STEPS} steps; enlarge it"
-    stepping.expect((end - time) / step <= MAX_STEPS, "time_step", text)
     times = [time]
     while times[-1] < end:
+        step = step_at(times[-1]) if step_at else step
+        if not step > 0:
+            raise stepping.error(key, f"must be > 0 s; got {step:g} at t = {times[-1]:g} s")
+        if (end - times[-1]) / step + len(times) - 1 > MAX_STEPS:
+            raise stepping.error(key, f"{key} {step:g} s makes more than {MAX_STEPS} steps; enlarge it")
         times.append(times[-1] + step)
     return times
+
+
+def _steps_of_table(stepping: Settings) -> Callable[[float], float]:
+    """Return the step after a time by ``time_step_table``: linear between its rows and beyond them."""
+    key = "time_step_table"
+    rows = stepping.placed(key, finite, stepping.get(key), "the table of times and steps", ("n", 2))
+    x, y = rows.T.tolist()
+    stepping.expect(x and (np.diff(x) > 0).all(), key, "must have times that grow")
+
+    def step_at(time: float) -> float:
+        k = min(max(bisect_left(x, time), 1), len(x) - 1)
+        slope = (y[k] - y[k - 1]) / (x[k] - x[k - 1]) if k else 0.0
+        return float(y[k - 1] + slope * (time - x[k - 1]))
+
+    return step_at
 
 
 def module_of(entry: Settings) -> str:

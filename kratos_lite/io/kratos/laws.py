@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import KratosLiteError, ModelError
@@ -85,5 +86,6 @@ def quasi_static_of(solver: Settings, times: Sequence[float]) -> TimeIntegration
         "iterations": max(most, ITERATIONS),
         "line_search": solver.flag("line_search", False) or kind == "line_search",
     }
-    step = solver.section("time_stepping").number("time_step")
-    return TimeIntegration(step, len(times) - 1, quasi_static=options, start=times[0])
+    sizes = [after - before for before, after in pairwise(times)]
+    own = () if "time_step" in solver.section("time_stepping") else tuple(sizes)
+    return TimeIntegration(sizes[0], len(sizes), quasi_static=options, start=times[0], sizes=own)

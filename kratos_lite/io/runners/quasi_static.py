@@ -25,7 +25,15 @@ def prepare(case: Case, progress: Progress | None = None) -> tuple[QuasiStaticAn
         restart(time.restart, analysis)
 
     def steps() -> Iterator[State]:
-        return integrate(analysis, time.step, time.steps, every=time.every, progress=progress)
+        if not time.sizes:
+            return integrate(analysis, time.step, time.steps, every=time.every, progress=progress)
+        last = analysis.step + time.steps
+        return (state for state in unlike(last) if state.step % time.every == 0 or state.step == last)
+
+    def unlike(last: int) -> Iterator[State]:
+        while analysis.step < last:
+            h = time.sizes[min(analysis.step, len(time.sizes) - 1)]
+            yield from integrate(analysis, h, 1, progress=progress)
 
     return analysis, placed(time, steps)
 

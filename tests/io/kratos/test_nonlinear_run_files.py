@@ -234,6 +234,39 @@ def test_a_support_in_a_part_of_the_run_is_refused(tmp_path):
             read_case(cube(tmp_path, intervals))
 
 
+def test_steps_of_a_table_are_those_of_kratos(tmp_path):
+    """Between the rows linear: 0.1, 0.12, 0.144 … s up to t = 1, and less after it."""
+    table = {"time_step_table": [[0.0, 0.1], [1.0, 0.3], [2.0, 0.1]]}
+    check = in_file(gauss_points_check_variables=["CAUCHY_STRESS_VECTOR"], time_frequency=0.0)
+    times = [0.0]
+    while times[-1] < 2:
+        times.append(times[-1] + (0.1 + 0.2 * times[-1] if times[-1] < 1 else 0.5 - 0.2 * times[-1]))
+    stress = [200e6 + 80e12 / 200.4e3 * (0.01 * t - 1e-3) if t else 0.0 for t in times]  # E H / (E + H)
+    series = [[0, 0, s, 0, 0, 0] for s in stress]
+    results = {"CAUCHY_STRESS_VECTOR": {str(point): series for point in range(8)}}
+    write(tmp_path, {"TIME": times, "ELEMENT_1": results}, "results.json")
+    outcome = kl.run(read_case(cube(tmp_path, [("0.01*t", [0.0, "End"])], [check], time_stepping=table)))
+    assert outcome.compare()[0].endswith(f"after {len(times) - 1} steps")
+    assert " passed (" in outcome.compare()[0]
+    assert f"{len(times) - 1} steps in" in dict(outcome.rows)["time"]
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ([[0.0, -0.1], [1.0, 0.1]], "must be > 0 s; got -0.1 at t = 0 s"),
+        ([[1.0, 0.1], [0.0, 0.1]], "must have times that grow"),
+        ([[0.0, 0.1, 0.2]], "must have shape (n, 2)"),
+        ([], "time_step_table"),
+        ([[0.0, 1e-9]], "makes more than 1000000 steps"),
+    ],
+)
+def test_tables_of_steps_that_cannot_be_taken_are_refused(tmp_path, table, words):
+    with pytest.raises(InputError) as caught:
+        read_case(cube(tmp_path, IN_TURN, time_stepping={"time_step_table": table}))
+    assert words in str(caught.value)
+
+
 BAD = [
     ({"solving_strategy_settings": {"type": "arc_length"}}, "strategy 'arc_length' is not supported"),
     ({"convergence_criterion": "energy"}, "convergence_criterion 'energy' is not supported"),
