@@ -99,14 +99,6 @@ def test_follower_loads_turn_with_the_body(backend):
     np.testing.assert_allclose(q[9:], axis, atol=1e-13)
 
 
-@pytest.mark.parametrize("integrator", PSEUDO.methods)
-def test_free_fall_of_a_deformable_body_is_exact(backend, integrator):
-    q, u, constant = pseudo_bodies(3)
-    x, v, g = q[:, 9:].copy(), u[:, 9:].copy(), np.array([0, 1.0, -9.81])
-    PSEUDO.steps(q, u, *constant, g, NONE12, h=1e-3, count=100, method=integrator)
-    np.testing.assert_allclose(q[:, 9:], x + 0.1 * v + 0.005 * g, rtol=0, atol=1e-13)
-
-
 # compiled against NumPy
 
 
@@ -140,21 +132,20 @@ RUNS = [(run_rigid, integrator) for integrator in RIGID.methods] + [
 ]
 
 
-@compiled
-@pytest.mark.parametrize(("run", "integrator"), RUNS)
-def test_compiled_steps_are_those_of_numpy(run, integrator, monkeypatch):
-    found = run(integrator)
-    monkeypatch.setattr(native, "kernels", lambda name: None)
-    np.testing.assert_allclose(found, run(integrator), rtol=0, atol=2e-13)
+LARGE = {"count": 1, "h": 0.25}
+"""A step in half of which some bodies turn by more than a radian."""
 
 
 @compiled
-@pytest.mark.parametrize("integrator", RIGID.methods)
-def test_compiled_steps_are_those_of_numpy_where_half_a_step_is_more_than_a_radian(integrator, monkeypatch):
-    assert (np.linalg.norm(rigid_bodies(37)[1][:, :3], axis=1) * 0.25 / 2 > 1).any()
-    found = run_rigid(integrator, count=1, h=0.25)
+@pytest.mark.parametrize(
+    ("run", "integrator", "options"),
+    [*((*run, {}) for run in RUNS), *((run_rigid, method, LARGE) for method in RIGID.methods)],
+)
+def test_compiled_steps_are_those_of_numpy(run, integrator, options, monkeypatch):
+    assert (np.linalg.norm(rigid_bodies(37)[1][:, :3], axis=1) * LARGE["h"] / 2 > 1).any()
+    found = run(integrator, **options)
     monkeypatch.setattr(native, "kernels", lambda name: None)
-    np.testing.assert_allclose(found, run_rigid(integrator, count=1, h=0.25), rtol=0, atol=2e-13)
+    np.testing.assert_allclose(found, run(integrator, **options), rtol=0, atol=2e-13)
 
 
 @compiled
