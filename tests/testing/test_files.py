@@ -10,48 +10,43 @@ from kratos_lite.materials import MATERIALS
 from kratos_lite.shapes import SHAPES
 from kratos_lite.testing import failures, run_file
 
-WEDGE = '''
-"""A wedge of one's own."""
+SHAPE = '''
+"""A tetrahedron of one's own."""
 from __future__ import annotations
 import numpy as np
 from kratos_lite.elements import KinematicLinear
-from kratos_lite.quadrature import wedge
+from kratos_lite.quadrature import tetrahedron
 from kratos_lite.shapes import Shape
 
 
-class MyWedge(Shape):
-    """Six nodes."""
-    cell, corners, degree = "wedge", 6, 1
-    nodes = np.array([[0, 0, -1], [1, 0, -1], [0, 1, -1], [0, 0, 1], [1, 0, 1], [0, 1, 1]], float)
-    edges = ((0, 1), (1, 2), (2, 0), (0, 3), (1, 4), (2, 5), (3, 4), (4, 5), (5, 3))
-    faces = ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5))
-    vtk = 13
+class MyTetrahedron(Shape):
+    """Four nodes."""
+    cell, corners, degree = "tetrahedron", 4, 1
+    nodes = np.vstack([np.zeros(3), np.eye(3)])
+    edges = ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))
+    faces = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3))
+    vtk = 10
 
     @staticmethod
     def N(xi):
-        r, s, t = np.moveaxis(np.asarray(xi, float), -1, 0)
-        L = np.stack([1 - r - s, r, s], axis=-1)
-        t = t[..., None]
-        return np.concatenate([L * (1 - t), L * (1 + t)], axis=-1) / 2
+        xi = np.asarray(xi, float)
+        return np.concatenate([1 - xi.sum(axis=-1, keepdims=True), xi], axis=-1)
 
     @staticmethod
     def dN(xi):
-        r, s, t = np.moveaxis(np.asarray(xi, float), -1, 0)
-        L = np.stack([1 - r - s, r, s], axis=-1)
-        t = t[..., None]
-        rows = []
-        for k in (-1, 1):
-            h = (1 + k * t) / 2
-            rs = np.stack([np.concatenate([-h, h, 0 * h], -1), np.concatenate([-h, 0 * h, h], -1)], -1)
-            rows.append(np.concatenate([rs, (k * L / 2)[..., None]], axis=-1))
-        return np.concatenate(rows, axis=-2)
-
+        slopes = np.vstack([-np.ones(3), np.eye(3)])
+        return np.broadcast_to(slopes, (*np.shape(xi)[:-1], 4, 3))
+'''
+ELEMENT = (
+    SHAPE
+    + '''
 
 class MyElement(KinematicLinear):
     """An element of it."""
-    shape = MyWedge
-    rule = wedge(degree=2)
+    shape = MyTetrahedron
+    rule = tetrahedron(degree=2)
 '''
+)
 
 LAW = '''
 """Transversely isotropic elasticity."""
@@ -122,7 +117,7 @@ def checked(tmp_path):
 
 def test_an_element_is_checked_with_its_shape_and_forgotten(checked):
     before = [list(registry) for registry in (ELEMENTS, SHAPES, MATERIALS)]
-    ((name, findings),) = checked(WEDGE)
+    ((name, findings),) = checked(ELEMENT)
     assert name == "MyElement"
     assert not failures(findings)
     assert len(findings) == 34
@@ -133,35 +128,30 @@ def test_a_file_that_reuses_a_name_of_the_library_does_not_replace_it(checked):
     shipped = ELEMENTS["KinematicLinear3D6N"]
     match = r"two classes of the element KinematicLinear3D6N: .*kinematic_linear_3d6n\.py, one in .*mine\.py"
     with pytest.raises(InputError, match=match):
-        checked(WEDGE.replace("MyElement", "KinematicLinear3D6N"))
+        checked(ELEMENT.replace("MyElement", "KinematicLinear3D6N"))
     assert ELEMENTS["KinematicLinear3D6N"] is shipped
     assert ELEMENTS["SmallDisplacementElement3D6N"] is shipped
 
 
 def test_a_wrong_sign_in_the_file_is_named(checked):
-    ((_, findings),) = checked(WEDGE.replace("(k * L / 2)", "(-k * L / 2)"))
-    assert "/ d t at xi = (" in {f.check: f for f in failures(findings)}["derivatives"].detail
+    ((_, findings),) = checked(ELEMENT.replace("np.eye(3)])\n        return", "-np.eye(3)])\n        return"))
+    assert "dN[3] / d t at xi = (" in {f.check: f for f in failures(findings)}["derivatives"].detail
 
 
 def test_an_error_in_a_function_is_named_with_the_line_of_the_file(checked):
-    text = WEDGE.replace("return np.concatenate(rows, axis=-2)", "return np.concatenate(row, axis=-2)")
+    text = ELEMENT.replace("broadcast_to(slopes", "broadcast_to(slope")
     ((_, findings),) = checked(text)
-    line = 1 + text[: text.index("(row,")].count("\n")
+    line = 1 + text[: text.index("(slope,")].count("\n")
     detail = {f.check: f for f in failures(findings)}["derivatives"].detail
-    assert detail == f"raises NameError: name 'row' is not defined at mine.py:{line}"
+    assert detail == f"raises NameError: name 'slope' is not defined at mine.py:{line}"
 
 
 def test_a_shape_alone_and_an_element_with_another_rule_are_checked(checked):
-    text = (
-        WEDGE[: WEDGE.index("class MyElement")]
-        + "from kratos_lite import KinematicLinear3D20N\n"
-        + "from kratos_lite.quadrature import hexahedron\n"
-        + "class Reduced(KinematicLinear3D20N):\n    rule = hexahedron(3)\n"
-    )
-    found = dict(checked(text))
-    assert list(found) == ["Reduced", "MyWedge"]
+    text = "import kratos_lite as kl\nclass Reduced(kl.KinematicLinear3D20N):\n"
+    found = dict(checked(f"{SHAPE}{text}    rule = kl.quadrature.hexahedron(3)\n"))
+    assert list(found) == ["Reduced", "MyTetrahedron"]
     assert {f.check for f in failures(found["Reduced"])} == {"rank", "bending"}
-    assert not failures(found["MyWedge"])
+    assert not failures(found["MyTetrahedron"])
 
 
 def test_a_material_is_checked_as_the_instance_that_the_file_makes(checked):
@@ -245,10 +235,10 @@ def test_a_material_that_is_no_dataclass_is_named_with_and_without_an_instance(c
 
 
 def test_a_shape_without_its_vtk_number_is_told_the_number_and_checked_all_the_same(checked):
-    ((_, findings),) = checked(WEDGE.replace("    vtk = 13\n", ""))
+    ((_, findings),) = checked(ELEMENT.replace("    vtk = 10\n", ""))
     (finding,) = failures(findings)
     assert finding.check == "definition"
-    assert "write vtk = 13 in the shape" in finding.detail
+    assert "write vtk = 10 in the shape" in finding.detail
     assert len(findings) == 34
 
 
