@@ -170,27 +170,16 @@ def test_one_body_moves_as_in_a_crowd(kernel, bodies, loads, integrator):
     np.testing.assert_array_equal(rate, u[437])
 
 
-@pytest.mark.parametrize("integrator", RIGID.methods)
-def test_two_halves_are_a_step(backend, integrator):
-    q, u, constant = rigid_bodies(21)
-    q2, u2 = q.copy(), u.copy()
-    load = np.array([1.0, 2, 3, 4, 5, 6])
-    spatial, follower = np.concatenate([NONE3, load[3:]]), np.concatenate([load[:3], NONE3])
+@pytest.mark.parametrize(("kernel", "bodies", "_", "integrator"), EITHER_KIND)
+def test_two_halves_are_a_step(backend, kernel, bodies, _, integrator):
+    q, u, constant = bodies(21)
+    q2, u2, load = q.copy(), u.copy(), np.arange(1.0, 7 if kernel is RIGID else 13)
+    halves = [np.concatenate([NONE3, load[3:]]), np.concatenate([load[:3], NONE3])]
+    loads = (NONE3, *(halves if kernel is RIGID else [load]))
     for _ in range(5):
-        RIGID.steps(q, u, *constant, NONE3, spatial, follower, h=0.02, count=1, method=integrator)
-        qh = rigid.half_step(q2, u2, 0.02)
-        RIGID.finish(q2, u2, qh, np.tile(load, (21, 1)), *constant, h=0.02, method=integrator)
-    np.testing.assert_array_equal(q, q2)
-    np.testing.assert_array_equal(u, u2)
-
-
-@pytest.mark.parametrize("integrator", PSEUDO.methods)
-def test_one_step_is_the_first_of_many(backend, integrator):
-    q, u, constant = pseudo_bodies(21)
-    q2, u2, load = q.copy(), u.copy(), np.arange(12.0)
-    PSEUDO.steps(q, u, *constant, NONE3, load, h=0.01, count=2, method=integrator)
-    for _ in range(2):
-        PSEUDO.finish(q2, u2, np.tile(load, (21, 1)), *constant, h=0.01, method=integrator)
+        kernel.steps(q, u, *constant, *loads, h=0.01, count=1, method=integrator)
+        half = [rigid.half_step(q2, u2, 0.01)] if kernel is RIGID else []
+        kernel.finish(q2, u2, *half, np.tile(load, (21, 1)), *constant, h=0.01, method=integrator)
     np.testing.assert_array_equal(q, q2)
     np.testing.assert_array_equal(u, u2)
 

@@ -86,23 +86,13 @@ def test_the_velocity_is_the_rate_of_the_position(kind):
 
 
 @each_kind
-def test_a_force_in_space_has_its_moment(kind):
-    body = moved(block(kind))
-    X, f = at(0.2, -0.3, 0.5), np.array([1.0, 2.0, -3.0])
-    body.add(kl.Force(X, f))
+@pytest.mark.parametrize(("frame", "turn"), [("spatial", np.eye(3)), ("follower", TURN)])
+def test_a_force_has_its_moment_and_may_turn_with_the_body(kind, frame, turn):
+    body, X, f = moved(block(kind)), at(0.2, -0.3, 0.5), np.array([1.0, 2.0, -3.0])
+    body.add(kl.Force(X, f, frame=frame), amplitude=2.0)
     force, torque = resultant(body)
-    np.testing.assert_allclose(force, f, rtol=1e-13)
-    np.testing.assert_allclose(torque, np.cross(TURN @ (X - CENTER), f), rtol=1e-12)
-
-
-@each_kind
-def test_a_force_in_the_body_turns_with_it(kind):
-    body = moved(block(kind))
-    X, f = at(0.1, -0.2, 0.4), np.array([1.0, 2.0, -3.0])
-    body.add(kl.Force(X, f, frame="follower"), amplitude=2.0)
-    force, torque = resultant(body)
-    np.testing.assert_allclose(force, 2 * TURN @ f, rtol=1e-12)
-    np.testing.assert_allclose(torque, 2 * TURN @ np.cross(X - CENTER, f), rtol=1e-11)
+    np.testing.assert_allclose(force, 2 * turn @ f, rtol=1e-12)
+    np.testing.assert_allclose(torque, np.cross(TURN @ (X - CENTER), 2 * turn @ f), rtol=1e-11)
 
 
 @soft_kind

@@ -154,18 +154,18 @@ def test_a_shape_alone_and_an_element_with_another_rule_are_checked(checked):
     assert not failures(found["MyTetrahedron"])
 
 
-def test_a_material_is_checked_as_the_instance_that_the_file_makes(checked):
-    ((name, findings),) = checked(LAW + "\nslate = Transverse(9e9, 5e9, 0.2, 0.15, 2e9)\n")
-    assert name == "slate (Transverse)"
+@pytest.mark.parametrize(
+    ("text", "name", "count"),
+    [
+        (LAW + "\nslate = Transverse(9e9, 5e9, 0.2, 0.15, 2e9)\n", "slate (Transverse)", 5),
+        (STEEL, "steel (Perfect)", 13),
+    ],
+    ids=["linear", "not linear"],
+)
+def test_a_material_is_checked_as_the_instance_that_the_file_makes(checked, text, name, count):
+    ((named, findings),) = checked(text)
+    assert (named, len(findings)) == (name, count)
     assert not failures(findings)
-    assert [f.check for f in findings if f.skipped] == ["isotropy"]
-
-
-def test_a_law_that_is_not_linear_is_checked_as_one(checked):
-    ((name, findings),) = checked(STEEL)
-    assert name == "steel (Perfect)"
-    assert not failures(findings)
-    assert len(findings) == 13
     assert [f.check for f in findings if f.skipped] == ["isotropy"]
 
 
