@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from pages import DOCS, run_scripts, text_of
 
+pytest.importorskip("matplotlib")
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 README = (EXAMPLES.parent / "README.md").read_text()
 
@@ -86,7 +87,6 @@ def test_python_of_the_readme_and_of_each_page_runs(tmp_path):
 
 @pytest.mark.parametrize("page", ["moving-material.md", "run-bodies.md", "models-in-time.md", "modes.md"])
 def test_command_lines_of_each_page_run(page, script, command, tmp_path):
-    pytest.importorskip("matplotlib")
     text = text_of(f"howto/{page}").replace("\\\n", "")
     lines = re.findall(r"^kratos-lite ([^#\n]*)", text, re.M)
     assert lines
@@ -152,7 +152,6 @@ def number(pattern, text):
 
 @pytest.mark.parametrize("kind", ["rigid", "pseudo-rigid", "finite-element"])
 def test_a_thrown_box_falls_and_tumbles_the_same_whatever_its_kind(kind, tmp_path, script):
-    pytest.importorskip("matplotlib")
     out = script(BODIES / "tumbling_box.py", kind, tmp_path / "box.png")
     moved = [float(x) for x in re.search(r"moved by \[(.*?)\]", out).group(1).split()]
     assert moved == pytest.approx([1.5, 1.5, 0.0], abs=1e-9)
@@ -235,7 +234,6 @@ def test_turntable_moves_as_it_is_told(tmp_path, command):
 
 
 def test_the_wheel_gives_way_to_its_contact_as_a_spectral_solution_says(tmp_path, script):
-    pytest.importorskip("matplotlib")
     out = script(EXAMPLES / "rotating_wheel.py", tmp_path / "wheel.png")
     for rate, dent in ((0, 2.068909634465), (30, 2.120223003867), (60, 2.314713545843)):
         assert number(rf"{rate} rad/s: .* by (\S+) mm", out) == pytest.approx(dent, rel=6e-3)
@@ -249,7 +247,6 @@ def test_the_wheel_gives_way_to_its_contact_as_a_spectral_solution_says(tmp_path
 
 
 def test_the_pulse_leaves_the_window(tmp_path, script):
-    pytest.importorskip("matplotlib")
     out = script(EXAMPLES / "translated_bar.py", tmp_path / "pulse.png")
     assert number(r"of the material (\S+) mm/s", out) < 1e-3 * number(r"at first (\S+) mm/s", out)
     wrong = dict(re.findall(r"t = (\S+) s: .* wrong by (\S+)", out))
@@ -261,7 +258,6 @@ def test_the_pulse_leaves_the_window(tmp_path, script):
 
 
 def test_twisted_rubber_resists_and_pushes(tmp_path, script):
-    pytest.importorskip("matplotlib")
     out = script(EXAMPLES / "twisted_rubber.py", tmp_path / "rubber.png")
     torque, push = np.array(re.findall(r"torque +(\S+) kN m, push +(\S+) N", out), float).T
     slope = 1e6 / 2.8 * 0.1406 / 4 / 1e3  # G J / L of a square in kN m

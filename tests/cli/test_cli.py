@@ -861,11 +861,6 @@ def test_progress_of_a_short_work_or_without_a_terminal_is_not_shown(monkeypatch
     assert shown(monkeypatch, False, 0.1) == ""
 
 
-def test_progress_that_is_asked_for_is_shown_at_once(monkeypatch):
-    said = shown(monkeypatch, False, 0.0, always=True)
-    assert re.findall(r"[a-z]{2,}", said) == ["read", "assemble"]
-
-
 def test_an_error_asked_for_is_reached_on_a_finer_mesh(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     kl.write("bar.vtu", kl.box((4, 1, 1), (4, 1, 1)))

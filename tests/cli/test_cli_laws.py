@@ -59,19 +59,6 @@ def test_large_displacements_by_a_flag(box):
     assert np.abs(displacement("out.json") - model.solve().u).max() < 1e-12
 
 
-def test_a_script(box):
-    with open("case.py", "w", encoding="utf-8") as file:
-        file.write(
-            "import kratos_lite as kl\n"
-            "model = kl.Model(kl.box(cells=(2, 2, 2)), kl.J2Plasticity3D(200e9, 0.3, 200e6, 2e9, 1e9))\n"
-            "for side in 'xyz':\n    model.fix(f'{side}-', side)\n"
-            "model.fix('z+', 'z', 0.01)\n"
-            "case = kl.Case(model)\n"
-        )
-    assert main(["solve", "case.py", "--json", "out.json"]) == 0
-    assert np.abs(displacement("out.json") - bar(kl.box(cells=(2, 2, 2)), STEEL).solve().u).max() < 1e-12
-
-
 def test_what_is_for_linear_laws(capsys):
     words = ["solve", "box.vtu", "--material", LAW, *HELD]
     assert main([*words, "--error", "1%"]) != 0

@@ -66,8 +66,6 @@ def test_options_of_petsc_belong_to_the_backend(beam, run):
         (["--rotation", "z:3"], "--rotation does not go with --backend petsc"),
         (["--error", "1%"], "--error is for one process"),
         (["--petsc", "-ksp_type cg gmres"], "'gmres' is no option and the value of none"),
-        (["--petsc", "ksp_view"], "'ksp_view' is no option"),
-        (["--petsc", "-ksp_type 'cg"], "cannot be read"),
     ],
 )
 def test_what_petsc_does_not_do_is_refused_before_anything_is_read(run, words, text):

@@ -117,16 +117,6 @@ def test_wrong_time_integration_is_refused(numbers, message):
         kl.TimeIntegration(**numbers)
 
 
-def test_outputs_are_checked_before_any_work(folder):
-    case = kl.Case(held(), outputs=kl.Outputs(["a.npz"]))
-    with pytest.raises(kl.InputError, match=r"a\.npz: \.npz holds states in time"):
-        kl.run(case)
-    case.time = kl.TimeIntegration(1e-3, 1)
-    case.outputs.state = "a.npz"
-    with pytest.raises(kl.InputError, match=r"a\.npz: is an input or another output"):
-        kl.run(case)
-
-
 @pytest.mark.parametrize(
     ("make", "text"),
     [

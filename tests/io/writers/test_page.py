@@ -16,6 +16,7 @@ from kratos_lite.io.writers.page.lattices import TETRAHEDRA, lattice_of_cell, la
 from kratos_lite.shapes import LINEAR, SHAPES
 from kratos_lite.view.facets import sharp_edges
 
+pytest.importorskip("trimesh")
 CELLS = [
     *("Tetrahedron4", "Tetrahedron10", "Hexahedron8", "Hexahedron20", "Hexahedron27"),
     *("Wedge6", "Wedge15", "Pyramid5", "Pyramid13"),
@@ -116,7 +117,6 @@ def test_sharp_edges_of_a_box_are_its_twelve():
 
 
 def test_a_page_holds_mesh_and_fields(result, tmp_path):
-    pytest.importorskip("trimesh")
     kl.write(tmp_path / "a.html", result)
     content = content_of(tmp_path / "a.html")
     mesh = result.mesh
@@ -137,7 +137,6 @@ def test_a_page_holds_mesh_and_fields(result, tmp_path):
 
 
 def test_a_large_page_holds_the_surface_alone(tmp_path, monkeypatch):
-    pytest.importorskip("trimesh")
     monkeypatch.setattr("kratos_lite.io.writers.page.content.MOST_CELLS", 26)
     mesh = kl.box((3, 3, 3), (3, 3, 3))
     kl.write_modes(tmp_path / "a.html", mesh, [1.0], np.ones((1, 64, 3)))
@@ -153,7 +152,6 @@ def test_a_large_page_holds_the_surface_alone(tmp_path, monkeypatch):
 
 
 def test_large_ids_keep_their_digits(tmp_path):
-    pytest.importorskip("trimesh")
     box = kl.box()
     ids = box.node_ids + 2**62
     mesh = kl.Mesh(box.points, box.blocks, node_ids=ids)
@@ -162,7 +160,6 @@ def test_large_ids_keep_their_digits(tmp_path):
 
 
 def test_numbers_beyond_single_precision_are_refused(result, tmp_path):
-    pytest.importorskip("trimesh")
     stiff = kl.Model(kl.box(), kl.Isotropic3D(E=1e45, nu=0.3))
     stiff.fix("x-")
     stiff.fix("x+", value=(1e-3, 0, 0))
@@ -174,14 +171,12 @@ def test_numbers_beyond_single_precision_are_refused(result, tmp_path):
 
 
 def test_a_mesh_without_solids_is_refused(tmp_path):
-    pytest.importorskip("trimesh")
     mesh = kl.Mesh(np.eye(3), [kl.Block("Unknown3N", [[0, 1, 2]])])
     with pytest.raises(InputError, match="nothing to show: the mesh has no element of a known shape"):
         kl.write_modes(tmp_path / "a.html", mesh, [1.0], np.ones((1, 3, 3)))
 
 
 def test_of_very_many_states_some_are_kept(tmp_path, monkeypatch):
-    pytest.importorskip("trimesh")
     monkeypatch.setattr("kratos_lite.io.writers.page.states.MOST_FRAMES", 4)
     body = kl.RigidBody(kl.box(), kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0))
     with kl.SeriesWriter(tmp_path / "a.html", body) as series:
@@ -193,7 +188,6 @@ def test_of_very_many_states_some_are_kept(tmp_path, monkeypatch):
 
 
 def test_a_page_asks_nothing_of_a_network(result, tmp_path):
-    pytest.importorskip("trimesh")
     kl.write(tmp_path / "a.html", result)
     text = (tmp_path / "a.html").read_text(encoding="utf-8")
     assert "default-src 'none'" in text
@@ -202,7 +196,6 @@ def test_a_page_asks_nothing_of_a_network(result, tmp_path):
 
 
 def test_a_series_becomes_a_page_of_its_states(tmp_path):
-    pytest.importorskip("trimesh")
     body = kl.RigidBody(kl.box(), kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0))
     body.set_velocity(linear=(1, 0, 0), angular=(0, 0, 1))
     moved = []
@@ -218,7 +211,6 @@ def test_a_series_becomes_a_page_of_its_states(tmp_path):
 
 
 def test_a_title_is_no_markup(result, tmp_path):
-    pytest.importorskip("trimesh")
     kl.write(tmp_path / "a<b>&amp{data}.html", result)
     text = (tmp_path / "a<b>&amp{data}.html").read_text(encoding="utf-8")
     assert "<title>a&lt;b&gt;&amp;amp{data}</title>" in text
@@ -241,7 +233,6 @@ def test_a_trimesh_without_three_js_is_named(result, tmp_path, monkeypatch):
 
 
 def test_modes_keep_their_shapes_and_have_names(tmp_path):
-    pytest.importorskip("trimesh")
     mesh, shapes = kl.box(), np.random.default_rng(2).normal(size=(2, 8, 3))
     kl.write_modes(tmp_path / "m.html", mesh, [2 * np.pi, 20 * np.pi], shapes)
     content = content_of(tmp_path / "m.html")
@@ -251,7 +242,6 @@ def test_modes_keep_their_shapes_and_have_names(tmp_path):
 
 
 def test_modes_of_another_mesh_are_refused(tmp_path):
-    pytest.importorskip("trimesh")
     with pytest.raises(InputError, match=r"must have shape \(k, 8, 3\); got \(1, 7, 3\)"):
         kl.write_modes(tmp_path / "m.html", kl.box(), [1.0], np.zeros((1, 7, 3)))
     with pytest.raises(InputError, match=r"must be finite"):
@@ -262,6 +252,5 @@ def test_modes_of_another_mesh_are_refused(tmp_path):
 
 
 def test_only_vtu_files_have_a_mode(result, tmp_path):
-    pytest.importorskip("trimesh")
     with pytest.raises(InputError, match=r"only .vtu files are written as ascii"):
         kl.write(tmp_path / "a.html", result, mode="ascii")
