@@ -135,12 +135,6 @@ def test_a_constant_acceleration_changes_the_rate():
         assert not motion.steady
 
 
-def test_a_far_knot_leaves_the_slope_of_the_others():
-    rate = kl.TimeSeries([0.0, 0.1, 1e9], [0.0, 10.0, 10.0])
-    assert [rate.slope(t) for t in (0.0, 0.05, 0.1, 0.2, 2e9)] == [100.0, 100.0, 50.0, 0.0, 0.0]
-    assert rate.slope(sum([0.01] * 10)) == 50.0  # 0.09999999999999999
-
-
 def test_a_rate_that_passes_the_critical_one_is_told_once(wheels, caplog):
     model = wheels.disk("8N", 1, 12)
     model.add(Rotation("z", lambda t: 2000 * t, 2000.0))

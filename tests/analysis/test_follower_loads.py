@@ -108,21 +108,6 @@ def test_amplitudes_and_functions_of_time_follow_too():
     assert abs(found[0].u - dead.solve().u).max() > 1e-3
 
 
-def test_a_motion_under_a_follower_pressure_comes_to_rest_at_the_same_place():
-    model = squeezed(8, 1, 3e5)
-    still = model.quasi_static()
-    list(kl.integrate(still, dt=1.0, steps=1))
-    moving = kl.Model(model.mesh, kl.SaintVenantKirchhoff3D(E, NU, density=1000.0))
-    for axis in "xyz":
-        moving.fix(f"{axis}-", axis)
-        moving.add(kl.Pressure(f"{axis}+", 3e5, follower=True))
-    transient = moving.transient(rayleigh=(200.0, 0.0))
-    *_, last = kl.integrate(transient, dt=5e-3, steps=100)
-    assert np.abs(last.v).max() < 1e-6
-    u = still.result().u
-    assert np.abs(last.u - u).max() < 1e-6 * np.abs(u).max()
-
-
 def test_a_follower_by_places_is_refused():
     with pytest.raises(InputError, match="a follower pressure is a number"):
         kl.Pressure("z+", lambda X: X[:, 0], follower=True)

@@ -123,23 +123,6 @@ def test_a_beam_of_steel_bends_beyond_its_yield_moment():
     assert abs(moment / elastic / ((3 - 1 / 9) / 2) - 1) < 0.01
 
 
-def test_restart_goes_on_bit_by_bit():
-    model = bar(STEEL)
-    model.fix("z+", "z", lambda t: 0.02 * np.sin(3 * t))
-    whole = model.quasi_static()
-    states = list(kl.integrate(whole, dt=0.2, steps=6))
-    again = model.quasi_static()
-    states[2].restore(again)
-    for _ in kl.integrate(again, dt=0.2, steps=3):
-        pass
-    for name, value in states[-1].values.items():
-        assert (np.asarray(again.state().values[name]) == np.asarray(value)).all(), name
-    assert abs(whole.work) > 0
-    other = bar(kl.J2Plasticity3D(E, 0.3, Y), "KinematicLinear3D20N").quasi_static()
-    with pytest.raises(InputError, match="does not fit"):
-        states[2].restore(other)
-
-
 def test_a_load_beyond_the_limit_is_refused_with_how_far_it_came():
     model = bar(kl.J2Plasticity3D(E, 0.3, Y))
     model.add(kl.Traction("z+", (0, 0, 2 * Y)))
