@@ -50,7 +50,7 @@ def _in_constant_volume(groups: Sequence[ElementGroup]) -> list[str]:
             why, better = "Poisson's ratio lies so near 0.5", better_element(element, "BBar")
         elif law.keeps_volume and linear:
             why = f"{type(law).__name__} flows without change of volume"
-            flowing = formulations_of(element.shape).get("b_bar")
+            flowing = formulations_of(element.shape).get("f_bar" if element.finite else "b_bar")
             better = flowing.__name__ if flowing else better_element(element)
         else:
             continue
