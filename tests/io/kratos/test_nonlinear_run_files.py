@@ -10,6 +10,7 @@ from scenes import SHARED
 import kratos_lite as kl
 from kratos_lite.errors import InputError
 from kratos_lite.io.files import read_case
+from kratos_lite.io.run import prepare
 
 FOLDERS = SHARED / "kratos_examples"
 PRESSURE = process(
@@ -226,6 +227,16 @@ def test_gauss_points_are_those_of_kratos(tmp_path, order):
     content["processes"]["constraints_process_list"] = [field]
     (line,) = kl.run(read_case(write(tmp_path, content))).compare()
     assert f" {'passed' if order == sorted(order) else 'failed'} (element 1, point " in line
+
+
+def test_processes_hold_nodes_in_turn(tmp_path):
+    """At a time of two processes the later one holds."""
+    case = read_case(
+        cube(tmp_path, [("0.01*t", [0.0, 1.0]), ("0.03-0.02*t", [1.0, 1.5]), ("0.0", [1.5, 9.0])])
+    )
+    tops = [state.u[4:, 2] for state in prepare(case)[1]]
+    exact = [0.002, 0.004, 0.006, 0.008, 0.01, 0.006, 0.002, 0, 0, 0, 0]
+    assert np.abs(np.array(tops) - np.array(exact)[:, None]).max() < 1e-15
 
 
 def test_a_support_in_a_part_of_the_run_is_refused(tmp_path):
