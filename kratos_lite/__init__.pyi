@@ -121,6 +121,7 @@ from kratos_lite.model.loads.surface import LineLoad as LineLoad
 from kratos_lite.model.loads.surface import Pressure as Pressure
 from kratos_lite.model.loads.surface import Resultant as Resultant
 from kratos_lite.model.loads.surface import Traction as Traction
+from kratos_lite.model.loads.temperature import Temperature as Temperature
 from kratos_lite.model.mass_properties import MassProperties as MassProperties
 from kratos_lite.shapes import Shape as Shape
 

@@ -66,7 +66,8 @@ class Level:
         assert self.before is not None
         assert self.step is not None
         change = self.result.u - self.step.interpolate(self.before.result.u)
-        return float(np.sqrt(2 * totals(self.model.mesh.points, self.result.groups, change)[0]))
+        cold = [group.without_initial for group in self.result.groups]
+        return float(np.sqrt(2 * totals(self.model.mesh.points, cold, change)[0]))
 
     @property
     def is_nested(self) -> bool:

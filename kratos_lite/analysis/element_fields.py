@@ -275,7 +275,7 @@ class ElementFields:
             return value.reshape(*value.shape[:2], -1)
 
         flat = extrapolated_at(self.groups, located, values)
-        return flat.reshape(*located.rows.shape, *tail)
+        return flat.reshape((*located.rows.shape, *tail))
 
     def von_mises(self, at: str = "gauss") -> Any:
         """Return von Mises stresses.

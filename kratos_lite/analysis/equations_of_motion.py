@@ -11,7 +11,7 @@ import numpy as np
 
 from kratos_lite.ale import Motion, MotionMatrices
 from kratos_lite.ale.checks import check_materials
-from kratos_lite.analysis.nodal_loads import AppliedLoads
+from kratos_lite.analysis.nodal_loads import AppliedLoads, at_temperature
 from kratos_lite.analysis.prescribed_motion import PrescribedMotion
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
@@ -257,9 +257,9 @@ class EquationsOfMotion:
         """Return the nodal forces (3a,) at displacements (3a,) and a time."""
         return self.load(time)
 
-    def groups_of_result(self) -> list[ElementGroup]:
-        """Return the elements with the states of their laws."""
-        return self.groups
+    def groups_of_result(self, time: float) -> list[ElementGroup]:
+        """Return the elements with the states of their laws, and the temperatures at a time in s."""
+        return at_temperature(self.model, self.groups, time)
 
     def stored_energy(self, u: Array, time: float) -> float:
         """Return ½ u·K u in J, K with what the motion adds, at a time."""

@@ -185,7 +185,7 @@ def variable(name: str, size: int) -> Field:
 
 def known(groups: Sequence[ElementGroup]) -> dict[str, Field]:
     """Return the fields of a result of groups: those of the table, and the internal variables of its laws."""
-    if all(group.is_linear for group in groups):
+    if all(group.is_linear and group.heating is None for group in groups):
         return FIELDS
     energy = replace(FIELDS["strain_energy_density"], where=EVERYWHERE, sampled=True)
     laws = [group.material for group in groups if group.states is not None]
@@ -286,8 +286,8 @@ class GaussPoints:
 
     @property
     def elastic(self) -> tuple[Array, Array]:
-        """ε and the stress (m, g, 6) in Pa without prestress."""
-        strain = self.strain
+        """The elastic strain and its stress (m, g, 6) in Pa, without prestress."""
+        strain = self.strain - self.group.thermal_strain(slice(None))
         return strain, strain @ self.group.material.C.T
 
     @property

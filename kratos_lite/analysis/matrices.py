@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
+from kratos_lite.analysis.nodal_loads import at_temperature
 from kratos_lite.assembly.element_groups import group_of_element
 from kratos_lite.assembly.gauss_point_fields import internal_load
 from kratos_lite.model.loads import ScaledLoad
@@ -108,7 +109,7 @@ def local_system_of(model: Structure, element: int, u: ArrayLike | None = None) 
     if model.initial_displacement is not None:
         displaced = displaced - model.initial_displacement
     group = group_of_element(model.mesh, model.element_groups(), element)
-    load = -internal_load(points, [group], displaced)
+    load = -internal_load(points, at_temperature(model, [group], 0.0), displaced)
     for one in model.loads:
         of, factor = (one.load, one.amplitude(0.0)) if isinstance(one, ScaledLoad) else (one, 1.0)
         if isinstance(of, BodyForce):

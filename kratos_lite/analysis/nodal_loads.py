@@ -13,6 +13,7 @@ from kratos_lite.assembly.gauss_point_fields import internal_load
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.checks import check_carried
 from kratos_lite.model.loads import Load, TimeDependentLoad
+from kratos_lite.model.loads.temperature import Temperature, heated
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.tangents import Changes
@@ -28,8 +29,9 @@ def external_loads(mesh: Mesh, groups: Sequence[ElementGroup], loads: Sequence[L
 
 
 def initial_loads(model: Structure, groups: Sequence[ElementGroup]) -> Array | None:
-    """Return ∫ B^T (σ0 - C ε0) dV: what prestress and stress-free displacement put on the nodes."""
-    if model.initial_displacement is None and model.prestress is None:
+    """Return ∫ B^T σ dV at rest: what prestress, temperature and stress-free state put on the nodes."""
+    at_rest = model.initial_displacement is None and model.prestress is None
+    if at_rest and all(group.heating is None for group in groups):
         return None
     return stress_load(model, groups, np.zeros_like(model.mesh.points))
 
@@ -38,6 +40,17 @@ def stress_load(model: Structure, groups: Sequence[ElementGroup], u: Array) -> A
     """Return ∫ B^T σ dV (n, 3) in N of the stresses that a result of u shows, with those of prestress."""
     u0 = model.initial_displacement
     return internal_load(model.mesh.points, groups, u if u0 is None else u - u0)
+
+
+def at_temperature(model: Structure, groups: Sequence[ElementGroup], time: float) -> list[ElementGroup]:
+    """Return groups with the temperatures of the model at a time in s; the same ones without any."""
+    return heated(model.mesh, groups, chain.from_iterable(load.acting(time) for load in model.loads))
+
+
+def heating_of(model: Structure, groups: Sequence[ElementGroup], time: float) -> list[Array | float] | None:
+    """Return the temperatures (m, k) of the nodes of each group at a time in s, or 0; None without any."""
+    found = [group.heating for group in at_temperature(model, groups, time)]
+    return None if all(values is None for values in found) else [0.0 if v is None else v for v in found]
 
 
 class AppliedLoads:
@@ -76,7 +89,11 @@ class AppliedLoads:
     def _forces_of(self, load: Load) -> Array:
         used = np.zeros(self.system.n_nodes, dtype=bool)
         used[self.system.nodes] = True
-        forces = load.forces(self.model.mesh, self._groups)
+        mesh = self.model.mesh
+        forces = load.forces(mesh, self._groups)
+        if isinstance(load, Temperature) and self._initial:
+            cold = [group.without_initial for group in self._groups]
+            forces = -internal_load(mesh.points, heated(mesh, cold, [(1.0, load)]), np.zeros_like(forces))
         check_carried(self.model.mesh, forces, used)
         return self.system.gather(forces)
 

@@ -13,6 +13,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion, Solve
+from kratos_lite.analysis.nodal_loads import at_temperature, heating_of
 from kratos_lite.analysis.quasi_static import assembly_of
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
@@ -61,7 +62,8 @@ class NonlinearMotion(EquationsOfMotion):
         self, u: Array, time: float, tangent: bool = False
     ) -> tuple[History, BlockMatrix | None, Changes]:
         h, before = time - self.history.time, self.history.states
-        forces, K, states = self.assembly.evaluate(u, before, h, tangent=tangent)
+        heating = heating_of(self.model, self.groups, time)
+        forces, K, states = self.assembly.evaluate(u, before, h, heating, tangent=tangent)
         more, changes = self.applied.following(time, u)
         self._found = History(time, u, forces - more, states)
         return self._found, K, changes
@@ -125,16 +127,16 @@ class NonlinearMotion(EquationsOfMotion):
 
     def stored_energy(self, u: Array, time: float) -> float:
         """Return the energy in J that the laws store."""
-        groups = self._with_states(self.system.groups)
+        groups = self._with_states(at_temperature(self.model, self.system.groups, time))
         return totals(self.system.points, groups, self.assembly.strained(u))[0]
 
     def load_of_result(self, u: Array, time: float) -> Array:
         """Return the nodal forces (3a,) at a time, those among them that follow the faces."""
         return self.load(time) + self.applied.following(time, u)[0]
 
-    def groups_of_result(self) -> list[ElementGroup]:
-        """Return the elements with the states of their laws."""
-        return self._with_states(self.groups)
+    def groups_of_result(self, time: float) -> list[ElementGroup]:
+        """Return the elements with the states of their laws, and the temperatures at a time in s."""
+        return self._with_states(at_temperature(self.model, self.groups, time))
 
     def _with_states(self, groups: list[ElementGroup]) -> list[ElementGroup]:
         return [replace(g, states=s) for g, s in zip(groups, self.history.states, strict=True)]

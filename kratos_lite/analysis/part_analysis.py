@@ -18,6 +18,7 @@ from kratos_lite.errors import ModelError
 from kratos_lite.model import checks
 from kratos_lite.model.loads import Load, ScaledLoad
 from kratos_lite.model.loads.nodal import NodalForces, PointLoad
+from kratos_lite.model.loads.temperature import Temperature
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constraints import rigid_modes
 from kratos_lite.typing import Array, Mask, Progress
@@ -137,6 +138,8 @@ def _checked(model: Structure) -> tuple[list[ElementGroup], list[str]]:
         )
     warnings = model.check_geometry()
     groups = model.element_groups()
+    if any(isinstance(one, Temperature) for load in model.loads for _, one in load.acting(0.0)):
+        raise ModelError("temperatures need the whole mesh on one process; solve it there")
     if any(group.element.spurious_modes for group in groups):
         raise ModelError("whether reduced integration leaves elements free is found in a whole mesh alone")
     return groups, warnings

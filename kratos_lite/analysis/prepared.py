@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from kratos_lite.errors import InputError
 from kratos_lite.model import checks
 from kratos_lite.model.free_motions import FreeMotions
 from kratos_lite.model.loads import Load
+from kratos_lite.model.loads.temperature import heated
 from kratos_lite.model.structure import Structure
 from kratos_lite.model.supports import Supports
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
@@ -34,7 +36,6 @@ class Prepared:
     groups: list[ElementGroup]
     warnings: list[str]  # of the checks
     free: FreeMotions  # the rigid motions that supports leave to its components
-    initial: Array | None  # (n, 3) N, nodal forces of the initial state
 
     @cached_property
     def component(self) -> Ints:
@@ -57,7 +58,7 @@ def prepared(model: Structure) -> Prepared:
     """Return a structure checked; MeshError, ModelError or InputError where it is broken."""
     version = model.version
     groups, warnings = model.checked()
-    return Prepared(version, groups, warnings, model.free_motions(groups), initial_loads(model, groups))
+    return Prepared(version, groups, warnings, model.free_motions(groups))
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +99,7 @@ class LoadSet:
     """Loads, their nodal forces (n, 3) in N without and with initial stress, and components they strain."""
 
     loads: list[Load]
+    groups: list[ElementGroup]  # the elements with the temperatures among them
     external: Array
     forces: Array
     moving: Mask
@@ -121,12 +123,14 @@ def load_set(
     mesh, supports = model.mesh, model.supports
     with phase("load"):
         external = supports.on_independents(external_loads(mesh, state.groups, loads))
-        forces = external if state.initial is None else external - state.initial
+        groups = heated(mesh, state.groups, chain.from_iterable(load.acting(0.0) for load in loads))
+        initial = initial_loads(model, groups)
+        forces = external if initial is None else external - supports.on_independents(initial)
         checks.check_carried(mesh, forces, state.used)
         pushed = any_axis((forces != 0) & ~supports.fixed)
         moving = state.components_with(pushed | dirichlet.displaced)
         state.free.check((load.forces(mesh, state.groups) for load in loads), moving)
-    return LoadSet(list(loads), external, forces, moving, phase)
+    return LoadSet(list(loads), groups, external, forces, moving, phase)
 
 
 def any_axis(mask: Mask) -> Mask:

@@ -9,13 +9,20 @@ from typing import TypeAlias
 
 import numpy as np
 
-from kratos_lite.analysis.nodal_loads import AppliedLoads
+from kratos_lite.analysis.nodal_loads import AppliedLoads, heating_of
 from kratos_lite.analysis.prescribed_motion import PrescribedMotion
 from kratos_lite.analysis.report import Report, StepReport
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.state import ModelInTime, State, check_state
 from kratos_lite.assembly.block_matrix import BlockMatrix
-from kratos_lite.assembly.nonlinear_assembly import NonlinearAssembly, States, named, unnamed
+from kratos_lite.assembly.nonlinear_assembly import (
+    Heating,
+    NonlinearAssembly,
+    States,
+    heated_by,
+    named,
+    unnamed,
+)
 from kratos_lite.assembly.stiffness import assemble_stiffness
 from kratos_lite.errors import InputError, ModelError, SolveError
 from kratos_lite.mesh.mesh import place_of
@@ -122,6 +129,7 @@ class QuasiStaticAnalysis(ModelInTime):
         self.increment, self.speed = np.zeros_like(self.u), 0.0
         self.load, self.rate, self.curvature = (np.zeros_like(self.u) for _ in range(3))
         self.last = 0.0  # s, duration of the last part
+        self.heating: Heating | None = None  # at the end of the present step
         self.internal = self._forces(self.u)
         self.reports: list[StepReport] = []
         if arc_length:
@@ -129,10 +137,12 @@ class QuasiStaticAnalysis(ModelInTime):
 
     def _forces(self, u: Array) -> Array:
         """Return the internal forces (3a,) of the committed states at displacements (3a,)."""
-        return self.assembly.evaluate(u, self.states, 0.0, tangent=False)[0]
+        return self.assembly.evaluate(u, self.states, 0.0, self.heating, tangent=False)[0]
 
     def _check_factor(self) -> None:
         """Refuse loads that are no constant ones and a factor times others, and supports that move."""
+        if heating_of(self.model, self.groups, 1.0):
+            raise InputError("the arc length scales loads, not temperatures; leave them out")
         f = [self._loads(self.u, t)[0] for t in (0.0, 1.0, 2.0)]
         if self.model.supports.motions or np.abs(f[2] - 2 * f[1] + f[0]).max() > 1e-9 * np.abs(f[1]).max():
             raise InputError(
@@ -171,6 +181,7 @@ class QuasiStaticAnalysis(ModelInTime):
         """Come to the loads of a time, in parts where one step does not converge."""
         start, begin, dead = self.time, self.load, self.applied(end)
         fields = self.prescribed.part(self.u), self.prescribed(end)
+        cold, hot = self.heating, heating_of(self.model, self.groups, end)
 
         def advance(done: float, fraction: float) -> int:
             def load(u: Array) -> Load:
@@ -179,6 +190,7 @@ class QuasiStaticAnalysis(ModelInTime):
                 return now, [(nodes, fraction * k) for nodes, k in tangent]
 
             field = (1 - fraction) * fields[0] + fraction * fields[1]
+            self.heating = _between(cold, hot, fraction)
             with one_thread():
                 u, known, residuals = self._newton(load, field, (fraction - done) * (end - start))
             time = start + fraction * (end - start)
@@ -242,7 +254,8 @@ class QuasiStaticAnalysis(ModelInTime):
 
     def _balance(self, u: Array, load: Load, dt: float) -> tuple[float, Response]:
         """Return the relative residual at displacements (3a,), and what is known there."""
-        (internal, K, states), (force, tangent) = self.assembly.evaluate(u, self.states, dt), load
+        internal, K, states = self.assembly.evaluate(u, self.states, dt, self.heating)
+        force, tangent = load
         assert K is not None
         scale = max(float(np.linalg.norm(v)) for v in (force, internal, self.load, self.internal))
         residual = float(np.linalg.norm(self.system.constraint_map.reduce(force - internal)))
@@ -302,7 +315,7 @@ class QuasiStaticAnalysis(ModelInTime):
         q, s = du[constraints.free], 1.0
         before = float(q @ r)
         for _ in range(SEARCHES):
-            forces = self.assembly.evaluate(u + s * du, self.states, dt, tangent=False)[0]
+            forces = self.assembly.evaluate(u + s * du, self.states, dt, self.heating, tangent=False)[0]
             after = float(q @ constraints.reduce(load(u + s * du)[0] - forces))
             if after * before >= 0 or abs(after) <= SLACK * abs(before):
                 break
@@ -352,6 +365,7 @@ class QuasiStaticAnalysis(ModelInTime):
             self.increment, self.speed = get["increment"].copy(), float(get["speed"])
         self.states = unnamed(get, self.states)
         self.time, self.step = float(state.time), int(state.step)
+        self.heating = heating_of(self.model, self.groups, self.time) if self.last else None
 
     def _whole(self, values: Array) -> Array:
         return self.system.scatter(values)
@@ -388,8 +402,17 @@ class QuasiStaticAnalysis(ModelInTime):
             work=self.work,
         )
         groups = [replace(g, states=s) for g, s in zip(self.groups, self.states, strict=True)]
+        groups = heated_by(groups, self.heating) if self.heating else groups
         u0 = model.initial_displacement
         return Result(model.mesh, groups, self._whole(self.u).copy(), reactions, loads, report, u0)
+
+
+def _between(cold: Heating | None, hot: Heating | None, fraction: float) -> Heating | None:
+    """Return temperatures of groups at a fraction of a step; None are 0."""
+    if (given := hot or cold) is None:
+        return None
+    rest = [0.0] * len(given)
+    return [(1 - fraction) * a + fraction * b for a, b in zip(cold or rest, hot or rest, strict=True)]
 
 
 def assembly_of(model: Structure, system: ConstrainedSystem) -> NonlinearAssembly:

@@ -184,14 +184,14 @@ class StaticAnalysis:
             if case.moving.any():
                 reactions = system.residual(u, case.forces)
             reactions = model.supports.supported(reactions)
-            inner = model.supports.on_independents(stress_load(model, state.groups, u))
-            roundoff = max(noise, self._initial_roundoff(case.forces))
+            inner = model.supports.on_independents(stress_load(model, case.groups, u))
+            initial = case.external - case.forces
+            roundoff = max(noise, self._initial_roundoff(case.forces) if initial.any() else 0.0)
             # Without loads, each prescribed degree of freedom may hold nothing but the rounding of K u.
             count = n_used**0.5 if case.forces.any() else np.count_nonzero(reactions)
             balance = checks.equilibrium(model.mesh.points, case.external, reactions, inner, count * roundoff)
             if tolerance is None:
                 check_solution(solution, u, balance)
-            initial = case.external - case.forces
             if tolerance is None and not initial.any():
                 work = checks.work_of(u, inner, case.external, reactions)
                 prescribed = float(np.abs(model.supports.values).sum())  # whose work has roundoff of forces
@@ -206,7 +206,7 @@ class StaticAnalysis:
             "skipped": self._skipped(case.moving),
         }
         fields = u, reactions, case.external
-        return result_of(Result, self, model, state.groups, fields, solution, balance, **report)
+        return result_of(Result, self, model, case.groups, fields, solution, balance, **report)
 
     def release(self) -> None:
         """Release the matrix and what is made of it; another solution makes them anew."""
@@ -233,7 +233,7 @@ class StaticAnalysis:
 
     def _initial_roundoff(self, forces: Array) -> float:
         """Return what rounding and the solver leave of the forces (n, 3) of an initial state, in N."""
-        if self._state.initial is None or self.system is None:
+        if self.system is None:
             return 0.0
         u0 = self.model.initial_displacement
         largest = 0.0 if u0 is None else float(np.abs(u0).max(initial=0.0))

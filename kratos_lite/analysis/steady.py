@@ -6,7 +6,7 @@ from kratos_lite.ale.checks import critical_rate_estimate, near_critical
 from kratos_lite.analysis.derived_quantities import motion_summary
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.modal import critical_rates
-from kratos_lite.analysis.nodal_loads import initial_loads, stress_load
+from kratos_lite.analysis.nodal_loads import at_temperature, initial_loads, stress_load
 from kratos_lite.analysis.result import Result, result_of
 from kratos_lite.analysis.solution_checks import (
     Phases,
@@ -52,8 +52,9 @@ def solve_steady(
         warnings += check_deformation(model, e.groups, e.system.scatter(u))
         reactions = model.supports.supported(e.system.scatter(A @ u - forces))
         inner = e.system.scatter(e.times_stiffness(u, 0.0) - e.K @ u)  # what the motion adds is a force, too
-        stresses = stress_load(model, e.groups, e.system.scatter(u))
-        initial = initial_loads(model, e.groups)
+        groups = at_temperature(model, e.groups, 0.0)
+        stresses = stress_load(model, groups, e.system.scatter(u))
+        initial = initial_loads(model, groups)
         stresses = stresses if initial is None else stresses - initial  # as in the load
         balance = equilibrium(model.mesh.points, nodal - inner, reactions, stresses)
         check_solution(solution, u, balance)
@@ -71,6 +72,6 @@ def solve_steady(
         "skipped": [] if rate or inertia.any() else ["convective terms, as the rate is 0"],
     }
     fields = e.system.scatter(u), reactions, nodal
-    result = result_of(Result, None, model, e.groups, fields, solution, balance, **report)
+    result = result_of(Result, None, model, groups, fields, solution, balance, **report)
     result.report.motion = motion_summary(e, result, critical)
     return result

@@ -274,7 +274,7 @@ class TransientAnalysis(ModelInTime):
         }
         with self._at(at) as (u, _, _, time):
             fields = at.u.copy(), at.reactions.copy(), e.system.scatter(e.load_of_result(u, time)).copy()
-            result = result_of(Result, None, model, e.groups_of_result(), fields, solution, **told)
+            result = result_of(Result, None, model, e.groups_of_result(time), fields, solution, **told)
         result.report.backward_error = residual
         if e.terms is not None:
             result.report.motion = motion_summary(e, result, self._monitor.of_mesh, at.time)

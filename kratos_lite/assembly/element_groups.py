@@ -77,6 +77,7 @@ class ElementGroup:
     rows: Ints  # (m,) int, indices of the elements in the mesh
     prestress: Array | None = None  # (m, 6) float in Pa, or None
     states: PointStates | None = None  # of a result, where the law is not linear
+    heating: Array | None = None  # (m, k) float in K, temperatures of the nodes beyond those without strain
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -125,9 +126,9 @@ class ElementGroup:
             return self
         stress = None if self.prestress is None else self.prestress[chosen]
         states = self.states and self.states.take(chosen)
-        return replace(
-            self, nodes=self.nodes[chosen], rows=self.rows[chosen], prestress=stress, states=states
-        )
+        heating = None if self.heating is None else self.heating[chosen]
+        nodes, rows = self.nodes[chosen], self.rows[chosen]
+        return replace(self, nodes=nodes, rows=rows, prestress=stress, states=states, heating=heating)
 
     def chunks(self, memory: int = CHUNK_BYTES, within: slice | None = None) -> Iterator[slice]:
         """Cut the group, or a slice of it, into slices whose matrices take about `memory` bytes each."""
@@ -138,9 +139,30 @@ class ElementGroup:
         for start in range(first, last, step):
             yield slice(start, min(start + step, last))
 
+    @property
+    def without_initial(self) -> ElementGroup:
+        """The group without prestress and thermal strain."""
+        return replace(self, prestress=None, heating=None)
+
+    def thermal_strain(self, chunk: slice, N: Array | None = None) -> Any:
+        """Return α ΔT of a chunk, (m, g, 6) at points with N (g, k), the Gauss points if not given, or 0.
+
+        Linear elements have the mean of their nodes.
+        """
+        if self.heating is None:
+            return 0.0
+        heating, nodes = self.heating[chunk], self.nodes.shape[1]
+        if N is None:
+            N = tabulate(self.element.shape, self.rule)[0]
+            N = np.full_like(N, 1 / nodes) if self.element.shape.degree == 1 else N
+        return np.einsum("mk,gk,i->mgi", heating, N, self.material.expansion)
+
     def initial_stress(self, chunk: slice) -> Array | float:
-        """Return the prestress of a chunk as (m, 1, 6), or 0."""
-        return 0.0 if self.prestress is None else self.prestress[chunk, None, :]
+        """Return the stress of a chunk where nothing is displaced, (m, 1 or g, 6), or 0."""
+        prestress = 0.0 if self.prestress is None else self.prestress[chunk, None, :]
+        if self.heating is None:
+            return prestress
+        return prestress - self.thermal_strain(chunk) @ self.material.C.T
 
 
 def by_mass_rule(points: Array, group: ElementGroup, factors: int, flow: bool = False) -> list[ElementGroup]:

@@ -93,7 +93,10 @@ def at_gauss(points: Array, group: ElementGroup, u: Array, *, stress: bool = Tru
         strain, found = of_law(points, group, u)
         return cauchy(points, group, u, found) if stress else strain
     if module := compiled("gauss", group.element):
-        return module.stress(*displaced(points, group, u, stress))
+        found = module.stress(*displaced(points, group, u, stress))
+        if not stress or group.heating is None:
+            return found
+        return found - group.thermal_strain(slice(None)) @ group.material.C.T
     parts = [value_at(group.at(points, chunk), group, u, chunk, stress) for chunk in group.chunks()]
     return np.concatenate(parts)
 
@@ -134,7 +137,8 @@ def internal_load(points: Array, groups: Sequence[ElementGroup], u: Array) -> Ar
     """Return ∫ B^T σ dV of displacements u (n, 3) as nodal forces (n, 3) in N."""
     total = np.zeros_like(points)
     for group in groups:
-        if module := compiled("gauss", group.element):
+        module = compiled("gauss", group.element)
+        if module and group.heating is None:
             total += module.internal_load(*displaced(points, group, u))
             continue
         for chunk in group.chunks():
@@ -148,7 +152,7 @@ def _internal_forces(element: KinematicLinear, group: ElementGroup, u: Array, ch
     if "local_system" not in element.custom:
         return element.internal_force(value_at(element, group, u, chunk), C)
     forces = custom.system(element, C, displacements)[1]
-    if group.prestress is None:
+    if group.prestress is None and group.heating is None:
         return forces
     stress = np.broadcast_to(group.initial_stress(chunk), (len(forces), len(group.rule), 6))
     return forces + element.internal_force(stress, C)
@@ -160,7 +164,7 @@ def totals(points: Array, groups: Sequence[ElementGroup], u: Array) -> tuple[flo
     for group in groups:
         if not group.is_linear:
             parts = [totals_of(points, group, u)]
-        elif module := compiled("gauss", group.element):
+        elif group.heating is None and (module := compiled("gauss", group.element)):
             parts = [module.totals(*displaced(points, group, u))]
         else:
             parts = [_totals(points, group, u, chunk) for chunk in group.chunks()]
@@ -174,12 +178,14 @@ def totals(points: Array, groups: Sequence[ElementGroup], u: Array) -> tuple[flo
 def _totals(points: Array, group: ElementGroup, u: Array, chunk: slice) -> tuple[float, float, int]:
     element = group.at(points, chunk)
     C, displacements = group.material.C, u[group.nodes[chunk]]
-    strain = element.strain(displacements, C)
+    strain = element.strain(displacements, C) - group.thermal_strain(chunk)
     elastic = strain @ C.T
     energy = float(((strain * elastic).sum(axis=-1) * element.dV).sum()) / 2
     if "local_system" in element.custom:
         energy = float((custom.system(element, C, displacements)[1] * displacements).sum()) / 2
-    mises = voigt.von_mises(elastic + group.initial_stress(chunk)).max(axis=1)
+    if group.prestress is not None:
+        elastic = elastic + group.prestress[chunk, None]
+    mises = voigt.von_mises(elastic).max(axis=1)
     return energy, float(mises.max()), chunk.start + int(mises.argmax())
 
 
@@ -187,7 +193,7 @@ def _totals(points: Array, group: ElementGroup, u: Array, chunk: slice) -> tuple
 
 
 def initial_strain(group: ElementGroup) -> Array | float:
-    """Return the elastic strain (m, 1, 6) of the prestress, or 0."""
+    """Return the elastic strain (m, 1 or g, 6) of prestress and temperature, or 0."""
     stress = group.initial_stress(slice(None))
     return stress @ np.linalg.inv(group.material.C) if isinstance(stress, np.ndarray) else 0.0
 
@@ -235,6 +241,7 @@ def energy_density(points: Array, group: ElementGroup, u: Array) -> Array:
     strain, stress = of_law(points, group, u)
     law, states = group.material, group.states
     if states is None:
+        strain = strain - group.thermal_strain(slice(None))
         return law.energy(strain, strain @ law.C.T, {})
     return law.energy(strain + initial_strain(group), stress, states.variables)
 

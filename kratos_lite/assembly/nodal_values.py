@@ -56,7 +56,7 @@ def averages(
 def _averages(points: Array, group: ElementGroup, u: Array, stress: bool) -> tuple[Array, Array]:
     """Return the sums of the nodal values (n, 6) of a group and the means of its elements (m, 6)."""
     to_nodes = as_double(extrapolation(group.element, group.rule))
-    if not group.is_linear:
+    if not group.is_linear or group.heating is not None:
         value, volume = at_gauss(points, group, u, stress=stress), volumes(points, group)
         means = np.einsum("mg,mgc->mc", volume / volume.sum(axis=1, keepdims=True), value)
         return _sums(group, value, len(points)), means
@@ -101,6 +101,9 @@ def at_located(groups: Sequence[ElementGroup], located: Located, u: Array, *, st
             if stress:
                 value = value @ group.material.C.T
                 value = value if group.prestress is None else value + group.prestress[cells]
+                if group.heating is not None:
+                    heating = _extrapolated(group, cells, xi[at], lambda g: g.thermal_strain(slice(None)))
+                    value = value - heating @ group.material.C.T
         out[at] = value
     return out.reshape(*located.rows.shape, 6)
 

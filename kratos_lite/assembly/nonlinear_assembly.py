@@ -11,6 +11,7 @@ points alone, so that they serve every law.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, TypeAlias
 
@@ -28,6 +29,8 @@ from kratos_lite.errors import MaterialError, SolveError
 from kratos_lite.shapes.inverse import determinant
 from kratos_lite.typing import Array
 
+Heating: TypeAlias = "Sequence[Array | float]"
+"""Temperatures (m, k) in K of the nodes of each group beyond those without strain, or 0."""
 States: TypeAlias = "list[PointStates | None]"
 """States of each group of elements; None where the law is linear."""
 POINTS = 4000
@@ -53,7 +56,7 @@ class NonlinearAssembly:
         self.place = place  # the words for an element in messages, of its index
         self._u0 = np.zeros(3 * len(points)) if u0 is None else u0
         self.symmetric = all(group.material.symmetric_tangent for group in groups)
-        self._linear = _only(groups, lambda group: group.is_linear)
+        self._linear = _only(groups, is_linear)
         self._lagrange = _only(groups, lambda group: group.element.finite and group.material.is_linear)
         self._dilatations = [None if g.material.is_linear else dilatation(self.points, g) for g in groups]
 
@@ -68,30 +71,32 @@ class NonlinearAssembly:
         return assemble_stiffness(self.points, self._linear, self.pattern), at_rest
 
     def evaluate(
-        self, u: Array, states: States, dt: float, *, tangent: bool = True
+        self, u: Array, states: States, dt: float, heating: Heating | None = None, *, tangent: bool = True
     ) -> tuple[Array, BlockMatrix | None, States]:
         """Return internal forces (3n,) in N, tangent stiffness and new states at displacements u (3n,).
 
-        `states` are those at the start of a step of `dt` s.  SolveError names an element that is turned
-        inside out; MaterialError says where a law fails.
+        `states` are those at the start of a step of `dt` s, `heating` is that at its end.  SolveError names
+        an element that is turned inside out; MaterialError says where a law fails.
         """
         u = self.strained(u)
         K, at_rest = self._linear_part
+        groups = self.groups if heating is None else heated_by(self.groups, heating)
+        if heating is not None:
+            at_rest = internal_load(self.points, _only(groups, is_linear), np.zeros_like(self.points))
         forces = at_rest + (K @ u.ravel()).reshape(-1, 3)
         data = K.data.copy() if tangent else None
         if any(map(len, self._lagrange)):
-            for place in np.flatnonzero([len(group) for group in self._lagrange]):
-                ElementRange(
-                    self, int(place), slice(None), u, None
-                ).strain()  # which looks for inverted elements
+            for number, group in enumerate(self._lagrange):
+                if len(group):  # it looks for inverted elements
+                    ElementRange(self, group, number, slice(None), u, None).strain()
             forces += finite_strain.internal_load(self.points, self._lagrange, u)
             if data is not None:
                 data += finite_strain.stiffness(self.points, self._lagrange, self.pattern, u).data
         new: States = []
-        for number, (group, state) in enumerate(zip(self.groups, states, strict=True)):
+        for number, (group, state) in enumerate(zip(groups, states, strict=True)):
             parts = []
             for elements in group.chunks(WINDOW_BYTES) if state is not None else ():
-                part = ElementRange(self, number, elements, u, data)
+                part = ElementRange(self, group, number, elements, u, data)
                 before = state.take(elements)  # type: ignore[union-attr]
                 add = part.add if before.modes is None else part.add_enhanced
                 parts.append(add(forces, before, dt))
@@ -101,6 +106,17 @@ class NonlinearAssembly:
     def strained(self, u: Array) -> Array:
         """Return the displacements (n, 3) that strain the body, those beyond the stress-free ones."""
         return (u - self._u0).reshape(-1, 3)
+
+
+def is_linear(group: ElementGroup) -> bool:
+    """Return whether stresses of a group are linear in the displacements."""
+    return group.is_linear
+
+
+def heated_by(groups: Sequence[ElementGroup], heating: Heating) -> list[ElementGroup]:
+    """Return groups with temperatures."""
+    every = zip(groups, heating, strict=True)
+    return [replace(group, heating=np.asarray(values) if np.any(values) else None) for group, values in every]
 
 
 def _only(groups: Sequence[ElementGroup], wanted: Callable[[ElementGroup], bool]) -> list[ElementGroup]:
@@ -138,11 +154,17 @@ class ElementRange:
     """Some elements of a group at displacements u (n, 3), whose forces and stiffness are added to totals."""
 
     def __init__(
-        self, assembly: NonlinearAssembly, number: int, elements: slice, u: Array, data: Array | None
+        self,
+        assembly: NonlinearAssembly,
+        group: ElementGroup,
+        number: int,
+        elements: slice,
+        u: Array,
+        data: Array | None,
     ) -> None:
-        chosen = np.zeros(len(assembly.groups[number]), dtype=bool)
+        chosen = np.zeros(len(group), dtype=bool)
         chosen[elements] = True
-        self.group, self.u, self.points = assembly.groups[number].take(chosen), as_double(u), assembly.points
+        self.group, self.u, self.points = group.take(chosen), as_double(u), assembly.points
         self.pattern, self.number, self.elements, self.data = assembly.pattern, number, elements, data
         self.place = assembly.place
         extra = assembly._dilatations[number]

@@ -184,7 +184,7 @@ class Recovery:
         self._last: tuple[Array, list[Array]] | None = None  # displacements, and C ε at nodes
 
     def nodal(self, u: Array, *, stress: bool = True) -> Array:
-        """Return recovered stresses with prestress in Pa, or strains, at nodes (n, 6)."""
+        """Return recovered stresses with initial ones in Pa, or strains, at nodes (n, 6)."""
         total, count = np.zeros((len(self.points), 6)), np.zeros(len(self.points))
         for region, values in self.by_region(u, stress=stress):
             total[region.nodes] += values
@@ -193,7 +193,7 @@ class Recovery:
 
     def by_region(self, u: Array, *, stress: bool = True) -> Iterator[tuple[Region, Array]]:
         """Yield each region with the values at its nodes (k, 6)."""
-        free = stress and all(group.prestress is None for group in self.groups)
+        free = stress and all(g.prestress is None and g.heating is None for g in self.groups)
         if free and self._last is not None and self._last[0] is u:
             yield from zip(self.regions, self._last[1], strict=True)
             return
@@ -230,7 +230,7 @@ class Recovery:
         known = self._last[1] if self._last is not None and self._last[0] is u else None
         recovered = []
         for i, region in enumerate(self.regions):
-            values = [at_gauss(self.points, replace(group, prestress=None), u) for group in region.groups]
+            values = [at_gauss(self.points, group.without_initial, u) for group in region.groups]
             recovered.append((values, known[i] if known else region.at_nodes(self.points, values)))
         if keep:
             self._last = u, [nodal for _, nodal in recovered]
@@ -260,7 +260,7 @@ def _compared_at(group: ElementGroup) -> ElementGroup:
     shape = group.element.shape
     if group.rule.degree >= 2 * shape.degree or not group.element.has_standard_strain():
         return group
-    return replace(group, prestress=None, rule=rule_for(shape.cell, 2 * shape.degree))
+    return replace(group.without_initial, rule=rule_for(shape.cell, 2 * shape.degree))
 
 
 def _joined(parts: Sequence[Array]) -> Array:

@@ -15,6 +15,7 @@ from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.loads import Load, TimeDependentLoad
 from kratos_lite.model.loads.body import Gravity
+from kratos_lite.model.loads.temperature import Temperature
 from kratos_lite.time_series import Factor, function_of
 from kratos_lite.typing import Array
 
@@ -78,6 +79,8 @@ def apply_load(load: BodyLoad | Load, body: FreeBody, amplitude: Factor | None) 
         applied = load.bind(body)
     elif not isinstance(load, Load):
         raise InputError(f"a load such as Gravity or Force is needed; got {type(load).__name__}")
+    elif isinstance(load, Temperature):
+        raise ModelError("a Temperature strains models; bodies in motion have none: leave it out")
     elif isinstance(load, Gravity) and load.where is None and np.ndim(load.force) == 1:
         applied = _gravity(load.force, body)
     elif body.mesh is None:

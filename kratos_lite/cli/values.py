@@ -133,7 +133,7 @@ def material(text: str) -> tuple[str | None, Material]:
     """Return part (or None) and material of ``[PART:][LAW:]constant=value,…``.
 
     >>> material("steel:E=210e9,nu=0.3")
-    ('steel', Isotropic3D(E=210000000000.0, nu=0.3, density=0.0))
+    ('steel', Isotropic3D(E=210000000000.0, nu=0.3, density=0.0, alpha=0.0))
     """
     from kratos_lite.materials import MATERIALS  # help and version do without NumPy
     from kratos_lite.tabular import names_of

@@ -88,7 +88,7 @@ class ElementProduct:
     """K, of which nobody has a matrix: its products element by element."""
 
     def __init__(self, points: Array, groups: Sequence[ElementGroup]) -> None:
-        self.points, self.groups = points, [replace(group, prestress=None) for group in groups]
+        self.points, self.groups = points, [group.without_initial for group in groups]
 
     def __matmul__(self, u: Array) -> Array:
         return internal_load(self.points, self.groups, u.reshape(-1, 3)).ravel()
@@ -211,7 +211,7 @@ class PartSystem:
         progress: Progress | None,
     ) -> None:
         self._points, self._partition, self._held = points, partition, held
-        self._elastic = [replace(group, prestress=None) for group in groups]
+        self._elastic = [group.without_initial for group in groups]
         ranks, self._tolerance = partition.ranks, tolerance
         given = parsed(options)
         part = partition.equations(points, self._elastic, held)

@@ -28,6 +28,7 @@ class DruckerPrager3D(IsotropicLaw):
     dilatancy : angle in degrees, 0 ≤ ψ ≤ φ; the flow is associated if it is φ.
     hardening : growth of the cohesion in Pa with the accumulated plastic strain, ≥ 0.
     density : kg/m³.
+    alpha : thermal expansion in 1/K; see `Temperature`.
 
     Raises
     ------
@@ -55,6 +56,7 @@ class DruckerPrager3D(IsotropicLaw):
     dilatancy: float = 0.0
     hardening: float = 0.0
     density: float = 0.0
+    alpha: float = 0.0
 
     positive: ClassVar[Mapping[str, str]] = {"cohesion": "Pa"}
     not_negative: ClassVar[Mapping[str, str]] = {"hardening": "Pa"}
@@ -66,6 +68,7 @@ class DruckerPrager3D(IsotropicLaw):
         "dilatancy": "DILATANCY_ANGLE",
         "hardening": "ISOTROPIC_HARDENING_MODULUS",
         "density": "DENSITY",
+        "alpha": "THERMAL_EXPANSION_COEFFICIENT",
     }
     internal_variables: ClassVar[Mapping[str, int]] = {"plastic_strain": 6, "accumulated_plastic_strain": 1}
 

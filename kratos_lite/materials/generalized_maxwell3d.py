@@ -23,6 +23,7 @@ class GeneralizedMaxwell3D(IsotropicLaw):
     E, nu : Young's modulus in Pa at once, and Poisson's ratio.
     w1, tau1, w2, tau2, w3, tau3 : fractions of the stiffness that relax, 0 ≤ Σ w ≤ 1, and times in s, > 0.
     density : kg/m³.
+    alpha : thermal expansion in 1/K; see `Temperature`.
 
     Raises
     ------
@@ -54,6 +55,7 @@ class GeneralizedMaxwell3D(IsotropicLaw):
     w3: float = 0.0
     tau3: float = 1.0
     density: float = 0.0
+    alpha: float = 0.0
 
     rate_dependent: ClassVar[bool] = True
     internal_variables: ClassVar[Mapping[str, int]] = {

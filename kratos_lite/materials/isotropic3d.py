@@ -21,6 +21,7 @@ class Isotropic3D(LinearMaterial):
     E : Young's modulus in Pa, > 0.
     nu : Poisson's ratio, -1 < nu < 0.5.
     density : kg/m³, ≥ 0.
+    alpha : thermal expansion in 1/K; see `Temperature`.
 
     Raises
     ------
@@ -37,6 +38,7 @@ class Isotropic3D(LinearMaterial):
     E: float
     nu: float
     density: float = 0.0
+    alpha: float = 0.0
 
     aliases: ClassVar[tuple[str, ...]] = (
         "LinearElastic3DLaw",
@@ -45,7 +47,12 @@ class Isotropic3D(LinearMaterial):
         "KratosMultiphysics.StructuralMechanicsApplication.LinearElastic3DLaw",
         "ElasticIsotropic3D",
     )
-    variables: ClassVar[dict[str, str]] = {"E": "YOUNG_MODULUS", "nu": "POISSON_RATIO", "density": "DENSITY"}
+    variables: ClassVar[dict[str, str]] = {
+        "E": "YOUNG_MODULUS",
+        "nu": "POISSON_RATIO",
+        "density": "DENSITY",
+        "alpha": "THERMAL_EXPANSION_COEFFICIENT",
+    }
 
     def check(self) -> None:
         """Check that E > 0 and -1 < nu < 0.5.

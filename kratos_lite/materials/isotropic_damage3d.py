@@ -27,6 +27,7 @@ class IsotropicDamage3D(IsotropicLaw):
     fracture_energy : J/m², > 0.
     linear : 1 for linear softening, 0 for exponential one.
     density : kg/m³.
+    alpha : thermal expansion in 1/K; see `Temperature`.
 
     Raises
     ------
@@ -54,6 +55,7 @@ class IsotropicDamage3D(IsotropicLaw):
     fracture_energy: float
     linear: float = 0.0
     density: float = 0.0
+    alpha: float = 0.0
 
     positive: ClassVar[Mapping[str, str]] = {"strength": "Pa", "fracture_energy": "J/m²"}
     variables: ClassVar[dict[str, str]] = {
@@ -62,6 +64,7 @@ class IsotropicDamage3D(IsotropicLaw):
         "strength": "YIELD_STRESS",
         "fracture_energy": "FRACTURE_ENERGY",
         "density": "DENSITY",
+        "alpha": "THERMAL_EXPANSION_COEFFICIENT",
     }
     internal_variables: ClassVar[Mapping[str, int]] = {"damage": 1, "threshold": 1, "element_length": 1}
 

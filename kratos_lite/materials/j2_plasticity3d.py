@@ -38,6 +38,7 @@ class J2Plasticity3D(VonMises):
     saturation_stress : Pa, ≥ yield_stress, to which the yield stress grows (Voce); 0 for none.
     exponent : rate of that growth, ≥ 0.
     density : kg/m³.
+    alpha : thermal expansion in 1/K; see `Temperature`.
 
     Raises
     ------
@@ -67,6 +68,7 @@ class J2Plasticity3D(VonMises):
     saturation_stress: float = 0.0
     exponent: float = 0.0
     density: float = 0.0
+    alpha: float = 0.0
 
     positive: ClassVar[Mapping[str, str]] = {"yield_stress": "Pa"}
     not_negative: ClassVar[Mapping[str, str]] = {
@@ -83,6 +85,7 @@ class J2Plasticity3D(VonMises):
         "saturation_stress": "EXPONENTIAL_SATURATION_YIELD_STRESS",
         "exponent": "HARDENING_EXPONENT",
         "density": "DENSITY",
+        "alpha": "THERMAL_EXPANSION_COEFFICIENT",
     }
     internal_variables: ClassVar[Mapping[str, int]] = {
         "plastic_strain": 6,

@@ -36,6 +36,7 @@ class J2Softening3D(VonMises):
     curve : 0 to soften linearly, 1 exponentially, 3 for perfect plasticity.
     compression : yield stress of compression in Pa, the same; 0 if not given.
     density : kg/m³.
+    alpha : thermal expansion in 1/K; see `Temperature`.
 
     Raises
     ------
@@ -67,6 +68,7 @@ class J2Softening3D(VonMises):
     curve: float = EXPONENTIAL
     compression: float = 0.0
     density: float = 0.0
+    alpha: float = 0.0
 
     positive: ClassVar[Mapping[str, str]] = {"yield_stress": "Pa", "fracture_energy": "J/m²"}
     aliases: ClassVar[tuple[str, ...]] = ("SmallStrainIsotropicPlasticity3DVonMisesVonMises",)
@@ -78,6 +80,7 @@ class J2Softening3D(VonMises):
         "curve": "HARDENING_CURVE",
         "compression": "YIELD_STRESS_COMPRESSION",
         "density": "DENSITY",
+        "alpha": "THERMAL_EXPANSION_COEFFICIENT",
     }
     internal_variables: ClassVar[Mapping[str, int]] = {
         "plastic_strain": 6,

@@ -10,6 +10,7 @@ from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
+from kratos_lite import voigt
 from kratos_lite.errors import MaterialError, SolveError
 from kratos_lite.registry import Registry
 from kratos_lite.tabular import names_of
@@ -145,6 +146,11 @@ class Material:
         MaterialError
             If one is beyond its bounds.
         """
+
+    @property
+    def expansion(self) -> Array:
+        """Thermal strain (6,) in 1/K: the constant `alpha` in all directions, if the law has it."""
+        return getattr(self, "alpha", 0.0) * voigt.UNIT
 
     def response(self, strain: Array, state: GaussState, dt: float) -> Response:
         """Return stress, tangent and internal variables at the end of a step; subclasses define it.

@@ -21,6 +21,7 @@ class Orthotropic3D(LinearMaterial):
     nu_xy, nu_yz, nu_xz : Poisson's ratios; nu_yx = nu_xy E_y / E_x and so on.
     G_xy, G_yz, G_xz : shear moduli in Pa.
     density : kg/m³, ≥ 0.
+    alpha_x, alpha_y, alpha_z : thermal expansion in 1/K; see `Temperature`.
 
     Raises
     ------
@@ -49,6 +50,9 @@ class Orthotropic3D(LinearMaterial):
     G_yz: float
     G_xz: float
     density: float = 0.0
+    alpha_x: float = 0.0
+    alpha_y: float = 0.0
+    alpha_z: float = 0.0
 
     aliases: ClassVar[tuple[str, ...]] = ("LinearElasticOrthotropic3DLaw",)
     positive: ClassVar[dict[str, str]] = dict.fromkeys(("E_x", "E_y", "E_z", "G_xy", "G_yz", "G_xz"), "Pa")
@@ -63,7 +67,15 @@ class Orthotropic3D(LinearMaterial):
         "G_yz": "SHEAR_MODULUS_YZ",
         "G_xz": "SHEAR_MODULUS_XZ",
         "density": "DENSITY",
+        "alpha_x": "THERMAL_EXPANSION_COEFFICIENT_X",
+        "alpha_y": "THERMAL_EXPANSION_COEFFICIENT_Y",
+        "alpha_z": "THERMAL_EXPANSION_COEFFICIENT_Z",
     }
+
+    @property
+    def expansion(self) -> Array:
+        """Thermal strain (6,) in 1/K."""
+        return np.array([self.alpha_x, self.alpha_y, self.alpha_z, 0.0, 0.0, 0.0])
 
     def why_unstable(self) -> str:
         """Name the pair of constants, if one, with nu_ij² ≥ E_i / E_j."""

@@ -17,7 +17,7 @@ class SaintVenantKirchhoff3D(Isotropic3D):
 
     Parameters
     ----------
-    E, nu, density : as of `Isotropic3D`.
+    E, nu, density, alpha : as of `Isotropic3D`; temperatures strain small strains alone.
 
     Raises
     ------

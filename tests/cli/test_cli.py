@@ -206,7 +206,7 @@ def test_a_script_says_the_same_as_options(run, box):
     told = run("info", "run.py")
     assert told.code == 0
     assert told.out.startswith("file         run.py\nnodes        27\n")
-    assert "material     Isotropic3D(E=210000000000.0, nu=0.3, density=7850.0)" in told.out
+    assert "material     Isotropic3D(E=210000000000.0, nu=0.3, density=7850.0, alpha=0.0)" in told.out
     assert "fixed        27 components" in told.out
     assert "load         Gravity" in told.out
     assert run("check", "run.py").out.startswith("run.py: 27 nodes, 8 elements, no errors")

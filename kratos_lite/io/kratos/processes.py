@@ -166,7 +166,7 @@ def _variable(settings: Settings, process: Process) -> str:
     kind, known = ("vector", KNOWN_VECTORS) if process.is_vector else ("scalar", KNOWN_SCALARS)
     name = settings.text("variable_name").rsplit(".", 1)[-1]
     if name == "TEMPERATURE":
-        text = "a TEMPERATURE is imposed, but there is no thermal strain; take the process out"
+        text = "a TEMPERATURE is imposed, which run files do not take; add a kl.Temperature in a script"
         raise settings.error("variable_name", text)
     if name not in known:
         text = f"{name!r} is not a {kind} variable of static solids.{nearest_variable(name, known)}"

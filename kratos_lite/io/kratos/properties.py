@@ -120,7 +120,7 @@ def material_from(values: dict[str, Any]) -> Material:
     """Return the material of a Properties block.
 
     >>> material_from({"YOUNG_MODULUS": 210e9, "POISSON_RATIO": 0.3})
-    Isotropic3D(E=210000000000.0, nu=0.3, density=0.0)
+    Isotropic3D(E=210000000000.0, nu=0.3, density=0.0, alpha=0.0)
     """
     law = values.get("CONSTITUTIVE_LAW")
     name = "Isotropic3D" if law is None else str(law)

@@ -16,6 +16,7 @@ from kratos_lite.materials import Material
 from kratos_lite.mesh import Block, Mesh, Part, with_rows
 from kratos_lite.model.loads import TimeDependentLoad
 from kratos_lite.model.loads.body import Gravity
+from kratos_lite.model.loads.temperature import Temperature
 from kratos_lite.shapes.faces import Point1
 from kratos_lite.solvers.constraints import Constraints
 from kratos_lite.tabular import names_of
@@ -33,6 +34,7 @@ def document_from(model: Model) -> Document:
     unwritten = {
         "a motion of the material": model.motion is not None,
         "a support that moves in time": bool(model.supports.motions),
+        "a temperature": any(isinstance(load, Temperature) for load in model.loads),
         "a load that changes in time": any(isinstance(load, TimeDependentLoad) for load in model.loads),
     }
     for what, is_present in unwritten.items():
@@ -99,7 +101,8 @@ def _values(material: Material, gravity: Array, prestress: Array) -> dict[str, A
     if name not in KRATOS_LAW:
         raise InputError(f"material {name} has no name in Kratos; model files hold {', '.join(KRATOS_LAW)}")
     constants = names_of(type(material))
-    values: dict[str, Any] = {material.variables[c]: float(getattr(material, c)) for c in constants}
+    stated = {material.variables[c]: float(getattr(material, c)) for c in constants}
+    values: dict[str, Any] = {name: v for name, v in stated.items() if v or "THERMAL" not in name}
     values["CONSTITUTIVE_LAW"] = KRATOS_LAW[name]
     if values["CONSTITUTIVE_LAW"] == USER_LAW:
         values["ELASTICITY_TENSOR"] = material.C

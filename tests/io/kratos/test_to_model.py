@@ -83,8 +83,8 @@ def test_a_component_that_contradicts_its_vector_is_refused(load):
 
 
 def test_properties_without_use_are_noted_but_not_those_that_are_zero(load):
-    notes = load("THICKNESS 0.5\nTHERMAL_EXPANSION_COEFFICIENT 1e-5\nTEMPERATURE 0").notes
-    text = "THICKNESS, THERMAL_EXPANSION_COEFFICIENT not used by a static solution of solids"
+    notes = load("THICKNESS 0.5\nVISCOSITY 1e-5\nTEMPERATURE 0").notes
+    text = "THICKNESS, VISCOSITY not used by a static solution of solids"
     assert f"Properties 1: {text}" in notes
     assert not any("TEMPERATURE" in note for note in notes)
 

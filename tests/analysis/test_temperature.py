@@ -1,0 +1,204 @@
+"""Thermal strain beside closed forms: statics, load cases, steps, transients, finer meshes; refusals."""
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.errors import InputError, KratosLiteError, ModelError
+from kratos_lite.mesh.refinement import refine
+from kratos_lite.model.refined import refined
+
+E, NU, ALPHA = 200e9, 0.3, 12e-6
+STEEL = kl.Isotropic3D(E, NU, density=7800.0, alpha=ALPHA)
+ELEMENTS = (
+    "KinematicLinear3D4N",
+    "KinematicLinear3D6N",
+    "KinematicLinear3D8N",
+    "BBar3D8N",
+    "EnhancedStrain3D8N",
+    "KinematicLinear3D10N",
+    "BBar3D10N",
+    "KinematicLinear3D20N",
+    "Reduced3D20N",
+    "KinematicLinear3D27N",
+)
+CLAMPED = -E * ALPHA * 100 / (1 - 2 * NU)
+
+
+def everywhere(X):
+    return np.ones(len(X), dtype=bool)
+
+
+@pytest.mark.parametrize("kernels", ["compiled", "numpy"])
+@pytest.mark.parametrize("element", ELEMENTS)
+def test_a_free_body_has_no_stress_and_a_clamped_one_no_strain(element, kernels, monkeypatch):
+    monkeypatch.setenv("KRATOS_LITE_KERNELS", kernels)
+    model = kl.Model(kl.box((1, 1, 2), (2, 2, 2), element), STEEL)
+    for side, axis in (("x-", "x"), ("y-", "y"), ("z-", "z")):
+        model.fix(side, axis)
+    model.add(kl.Temperature(120.0, reference=20.0))
+    result = model.solve()
+    assert np.abs(result.u - 100 * ALPHA * model.mesh.points).max() < 1e-12
+    assert np.abs(result.stress()).max() < 1e-9 * E * ALPHA * 100
+    model.fix(everywhere, "xyz", override=True)
+    result = model.solve()
+    for place in ("gauss", "element", "node", "averaged", "raw"):
+        stress = result.stress(place)
+        assert np.abs(stress[..., :3] - CLAMPED).max() < 1e-12 * -CLAMPED
+        assert np.abs(stress[..., 3:]).max() < 1e-12 * -CLAMPED
+    inside = result.at((0.3, 0.4, 0.7))
+    assert np.abs(inside.stress[:3] - CLAMPED).max() < 1e-12 * -CLAMPED
+    density = -1.5 * CLAMPED * ALPHA * 100  # ½ σ : (-α ΔT)
+    assert abs(result.energy() - 2 * density) < 1e-12 * density
+    for place in ("gauss", "element", "node"):
+        assert np.abs(result.field("strain_energy_density", place) - density).max() < 1e-12 * density
+    assert abs(inside.strain_energy_density - density) < 1e-12 * density
+
+
+@pytest.mark.parametrize("element", ["KinematicLinear3D10N", "KinematicLinear3D20N", "KinematicLinear3D27N"])
+def test_a_linear_temperature_bends_a_free_body_without_stress(element):
+    model = kl.Model(kl.box((1, 1, 2), (2, 2, 2), element), STEEL)
+    model.add(kl.Temperature(lambda X: 20 + 100 * X[:, 2] + 30 * X[:, 0], reference=20.0))
+    result = model.solve()
+    assert np.abs(result.u).max() > 1e-3
+    assert np.abs(result.stress("node")).max() < 1e-9 * E * ALPHA * 100
+
+
+def test_a_bimetal_strip_bends_as_timoshenko_says():
+    """Timoshenko, J. Opt. Soc. Am. 11 (1925) 233: two like layers bend by 1/ρ = 3 Δα ΔT / 2 h."""
+    length, h, T = 40.0, 1.0, 50.0
+    model = kl.Model(
+        kl.box((length, 1, h), (20, 1, 2), "KinematicLinear3D20N"), kl.Isotropic3D(E, 0.0, alpha=1e-5)
+    )
+    centers = model.mesh.points[model.mesh.blocks[0].nodes].mean(axis=1)
+    model.assign(kl.Isotropic3D(E, 0.0, alpha=3e-5), np.flatnonzero(centers[:, 2] > h / 2))
+    model.fix("x-", "x")
+    model.fix((0.0, 0.0, 0.0), "yz")
+    model.fix((0.0, 1.0, 0.0), "z")
+    model.add(kl.Temperature(T))
+    w = model.solve().at((length, 0.5, 0.0)).displacement[2]
+    assert abs(w / (-3 * 2e-5 * T / (2 * h) * length**2 / 2) - 1) < 0.01
+
+
+def test_a_hot_cylinder_between_walls_has_the_stress_of_the_closed_form():
+    """Timoshenko & Goodier, Theory of Elasticity (1970), article 151; T = T₀ ln(b/r) / ln(b/a)."""
+    a, b, T0 = 1.0, 2.0, 100.0
+    mesh = kl.annulus(a, b, 0.1, cells=(8, 24, 1), element="KinematicLinear3D20N")
+    model = kl.Model(mesh, STEEL)
+    model.fix(everywhere, "z")
+    model.fix((a, 0.0, 0.0), "y")
+    model.fix((-a, 0.0, 0.0), "y")
+    model.fix((0.0, a, 0.0), "x")
+    model.add(kl.Temperature(lambda X: T0 * np.log(b / np.hypot(X[:, 0], X[:, 1])) / np.log(b / a)))
+    result = model.solve()
+    size = E * ALPHA * T0 / (2 * (1 - NU) * np.log(b / a))
+    for r in (1.0, 1.4, 2.0):
+        ln, ratio = np.log(b / r), a**2 / (b**2 - a**2)
+        hoop = size * (1 - ln - ratio * (1 + b**2 / r**2) * np.log(b / a))
+        stress = result.at((r, 0, 0.05)).stress
+        assert abs(stress[1] - hoop) < 0.01 * size
+        assert abs(stress[0] - size * (-ln - ratio * (1 - b**2 / r**2) * np.log(b / a))) < 0.01 * size
+
+
+def rod(law=STEEL, **options):
+    """Return a rod between walls along z, free to swell across."""
+    model = kl.Model(kl.box((1, 1, 2), (1, 1, 2), "Element3D8N"), law, **options)
+    for side, axis in (("x-", "x"), ("y-", "y"), ("z-", "z"), ("z+", "z")):
+        model.fix(side, axis)
+    return model
+
+
+def test_load_cases_amplitudes_and_parts_scale_it():
+    model = rod()
+    hot, pull = kl.Temperature(100.0), kl.Traction("x+", (1e6, 0, 0))
+    cases = model.solve_cases({"hot": hot, "pull": pull, "both": [hot, pull], "twice": [hot, hot]})
+    stress = {name: result.stress() for name, result in cases.items()}
+    assert np.abs(stress["hot"][..., 2] + E * ALPHA * 100).max() < 1.0
+    assert np.abs(stress["hot"] + stress["pull"] - stress["both"]).max() < 1.0
+    assert np.abs(2 * stress["hot"] - stress["twice"]).max() < 1.0
+    assert np.abs(cases["hot"].report.total_load).max() == 0.0
+    model.add(hot, amplitude=lambda t: 0.5 + t)
+    assert np.abs(model.solve().stress() - 0.5 * stress["hot"]).max() < 1.0
+    half = rod(kl.Orthotropic3D(E, E, E, 0, 0, 0, E, E, E, alpha_z=ALPHA))
+    half.add(kl.Temperature(100.0, where=[0]))
+    assert np.abs(half.solve().stress("element")[:, 2] + E * ALPHA * 50).max() < 1.0
+
+
+def test_steps_of_any_law_flow_where_it_is_too_hot():
+    metal = kl.J2Plasticity3D(E, NU, yield_stress=200e6, alpha=ALPHA)
+    model = rod(metal)
+    model.add(kl.Temperature(100.0), amplitude=lambda t: t)
+    analysis, found = model.quasi_static(), []
+    for state in kl.integrate(analysis, 0.25, 8):
+        result = analysis.result()
+        found.append(result.stress("element")[0, 2])
+        exact = -min(E * ALPHA * 100 * state.time, 200e6)
+        assert abs(found[-1] - exact) < 1e-6 * 200e6
+    assert np.abs(analysis.result(state).stress() - result.stress()).max() == 0.0
+    glue = kl.GeneralizedMaxwell3D(E, NU, 0.0, 1.0, alpha=ALPHA)
+    linear, any_law = rod(formulation="b_bar"), rod(glue, formulation="b_bar")
+    for each in (linear, any_law):
+        each.add(kl.Temperature(lambda X: 50 * X[:, 2]))
+    one, other = linear.solve(), any_law.solve()
+    assert np.abs(one.u - other.u).max() < 1e-8 * np.abs(one.u).max()
+    assert abs(one.energy() - other.energy()) < 1e-6 * one.energy()
+
+
+@pytest.mark.parametrize("law", [STEEL, kl.J2Plasticity3D(E, NU, 1e12, density=7800.0, alpha=ALPHA)])
+def test_a_transient_is_heated_at_once_and_moves_then(law):
+    model = kl.Model(kl.box((1, 1, 2), (1, 1, 2), "Element3D8N"), law)
+    model.fix("z-")
+    model.add(kl.Temperature(100.0))
+    transient = model.transient()
+    next(kl.integrate(transient, 1e-9, 1))
+    stress = transient.result().stress("element")[:, :3]
+    assert np.abs(stress / CLAMPED - 1).max() < 1e-3
+
+
+def test_finer_meshes_and_files_have_it_or_say_so(tmp_path):
+    values = rod().mesh.points[:, 2] * 50
+    for given, slope in ((values, 50.0), (lambda X: 50 * X[:, 2], 50.0), (60.0, 0.0)):
+        model = rod()
+        model.add(kl.Temperature(given, reference=60.0))
+        finer = refined(model, refine(model.mesh))
+        T = finer.loads[0].difference(finer.mesh)
+        assert np.abs(T - slope * finer.mesh.points[:, 2] + (60 if slope else 0)).max() < 1e-12
+    with pytest.raises(InputError, match="a temperature cannot be written"):
+        kl.write(tmp_path / "rod.mdpa", model)
+    kl.write(tmp_path / "cold.mdpa", rod())
+    assert kl.read(tmp_path / "cold.mdpa").solve is not None
+    assert "1.2e-05" in (tmp_path / "cold.mdpa").read_text()
+
+
+@pytest.mark.parametrize(
+    ("act", "words"),
+    [
+        (lambda: rod().add(kl.Temperature(np.zeros(5))), r"need shape \(12,\)"),
+        (lambda: rod().add(kl.Temperature(20.0, where="lid")), "lid"),
+        (lambda: kl.Temperature(np.zeros((3, 3))), "a number or"),
+        (lambda: kl.Temperature("hot"), "temperatures"),
+        (lambda: kl.Temperature(20.0, reference=np.nan), "reference temperature"),
+        (lambda: rod().add(kl.Temperature(lambda x, y, z: x)), "temperature|argument"),
+        (lambda: kl.RigidBody(kl.box(), STEEL).add(kl.Temperature(20.0)), "bodies in motion"),
+    ],
+)
+def test_what_is_no_temperature_is_refused(act, words):
+    with pytest.raises((KratosLiteError, TypeError), match=words):
+        act()
+
+
+def test_large_strains_are_refused():
+    model = kl.Model(kl.box(element="TotalLagrangianElement3D8N"), STEEL)
+    model.fix("z-")
+    model.add(kl.Temperature(100.0))
+    with pytest.raises(ModelError, match="a temperature strains elements of small strains"):
+        model.solve()
+
+
+def test_orthotropic_bodies_swell_by_axes():
+    law = kl.Orthotropic3D(1e9, 2e9, 3e9, 0.2, 0.2, 0.2, 1e9, 1e9, 1e9, 0.0, 1e-5, 2e-5, 3e-5)
+    model = kl.Model(kl.box(element="KinematicLinear3D8N"), law)
+    for side, axis in (("x-", "x"), ("y-", "y"), ("z-", "z")):
+        model.fix(side, axis)
+    model.add(kl.Temperature(100.0))
+    assert np.abs(model.solve().u - model.mesh.points * [1e-3, 2e-3, 3e-3]).max() < 1e-12
