@@ -83,7 +83,7 @@ def test_order_of_central_differences_with_damping(alpha):
         options = {"velocity": 1e-3 * model().mesh.points, "rayleigh": (alpha, 0.0)}
         transient = model().transient(integrator=kl.CentralDifference(), **options)
         h = 0.4 * transient.critical_step()
-        ends.append([state.u for state in kl.integrate(transient, h / n, 60 * n, every=60 * n)][-1])
+        ends.append([state.u for state in kl.integrate(transient, h / n, 30 * n, every=30 * n)][-1])
     coarse, fine = (np.abs(end - ends[2]).max() for end in ends[:2])
     assert coarse / fine == pytest.approx(4 * (1 - 16.0**-2) / (1 - 8.0**-2), rel=0.2)
 

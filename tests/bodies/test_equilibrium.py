@@ -1,5 +1,7 @@
 """Equilibrium of deformable bodies: columns and cubes in closed form, supports of every kind."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 
@@ -30,11 +32,8 @@ def confine(body, sides=ROLLERS):
 # ---- the cube between rollers ----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("cells", [1, 2, 4])
-@pytest.mark.parametrize("element", ALL)
+@pytest.mark.parametrize(("element", "cells"), [*product(ALL, (1, 2)), (ALL[0], 4)])
 def test_a_cube_settles_under_its_weight(element, cells):
-    if cells == 4 and element not in ALL[:4]:
-        pytest.skip("four cells a side are for linear elements")
     body = cube(cells, element, formulation="corotational")
     confine(body)
     body.add(kl.Gravity((0, 0, -G)))
