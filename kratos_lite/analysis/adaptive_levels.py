@@ -52,7 +52,7 @@ class Level:
     @cached_property
     def norm(self) -> float:
         """‖u‖ in √J."""
-        return float(np.sqrt(2 * self.result.energy()))
+        return self.result.norm
 
     @cached_property
     def order(self) -> int:

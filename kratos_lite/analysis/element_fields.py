@@ -412,5 +412,13 @@ class ElementFields:
         return self._totals
 
     def energy(self) -> float:
-        """Return the strain energy ½ ∫ ε:C:ε dV in J."""
+        """Return the strain energy ½ ∫ ε:C:ε dV in J, of the elastic strain where a temperature acts."""
         return self._totals[0]
+
+    @cached_property
+    def norm(self) -> float:
+        """The energy norm √(∫ ε:C:ε dV) in √J of the strains, thermal ones among them."""
+        cold = [replace(group, heating=None) for group in self.groups]
+        hot = any(group.heating is not None for group in self.groups)
+        energy = totals(self.mesh.points, cold, self._strained)[0] if hot else self.energy()
+        return float(np.sqrt(2 * energy))

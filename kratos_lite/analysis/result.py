@@ -283,7 +283,7 @@ class Result(ElementFields, Tabular):
         from kratos_lite.analysis.error_estimate import energy_error  # as for the recovery
 
         squares = self._recovery.products(self._strained, self._strained, self.mesh.n_elements)
-        return energy_error(*squares, 2 * self.energy(), self.groups, self.mesh)
+        return energy_error(*squares, self.norm**2, self.groups, self.mesh)
 
     def _stated_error(self) -> str:
         """Return the error for the table: the one that was asked for, which its meshes have corrected."""
