@@ -13,7 +13,7 @@ import pytest
 
 import kratos_lite as kl
 
-ROCK = kl.Isotropic3D(E=1e9, nu=0.3, density=2000.0)
+ROCK = kl.Isotropic3D(E=1e9, nu=0.3, density=2000.0, alpha=1e-5)
 BRICK = kl.KinematicLinear3D8N
 BALL = kl.MassProperties(2.0, np.eye(3))
 CUBE, WHEEL = kl.box(), kl.annulus(0.5, 1.0, 0.2, (1, 32, 1), BRICK.__name__)
@@ -127,6 +127,8 @@ CASES: Case = {
     ("Mesh.area", "where"): (CUBE.area, TOP),
     ("LineLoad", "where"): (lambda v: loaded(kl.LineLoad(v, VECTOR)), NODES),
     ("LineLoad", "traction"): (lambda v: kl.LineLoad("z+", v).traction, VECTOR),
+    ("Temperature", "values"): (lambda v: loaded(kl.Temperature(v)), np.arange(8.0)),
+    ("Temperature", "where"): (lambda v: loaded(kl.Temperature(20.0, where=v)), [0]),
     ("NodalForces", "values"): (lambda v: loaded(kl.NodalForces(v)), U),
     ("Result.displacement", "where"): (RESULT.displacement, NODES),
     ("Result.reaction", "where"): (RESULT.reaction, NODES),
@@ -393,5 +395,6 @@ ELSEWHERE = {
     *(("material_point", name) for name in ("strain", "stress")),
     ("PlacedCell", "X"),
     ("Block", "shape"),
+    ("UMAT", "constants"),
 }
-"""Arguments of bases, of pictures, and of shapes, which trust their callers."""
+"""Arguments of bases, of pictures, of shapes, which trust their callers, and of subroutines."""
