@@ -7,11 +7,13 @@ import doctest
 import json
 import platform
 import sys
+from importlib.metadata import distributions
 from pathlib import Path
 
 import numpy as np
 import pytest
 from over_ranks import needs_mpi
+from run_files import CLAMP, box_mdpa, materials, process, run_file, write
 from scenes import OURS
 from scipy import sparse
 
@@ -28,6 +30,7 @@ from benchmarks import (  # noqa: E402
     curves,
     driver,
     dynamics,
+    folders,
     hard_scenes,
     laws,
     motion,
@@ -41,6 +44,7 @@ from benchmarks import (  # noqa: E402
 from benchmarks.programs import PROGRAMS, RANKS, SOLVERS  # noqa: E402
 from kratos_lite.verification import errors, fields  # noqa: E402
 
+CONSTITUTIVE_LAWS = any(one.name == "KratosConstitutiveLawsApplication" for one in distributions())
 E, NU = 1.0, 0.3
 RNG = np.random.default_rng(5)
 
@@ -297,6 +301,36 @@ def test_laws_beside_another_program():
     assert "| > 9 s |" in page
     assert page.endswith("J2 3.1.\n")
     assert "failed" in laws.timed(sys.executable, "ours", "clay", 2)
+
+
+def folder_rows(folder, monkeypatch, law, *names):
+    """Return the rows of a pulled box with a law, in a folder below that from which names count."""
+    lift = process("assign_scalar_variable_process", "Structure.Top", "DISPLACEMENT_Z", value="0.01*t")
+    variables = {"YIELD_STRESS": 4e6, "ISOTROPIC_HARDENING_MODULUS": 1e8}
+    write(folder, box_mdpa(), "box.mdpa")
+    write(folder, materials("Structure.Body", 0.0, 2e9, 0.3, law, **variables), "materials.json")
+    (folder / "below").mkdir()
+    for name in names:
+        content = run_file([CLAMP, lift], [], mesh=name, step=0.5, analysis_type="non_linear")
+        write(folder / "below", content, f"{name}_parameters.json")
+    monkeypatch.setattr(folders, "PAGE", folder / "page.md")
+    command.main(["folders", str(folder), "--python", sys.executable])
+    return (folder / "page.md").read_text()
+
+
+def test_folders_of_kratos_that_are_refused_say_why(tmp_path, monkeypatch):
+    page = folder_rows(tmp_path, monkeypatch, "Clay", "box", "none")
+    element = "SmallDisplacementElement3D8N"
+    refused = "refused |  |  | 'Clay' is not a law that kratos_lite has |"
+    assert f"| below/box | {element} | Clay |  | {refused}\n" in page
+    assert "| below/none |  | Clay |  | file not at hand |  |  | none |\n" in page
+    assert "have no run files. 1 refused, 1 file not at hand." in page
+
+
+@pytest.mark.skipif(not CONSTITUTIVE_LAWS, reason="KratosConstitutiveLawsApplication is not installed")
+def test_folders_of_kratos_agree(tmp_path, monkeypatch):
+    page = folder_rows(tmp_path, monkeypatch, "PlasticityIsotropicKinematicJ2Law", "box")
+    assert "| 2 | agrees | " in page
 
 
 def test_scenes_that_may_stall_have_ratios_to_the_block_and_to_other_solvers():

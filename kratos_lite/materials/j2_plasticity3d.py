@@ -76,7 +76,11 @@ class J2Plasticity3D(VonMises):
         "kinematic": "Pa",
         "exponent": "",
     }
-    aliases: ClassVar[tuple[str, ...]] = ("SmallStrainJ2Plasticity3DLaw", "SmallStrainJ2Plasticity3D")
+    aliases: ClassVar[tuple[str, ...]] = (
+        "SmallStrainJ2Plasticity3DLaw",
+        "SmallStrainJ2Plasticity3D",
+        "PlasticityIsotropicKinematicJ2Law",
+    )
     variables: ClassVar[dict[str, str]] = {
         "E": "YOUNG_MODULUS",
         "nu": "POISSON_RATIO",
