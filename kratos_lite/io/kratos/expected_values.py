@@ -142,7 +142,7 @@ def file_comparisons(settings: Settings, context: RunContext) -> Iterator[Callab
     def at(section: Settings, name: str, weights: Array) -> Array:
         series = np.atleast_1d(finite(section.get(name, []), section.name(name)))
         if len(series) != len(weights):
-            raise ValueError(f"{name} must be a list with one number for each TIME")
+            raise ValueError(f"{section.name(name)} must be a list with one number for each TIME")
         return np.asarray(weights @ series)
 
     def at_nodes(component: str, result: Result, time: float) -> tuple[Array, Array]:
@@ -172,6 +172,9 @@ def file_comparisons(settings: Settings, context: RunContext) -> Iterator[Callab
                 names += [f"element {ids[row]}, point {k}" for k in range(len(order))]
         if not names:
             raise ValueError("its part has no elements")
+        sizes = {value.size for value in (*values, *wanted)}
+        if len(sizes) > 1:
+            raise ValueError(f"{variable} has {' and '.join(map(str, sorted(sizes)))} components")
         expected = np.array(wanted)
         allowed = np.maximum(absolute, relative * np.abs(expected))
         return _worst(np.array(values), expected, allowed, lambda i: names[i[0]])

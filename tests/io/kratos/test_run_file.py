@@ -245,13 +245,29 @@ def test_expected_values_are_compared_as_kratos_does(folder, settings, words):
             {"check_variables": [], "gauss_points_check_variables": ["PK2"]},
             "kratos_lite has no PK2 at Gauss points here",
         ),
+        (
+            {
+                "TIME": [0.0, 2.0],
+                "ELEMENT_1": {"CAUCHY_STRESS_VECTOR": {str(i): [[0.0] * 3] * 2 for i in range(8)}},
+            },
+            {"check_variables": [], "gauss_points_check_variables": ["CAUCHY_STRESS_VECTOR"]}
+            | {"model_part_name": "First"},
+            "CAUCHY_STRESS_VECTOR has 3 and 6 components",
+        ),
+        (
+            {"TIME": [0.0, 2.0]},
+            {"check_variables": [], "gauss_points_check_variables": ["CAUCHY_STRESS_VECTOR"]}
+            | {"model_part_name": "None"},
+            "its part has no elements",
+        ),
         ({}, {"model_part_name": "None"}, "its part has no nodes"),
         ({}, {"input_file_name": "none.json"}, "check against none.json not evaluated: "),
     ],
 )
 def test_expected_values_of_a_file_are_compared_at_the_last_time(folder, content, settings, words):
     parts = "Begin SubModelPart One\nBegin SubModelPartNodes\n1\nEnd SubModelPartNodes\nEnd SubModelPart\n"
-    parts += "Begin SubModelPart None\nEnd SubModelPart\n"
+    parts += "Begin SubModelPart None\nEnd SubModelPart\nBegin SubModelPart First\n"
+    parts += "Begin SubModelPartElements\n1\nEnd SubModelPartElements\nEnd SubModelPart\n"
     (folder / "box.mdpa").write_text(box_mdpa() + parts)
     write(folder, content, "reference.json")
     entry = file_check(**{"check_variables": ["DISPLACEMENT_X"], **settings})
