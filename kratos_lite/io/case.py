@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -150,6 +151,12 @@ class Comparison:
     def __call__(self, result: Result) -> str:
         """Return the line of a result at the end."""
         return self.line([self.found(result, self.end)])
+
+    def is_due(self, time: float) -> bool:
+        """Return whether it is made after a step to a time."""
+        slack = 1e-9 * abs(time)
+        k = bisect_left(self.times, time - slack)
+        return k < len(self.times) and self.times[k] <= time + slack
 
     def found(self, result: Result, time: float) -> tuple[float, str]:
         """Return by how much a result exceeds the tolerance, and the words for it."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 from typing import TypeAlias
@@ -17,6 +18,7 @@ from kratos_lite.io.kratos.context import RunContext, interval_of
 from kratos_lite.io.kratos.expressions import evaluate
 from kratos_lite.io.kratos.processes import refuse_local_axes
 from kratos_lite.io.settings import Settings, find_file, is_number, read_settings, shown
+from kratos_lite.mesh import Part
 from kratos_lite.typing import Array, Ints
 from kratos_lite.validation import finite
 
@@ -114,6 +116,68 @@ def node_comparisons(settings: Settings, context: RunContext) -> Iterator[Callab
         yield Comparison(what, [time for time in context.times[1:] if acts(time)], context.times[-1], compare)
 
 
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """A file of json_output_process, with whose values those of a part are compared."""
+
+    data: Settings
+    part: Part
+    absolute: float
+    relative: float
+
+    def place(self, time: float) -> float:
+        """Return where a time lies among those of the file."""
+        instants = self.data.numbers("TIME")
+        if not instants or not instants[0] - 1e-9 <= time <= instants[-1] + 1e-9:
+            raise ValueError(f"the file has no values at time {time:g} s")
+        return float(np.interp(time, instants, np.arange(len(instants))))
+
+    def at(self, section: Settings, name: str, place: float) -> Array:
+        """Return the value of a key, or its components."""
+        series = np.atleast_1d(finite(section.get(name, []), section.name(name)))
+        if len(series) != len(self.data.values["TIME"]):
+            raise ValueError(f"{section.name(name)} must be a list with one number for each TIME")
+        before, after = series[int(place)], series[int(np.ceil(place))]
+        return np.asarray(before + (place - int(place)) * (after - before))
+
+    def allowed(self, wanted: Array) -> Array:
+        """Return the differences that values may have."""
+        return np.maximum(self.absolute, self.relative * np.abs(wanted))
+
+    def at_nodes(self, component: str, result: Result, time: float) -> tuple[Array, Array]:
+        """Return expected values of a component on nodes and allowed differences."""
+        now, ids = self.place(time), result.mesh.node_ids[self.part.nodes]
+        wanted = [self.at(self.data.section(f"NODE_{i}", required=True), component, now) for i in ids]
+        return np.array(wanted), self.allowed(np.array(wanted))
+
+    def at_gauss(self, variable: str, result: Result, time: float) -> tuple[float, str]:
+        """Compare a variable at Gauss points."""
+        fields, ids = known(result.groups), result.mesh.element_ids
+        field = next((key for key, each in fields.items() if each.kratos == variable), None)
+        if field is None or "gauss" not in fields[field].where:
+            raise ValueError(f"kratos_lite has no {variable} at Gauss points here")
+        now = self.place(time)
+        every, found = result.field(field, "gauss"), list[tuple[Array, Array, str]]()
+        chosen = set(self.part.elements.tolist())
+        for group in result.groups:
+            count, own = group.nodes.shape[1], group.rule is group.element.rule
+            order = ORDER_OF_POINTS.get(count, []) if own else []
+            for row in filter(chosen.__contains__, group.rows.tolist()):
+                if not order:
+                    raise ValueError(f"Gauss points of elements with {count} nodes are not those of Kratos")
+                points = self.data.section(f"ELEMENT_{ids[row]}", required=True).section(variable)
+                for i, k in enumerate(order):
+                    value, wanted = np.ravel(every[row][k]), np.ravel(self.at(points, str(i), now))
+                    if len(value) != len(wanted):
+                        raise ValueError(f"{variable} has {len(value)} components, {len(wanted)} in the file")
+                    found.append((value, wanted, f"element {ids[row]}, point {i}"))
+        if not found:
+            raise ValueError("its part has no elements")
+        values, wanted_all, names = zip(*found, strict=True)
+        expected = np.array(wanted_all)
+        return _worst(np.array(values), expected, self.allowed(expected), lambda i: names[i[0]])
+
+
 def file_comparisons(settings: Settings, context: RunContext) -> Iterator[Callable[[Result], str]]:
     """Yield the comparisons of from_json_check_result_process: values of a reference file.
 
@@ -130,65 +194,20 @@ def file_comparisons(settings: Settings, context: RunContext) -> Iterator[Callab
     context.part(settings)
     part, data = context.part(settings, key), read_settings(path)
     absolute, relative = settings.number("tolerance", 1e-3), settings.number("relative_tolerance", 1e-6)
-    frequency = settings.number("time_frequency", 0.1)
-
-    def weights(time: float) -> Array:
-        """Return by how much each TIME of a file of json_output_process counts at a time."""
-        instants = data.numbers("TIME")
-        if not instants or not instants[0] - 1e-9 <= time <= instants[-1] + 1e-9:
-            raise ValueError(f"the file has no values at time {time:g} s")
-        return np.array([np.interp(time, instants, unit) for unit in np.eye(len(instants))])
-
-    def at(section: Settings, name: str, weights: Array) -> Array:
-        series = np.atleast_1d(finite(section.get(name, []), section.name(name)))
-        if len(series) != len(weights):
-            raise ValueError(f"{section.name(name)} must be a list with one number for each TIME")
-        return np.asarray(weights @ series)
-
-    def at_nodes(component: str, result: Result, time: float) -> tuple[Array, Array]:
-        now, ids = weights(time), result.mesh.node_ids[part.nodes]
-        wanted = np.array([at(data.section(f"NODE_{i}", required=True), component, now) for i in ids])
-        return wanted, np.maximum(absolute, relative * np.abs(wanted))
-
-    def at_gauss(variable: str, result: Result, time: float) -> tuple[float, str]:
-        field = next((key for key, each in known(result.groups).items() if each.kratos == variable), None)
-        if field is None or "gauss" not in known(result.groups)[field].where:
-            raise ValueError(f"kratos_lite has no {variable} at Gauss points here")
-        values, wanted, names, now = list[Array](), list[Array](), list[str](), weights(time)
-        every, ids, chosen = (
-            result.field(field, "gauss"),
-            result.mesh.element_ids,
-            set(part.elements.tolist()),
-        )
-        for group in result.groups:
-            count, own = group.nodes.shape[1], group.rule is group.element.rule
-            order = ORDER_OF_POINTS.get(count, []) if own else []
-            for row in filter(chosen.__contains__, group.rows.tolist()):
-                if not order:
-                    raise ValueError(f"Gauss points of elements with {count} nodes are not those of Kratos")
-                points = data.section(f"ELEMENT_{ids[row]}", required=True).section(variable)
-                values += [np.ravel(every[row][k]) for k in order]
-                wanted += [np.ravel(at(points, str(k), now)) for k in range(len(order))]
-                names += [f"element {ids[row]}, point {k}" for k in range(len(order))]
-        if not names:
-            raise ValueError("its part has no elements")
-        sizes = {value.size for value in (*values, *wanted)}
-        if len(sizes) > 1:
-            raise ValueError(f"{variable} has {' and '.join(map(str, sorted(sizes)))} components")
-        expected = np.array(wanted)
-        allowed = np.maximum(absolute, relative * np.abs(expected))
-        return _worst(np.array(values), expected, allowed, lambda i: names[i[0]])
-
+    reference, frequency = Reference(data, part, absolute, relative), settings.number("time_frequency", 0.1)
     counter, times = 0.0, list[float]()
     for before, time in pairwise(context.times):  # as Kratos counts
         counter += time - before
         if counter > frequency:
-            counter, times = 0.0, [*times, time]
+            counter = 0.0
+            times.append(time)
     compares = {
-        component: _at_nodes(component, part.nodes, partial(at_nodes, component))
+        component: _at_nodes(component, part.nodes, partial(reference.at_nodes, component))
         for variable in settings.texts("check_variables")
         for component in ([f"{variable}_{axis}" for axis in "XYZ"] if variable in VECTORS else [variable])
-    } | {variable: partial(at_gauss, variable) for variable in settings.texts("gauss_points_check_variables")}
+    }
+    for variable in settings.texts("gauss_points_check_variables"):
+        compares[variable] = partial(reference.at_gauss, variable)
     for name, compare in compares.items():
         yield Comparison(f"{name} {what}", times, context.times[-1], compare)
 
