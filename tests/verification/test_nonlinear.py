@@ -128,7 +128,7 @@ def test_a_cantilever_is_bent_to_a_full_circle():
     model.fix("x-")
     pressure = 12 * moment / h**3 * mesh.points[:, 2]
     model.add(kl.Pressure("x+", pressure, follower=True), amplitude=lambda t: t)
-    analysis = model.quasi_static(tolerance=1e-4)
+    analysis = model.quasi_static(tolerance=1e-3)
     tip = nearest(mesh, (length, 0, 0))
     states = list(kl.integrate(analysis, dt=0.125, steps=8))
     for state, fraction in ((states[1], 0.25), (states[3], 0.5), (states[7], 1.0)):
@@ -146,7 +146,7 @@ def punch(formulation):
     model.fix("z-", "z")
     model.fix(np.flatnonzero((x == 0) | (x == 5)), "x")
     model.fix(np.flatnonzero((z == 3) & (x <= 1)), "z", lambda t: -0.12 * t)
-    return -run(model, 0.25, 4).result().reaction("z+")[:, 2].sum()
+    return -run(model, 0.5, 2).result().reaction("z+")[:, 2].sum()
 
 
 def test_a_punch_does_not_lock_with_projected_dilatations():
