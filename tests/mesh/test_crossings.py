@@ -41,7 +41,7 @@ def test_line_within_one_element_has_no_crossing():
 
 
 def test_tetrahedra_and_distorted_cells_lie_at_both_sides_of_each_crossing():
-    for kind in ("4N", "10N", "13N", "27N"):
+    for kind in ("4N", "13N", "27N"):
         mesh = kl.box(cells=(2, 1, 1), element=f"KinematicLinear3D{kind}")
         shift = 0.01 * np.random.default_rng(0).uniform(-1, 1, mesh.points.shape)
         mesh = mesh.replace(points=mesh.points + shift)

@@ -91,7 +91,7 @@ def test_stretched_elements(element, size, side):
 
 
 @pytest.mark.parametrize(("element", "n"), [("8N", 20), ("20N", 22), ("27N", 18), ("15N", 18), ("10N", 14)])
-@pytest.mark.parametrize("length", [0.3, 1.0, 4.0])
+@pytest.mark.parametrize("length", [0.3, 4.0])
 def test_long_elements_in_planes_too_large_to_be_solved(element, n, length):
     model = body(element, (1.0, 1.0, length), "x-", (n, n, 1))
     assert not hierarchy(model)[0].clusters[0]
@@ -127,7 +127,7 @@ FINE = {
 VERY_THIN = {"8N": (40, 20), "E8N": (30, 26), "10N": (14, 32), "15N": (14, 38), "20N": (20, 60)}
 PLATES = {
     "clamped along x": (thin("x-"), FINE),
-    "clamped along y": (thin("y+"), FINE),
+    "clamped along y": (thin("y+"), {"8N": FINE["8N"], "20N": FINE["20N"]}),
     "three layers": (thin("x-", 3), dict.fromkeys(QUADRATIC, (12, 32))),
     "clamped rim": (rim, VERY_THIN),
     "lower edges": (on_edges, {"20N": (12, 40)}),
