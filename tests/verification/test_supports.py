@@ -261,34 +261,6 @@ def test_a_body_activated_in_a_displaced_state_has_no_stress_there():
     assert result.energy() == pytest.approx(0, abs=1e-10)
 
 
-def test_orthotropic_bar_has_the_modulus_and_contractions_of_its_axes():
-    wood = kl.Orthotropic3D(11e9, 0.9e9, 0.5e9, 0.4, 0.3, 0.35, 0.7e9, 0.05e9, 0.6e9)
-    moduli, ratio = (11e9, 0.9e9, 0.5e9), {(0, 1): 0.4, (1, 2): 0.3, (0, 2): 0.35}
-    for axis, letter in enumerate("xyz"):
-        model = kl.Model(kl.box(cells=(2, 2, 2), element=named(10)), wood)
-        for side in ("x-", "y-", "z-"):
-            model.fix(side, side[0])
-        model.fix(letter + "+", letter, 1e-3)
-        result = model.solve()
-        np.testing.assert_allclose(result.stress()[..., axis], 1e-3 * moduli[axis], rtol=1e-10)
-        for other in range(3):
-            if other != axis:
-                i, j = min(axis, other), max(axis, other)
-                nu = ratio[i, j] if axis < other else ratio[i, j] * moduli[j] / moduli[i]
-                np.testing.assert_allclose(result.strain()[..., other], -nu * 1e-3, rtol=1e-10)
-
-
-def test_orthotropic_shear_moduli_belong_to_their_planes():
-    wood = kl.Orthotropic3D(11e9, 0.9e9, 0.5e9, 0.4, 0.3, 0.35, 0.7e9, 0.05e9, 0.6e9)
-    for (i, j), row, G in (((0, 1), 3, 0.7e9), ((1, 2), 4, 0.05e9), ((0, 2), 5, 0.6e9)):
-        mesh = kl.box()
-        field = np.zeros((8, 3))
-        field[:, i] = 1e-3 * mesh.points[:, j]
-        model = kl.Model(mesh, wood)
-        model.fix(np.arange(8), "xyz", field)
-        np.testing.assert_allclose(model.solve().stress()[..., row], 1e-3 * G, rtol=1e-12)
-
-
 def test_an_isotropic_body_written_as_orthotropic_is_the_same():
     E, nu = 2e11, 0.3
     G = E / (2 * (1 + nu))
