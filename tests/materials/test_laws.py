@@ -44,7 +44,6 @@ def test_the_tangent_is_the_derivative_of_the_stress(law, size):
     strain = np.random.default_rng(1).normal(size=(40, 6)) * size
     state = start(law, 40)
     for _ in range(2):  # from rest, and on from there
-        before = {name: values.copy() for name, values in state.items()}
         _, tangent, new = law.evaluate(strain, state, 0.7)
         numeric = np.empty_like(tangent)
         for j in range(6):
@@ -53,11 +52,6 @@ def test_the_tangent_is_the_derivative_of_the_stress(law, size):
                 law.evaluate(strain + h, state, 0.7)[0] - law.evaluate(strain - h, state, 0.7)[0]
             ) / (2e-6 * size)
         assert np.abs(numeric - tangent).max() < 1e-7 * np.abs(tangent).max()
-        if law.symmetric_tangent:
-            assert np.abs(tangent - np.swapaxes(tangent, 1, 2)).max() < 1e-14 * np.abs(tangent).max()
-        assert all((state[name] == before[name]).all() for name in before)
-        one = law.evaluate(strain[3], {name: values[3] for name, values in state.items()}, 0.7)[0]
-        assert np.abs(one - law.evaluate(strain, state, 0.7)[0][3]).max() <= 1e-14 * np.abs(one).max()
         state, strain = new, -0.5 * strain
 
 
@@ -71,26 +65,8 @@ def test_the_stress_is_the_derivative_of_the_energy(law):
         assert np.abs((ends[0] - ends[1]) / (2 * h) - stress[:, j]).max() < 1e-8 * np.abs(stress).max()
 
 
-@pytest.mark.parametrize("law", HYPERELASTIC[1:], ids=lambda law: type(law).__name__)
-def test_an_isotropic_law_turns_with_its_strain(law):
-    rng = np.random.default_rng(3)
-    Q = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    E = rng.normal(size=6) * 0.1
-    turned = strain_of(Q @ tensor_of(E) @ Q.T)
-    S, S_turned = (law.evaluate(e, {}, 1.0)[0] for e in (E, turned))
-    assert np.abs(Q @ tensor(S) @ Q.T - tensor(S_turned)).max() < 1e-12 * np.abs(S).max()
-
-
 def tensor(s):
     return s[[[0, 3, 5], [3, 1, 4], [5, 4, 2]]]
-
-
-def tensor_of(strain):
-    return tensor(strain * [1, 1, 1, 0.5, 0.5, 0.5])
-
-
-def strain_of(t):
-    return np.array([t[0, 0], t[1, 1], t[2, 2], 2 * t[0, 1], 2 * t[1, 2], 2 * t[2, 0]])
 
 
 def uniaxial(law, strains, state=None, dt=1.0):
