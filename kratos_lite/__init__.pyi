@@ -122,6 +122,10 @@ from kratos_lite.model.loads.surface import Pressure as Pressure
 from kratos_lite.model.loads.surface import Resultant as Resultant
 from kratos_lite.model.loads.surface import Traction as Traction
 from kratos_lite.model.loads.temperature import Temperature as Temperature
+from kratos_lite.model.local_axes import Cartesian as Cartesian
+from kratos_lite.model.local_axes import Cylindrical as Cylindrical
+from kratos_lite.model.local_axes import LocalAxes as LocalAxes
+from kratos_lite.model.local_axes import Spherical as Spherical
 from kratos_lite.model.mass_properties import MassProperties as MassProperties
 from kratos_lite.shapes import Shape as Shape
 

@@ -96,6 +96,6 @@ class Translation(Motion):
             dependents, independents = periodic_pairs(mesh, self.direction, self.moving(mesh))
             dofs = [(3 * nodes[:, None] + np.arange(3)).ravel() for nodes in (dependents, independents)]
             ones, zeros = np.ones(len(dofs[0])), np.zeros(len(dofs[0]))
-            structure.supports.constraints += Constraints.of(
-                dofs[0], dofs[1][:, None], ones, zeros, symmetric=True
+            structure.supports.add_constraints(
+                Constraints.of(dofs[0], dofs[1][:, None], ones, zeros, symmetric=True)
             )

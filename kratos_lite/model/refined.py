@@ -78,8 +78,7 @@ def _refined_condition(condition: DirichletCondition, finer: RefinedMesh) -> Dir
 
 def _carry_constraints(structure: Structure, new: Structure, finer: RefinedMesh) -> None:
     """Carry over constraints of nodes; refuse those that tie edges on which new nodes lie."""
-    every = structure.supports.constraints
-    own = every.take(np.arange(len(every)) >= len(structure.supports.hanging))
+    own = structure.supports.added
     if not len(own):
         return
     tied = np.unique(own.dependents // 3)
@@ -88,4 +87,4 @@ def _carry_constraints(structure: Structure, new: Structure, finer: RefinedMesh)
             f"{len(own)} constraints tie nodes of edges that are cut, but not their new nodes; constrain "
             "a finer mesh instead"
         )
-    new.supports.constraints += own
+    new.supports.add_constraints(own)

@@ -25,6 +25,7 @@ from kratos_lite.model.free_motions import FreeMotions, free_motions
 from kratos_lite.model.joints import check_coincident, check_joints
 from kratos_lite.model.loads import Load, ScaledLoad
 from kratos_lite.model.loads.base import key_of
+from kratos_lite.model.local_axes import Cartesian, LocalAxes, normal_of_plane
 from kratos_lite.model.locking import check_locking
 from kratos_lite.model.spurious_modes import check_rules, check_spurious_modes
 from kratos_lite.model.supports import DirichletCondition, Supports, axis_numbers
@@ -322,6 +323,7 @@ class Structure(Tabular):
         field: Callable[[Array], ArrayLike] | None = None,
         override: bool = False,
         name: str | None = None,
+        local: LocalAxes | None = None,
     ) -> None:
         """Prescribe the displacement of nodes.
 
@@ -336,6 +338,8 @@ class Structure(Tabular):
         override : let this value win over an earlier one for the same degree of freedom, and this support
             replace the one of its name.
         name : by which `release` knows the support.
+        local : axes such as `Cylindrical`, whose letters ``axes`` are then; values are constant, and the
+            support is released by its name alone.
 
         Raises
         ------
@@ -354,7 +358,34 @@ class Structure(Tabular):
         function_or_none(field, "field must be a function of places (k, 3)")
         if name is not None:
             instance(name, "the name of a support", str, "'clamp'")
-        self.supports.add(DirichletCondition(where, nodes, axes, value, field, override, name))
+        if local is not None:
+            instance(local, "local", LocalAxes, "kl.Cylindrical()")
+        self.supports.add(DirichletCondition(where, nodes, axes, value, field, override, name, local=local))
+
+    def symmetry(self, where: Where, *, anti: bool = False, name: str | None = None) -> None:
+        """Hold a plane of symmetry: no displacement across it; of antisymmetry: none along it.
+
+        Parameters
+        ----------
+        where : its nodes, as for `fix`; those of a part whose faces lie in one plane.
+        anti : whether the body moves antisymmetrically.
+        name : by which `release` knows the support.
+
+        Raises
+        ------
+        ModelError
+            The nodes lie in no plane, or on a line.
+
+        Examples
+        --------
+        >>> import kratos_lite as kl
+        >>> model = kl.Model(kl.box(), kl.Isotropic3D(E=1e9, nu=0.3))
+        >>> model.symmetry("x-")
+        >>> model.supports.fixed[:, 0].sum(), model.supports.fixed[:, 1:].any()
+        (np.int64(4), np.False_)
+        """
+        normal = normal_of_plane(self.mesh.points[self.mesh.nodes(where)])
+        self.fix(where, "yz" if anti else "x", name=name, local=Cartesian(normal))
 
     def release(self, where: Where, axes: str = "xyz") -> None:
         """Take supports away: one by its name, or whatever holds some nodes along axes.

@@ -11,6 +11,7 @@ import numpy as np
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh, Where
 from kratos_lite.model.loads.base import key_of
+from kratos_lite.model.local_axes import LocalAxes
 from kratos_lite.solvers.constraints import ConstraintMap, Constraints, constraint_map, eliminate
 from kratos_lite.time_series import function_of
 from kratos_lite.typing import Array, ArrayLike, Ints, Mask
@@ -19,14 +20,19 @@ from kratos_lite.validation import finite, short, whole_numbers
 AXES = "xyz"
 CONSTANT = -1
 """In place of the number of a function of time."""
+AXIAL = 1e-12
+"""Weight below which a component along a local axis is one along x, y or z."""
+DEPENDENT = 1e-10
+"""Square of the sine of the angle below which two directions at a node are one."""
 
 
-def axis_numbers(axes: str) -> list[int]:
+def axis_numbers(axes: str, letters: str = AXES) -> list[int]:
     """Return the axis numbers of a word such as ``"xz"``."""
-    known = isinstance(axes, str) and axes and set(axes) <= set(AXES)
+    known = isinstance(axes, str) and axes and set(axes) <= set(letters)
     if not known or len(set(axes)) != len(axes):
-        raise InputError(f"axes must be some of x, y, z, each once, such as 'xz'; got {axes!r}")
-    return [AXES.index(a) for a in axes]
+        some = f"some of {', '.join(letters)}, each once, such as '{letters[0]}{letters[2]}'"
+        raise InputError(f"axes must be {some}; got {axes!r}")
+    return [letters.index(a) for a in axes]
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +47,7 @@ class DirichletCondition:
     override: bool = False  # whether it replaces earlier ones
     name: str | None = None  # of the support, or None
     released: bool = False  # whether the nodes are released along the axes instead
+    local: LocalAxes | None = None  # whose letters the axes are, or None
 
     def __str__(self) -> str:
         where = self.where if isinstance(self.where, str) else f"{len(self.nodes)} nodes"
@@ -49,12 +56,13 @@ class DirichletCondition:
         value = "by a field" if self.field is not None else "as a function of time"
         if not callable(self.value) and self.field is None:
             value = f"= {self.value:g} m" if isinstance(self.value, (int, float)) else "by values"
-        return f"{self.name + ': ' if self.name else ''}{where}, {self.axes} {value}"
+        axes = self.axes if self.local is None else f"{self.axes} of {self.local}"
+        return f"{self.name + ': ' if self.name else ''}{where}, {axes} {value}"
 
     @property
     def key(self) -> Hashable:
         """What equal calls share."""
-        return key_of([self.nodes, self.axes, self.value, self.field])
+        return key_of([self.nodes, self.axes, self.value, self.field, repr(self.local)])
 
 
 class Supports:
@@ -79,6 +87,8 @@ class Supports:
         self.fixed, self.values = self._fixed.view(), self._values.view()
         self.fixed.flags.writeable = self.values.flags.writeable = False
         self.hanging = self._constraints = hanging_constraints(mesh)
+        self._inclined = Constraints.none()  # of conditions in local axes
+        self._inclined_rows: list[tuple[Ints, Array, Array]] = []  # nodes, directions and values of these
         self._hangs = np.zeros(mesh.n_nodes, dtype=bool)
         if mesh.hanging is not None:
             self._hangs[mesh.hanging.nodes] = True
@@ -128,6 +138,7 @@ class Supports:
         """Take a condition away; what others prescribe stays."""
         self.conditions = [other for other in self.conditions if other is not condition]
         self._fixed[:], self._values[:], self._function[:] = False, 0.0, CONSTANT
+        self._inclined, self._inclined_rows = Constraints.none(), []
         self.version += 1
         self.value_version += 1
         for other in self.conditions:
@@ -136,7 +147,7 @@ class Supports:
     def _apply(self, condition: DirichletCondition) -> None:
         """Prescribe or release what a condition says; hanging nodes follow others."""
         nodes, axes, value, function = condition.nodes, condition.axes, condition.value, CONSTANT
-        numbers = axis_numbers(axes)
+        numbers = axis_numbers(axes, condition.local.letters if condition.local else AXES)
         if condition.released:
             at = np.ix_(nodes, np.array(numbers))
             self._fixed[at], self._values[at], self._function[at] = False, 0.0, CONSTANT
@@ -150,6 +161,8 @@ class Supports:
                 "edge or face of a larger element and follow its nodes; fix these"
             )
         if callable(value):
+            if condition.local is not None:
+                raise InputError("a support in local axes has a constant value; got a function of time")
             function, value = self._number(value)
         elif condition.field is not None:
             value = condition.field(self.mesh.points[nodes])
@@ -161,12 +174,65 @@ class Supports:
                 f"value must be one number, {len(numbers)} numbers (one per axis of {axes!r}) "
                 f"or have shape ({len(nodes)}, {len(numbers)}); got shape {new.shape}"
             ) from None
+        if condition.local is not None:
+            self._incline(nodes[~follows], condition.local, numbers, new)
+            return
         at = np.ix_(nodes[~follows], np.array(numbers))
         if not condition.override:
             self._check_prescribed_once(at, new, function)
         self.version += not self.fixed[at].all()
         self.value_version += 1
         self._fixed[at], self._values[at], self._function[at] = True, new, function
+        if self._inclined_rows:
+            self._resolve_inclined()  # what is prescribed now follows from nothing else
+
+    def _incline(self, nodes: Ints, local: LocalAxes, numbers: list[int], values: Array) -> None:
+        """Prescribe components (m, k) along local axes: a·u = value at nodes, for each of these axes."""
+        a = local.directions(self.mesh.points[nodes])[:, numbers]
+        self._inclined_rows.append((np.repeat(nodes, len(numbers)), a.reshape(-1, 3), values.ravel()))
+        self.version += 1
+        self.value_version += 1
+        self._resolve_inclined()
+
+    def _resolve_inclined(self) -> None:
+        """Make constraints of all components along local axes, those of one node together."""
+        rows, a, v = (np.concatenate(parts) for parts in zip(*self._inclined_rows, strict=True))
+        nodes, at = np.unique(rows, return_inverse=True)
+        G, g = np.zeros((len(nodes), 3, 3)), np.zeros((len(nodes), 3))  # Σ a aᵀ u = Σ a v at each node
+        np.add.at(G, at, a[:, :, None] * a[:, None])
+        np.add.at(g, at, a * v[:, None])
+        size, Q = np.linalg.eigh(G)
+        known = size > DEPENDENT
+        u = np.einsum("nij,nj->ni", Q, np.einsum("nij,ni->nj", Q, g) / np.where(known, size, np.inf))
+        wrong = np.abs((a * u[at]).sum(axis=1) - v) > 1e-9 * np.abs(v).max(initial=0.0)
+        if wrong.any():
+            node = self.mesh.node_ids[rows[wrong.argmax()]]
+            raise ModelError(f"node {node} has supports in local axes that contradict each other")
+        self._inclined = Constraints.none()
+        for rank in (1, 2, 3):
+            some = known.sum(axis=1) == rank
+            if some.any():
+                self._resolve(nodes[some], np.swapaxes(Q[some][:, :, 3 - rank :], 1, 2), u[some])
+
+    def _resolve(self, nodes: Ints, A: Array, u: Array) -> None:
+        """Let k components of displacements follow from the others where A (m, k, 3) times them is A u."""
+        k, free = A.shape[1], 1 - 0.999 * self._fixed[nodes]  # what is prescribed follows from nothing else
+        first = np.zeros(len(nodes), dtype=int)
+        if k < 3:
+            size = np.abs(A[:, 0]) * free if k == 1 else np.abs(np.cross(A[:, 0], A[:, 1])) / free
+            first = size.argmax(axis=1) + (k == 2)
+        order = (first[:, None] + np.arange(3)) % 3  # k that follow, then those from which they do
+        A, u = np.take_along_axis(A, order[:, None], axis=2), np.take_along_axis(u, order, axis=1)
+        W = -np.linalg.solve(A[:, :, :k], A[:, :, k:])
+        W = np.where(np.abs(W) < AXIAL, 0.0, W)
+        c = u[:, :k] - (W @ u[:, k:, None])[..., 0]
+        dofs = 3 * nodes[:, None] + order
+        alone = ~W.any(axis=(1, 2))
+        self._fixed.flat[dofs[alone, :k]], self._values.flat[dofs[alone, :k]] = True, c[alone]
+        if not alone.all():
+            others = np.broadcast_to(dofs[~alone, None, k:], W[~alone].shape).reshape(-1, 3 - k)
+            weights, constants = np.asarray(W[~alone].reshape(-1, 3 - k), dtype=float), c[~alone].ravel()
+            self._inclined += Constraints.of(dofs[~alone, :k].ravel(), others, weights, constants)
 
     def _number(self, function: Callable[[float], float]) -> tuple[int, float]:
         """Return the number of a function of time, and its value at the time 0."""
@@ -201,12 +267,17 @@ class Supports:
 
     @property
     def constraints(self) -> Constraints:
-        """The multi-point constraints; those of hanging nodes come first."""
-        return self._constraints
+        """The multi-point constraints: of hanging nodes, those added, and those of supports in local axes."""
+        return self._constraints + self._inclined if len(self._inclined) else self._constraints
 
-    @constraints.setter
-    def constraints(self, constraints: Constraints) -> None:
-        self._constraints = constraints
+    @property
+    def added(self) -> Constraints:
+        """The constraints that are neither of hanging nodes nor of supports."""
+        return self._constraints.take(np.arange(len(self._constraints)) >= len(self.hanging))
+
+    def add_constraints(self, constraints: Constraints) -> None:
+        """Add constraints."""
+        self._constraints += constraints
         self.version += 1
         self.value_version += 1
 
@@ -240,7 +311,7 @@ class Supports:
                 f"of {len(c)} dependents, independents must be ({len(c)},) or ({len(c)}, k), weights one or "
                 f"as many, constants one or ({len(c)},); got {each.shape}, {w.shape} and {offsets.shape}"
             ) from None
-        self.constraints += Constraints.of(c, each, w, offsets)
+        self.add_constraints(Constraints.of(c, each, w, offsets))
 
     def _dofs(self, values: ArrayLike, what: str) -> Ints:
         """Return degrees of freedom of this mesh, (c,) or (c, k)."""

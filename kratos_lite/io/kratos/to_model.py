@@ -186,7 +186,7 @@ def _constrain(model: Model, document: Document) -> None:
         return 3 * document.mesh.node_rows(ids) + axes
 
     counts = [len(constraint.weights) for constraint in known]
-    model.supports.constraints += Constraints(
+    constraints = Constraints(
         dofs([constraint.dependent for constraint in known]),
         np.concatenate([[0], np.cumsum(counts)]),
         dofs([pair for constraint in known for pair in constraint.independents]),
@@ -194,3 +194,4 @@ def _constrain(model: Model, document: Document) -> None:
         np.array([constraint.constant for constraint in known]),
         np.zeros(len(known), dtype=bool),
     )
+    model.supports.add_constraints(constraints)
