@@ -6,6 +6,8 @@ import logging
 from collections.abc import Callable
 from typing import TypeVar
 
+import numpy as np
+
 from kratos_lite.errors import SolveError
 from kratos_lite.typing import Array
 
@@ -36,7 +38,8 @@ def newton(
     """
     residuals: list[float] = []
     while True:
-        residual, known = evaluate(x)
+        with np.errstate(over="ignore", invalid="ignore"):  # x may have run away, which is refused below
+            residual, known = evaluate(x)
         residuals.append(residual)
         count = len(residuals) - 1
         if count >= least and residual <= tolerance:
