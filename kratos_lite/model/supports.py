@@ -270,6 +270,12 @@ class Supports:
         """The multi-point constraints: of hanging nodes, those added, and those of supports in local axes."""
         return self._constraints + self._inclined if len(self._inclined) else self._constraints
 
+    @constraints.setter
+    def constraints(self, constraints: Constraints) -> None:
+        self._constraints = Constraints.none()
+        self._inclined, self._inclined_rows = Constraints.none(), []
+        self.add_constraints(constraints)
+
     @property
     def added(self) -> Constraints:
         """The constraints that are neither of hanging nodes nor of supports."""
