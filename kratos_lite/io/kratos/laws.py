@@ -31,6 +31,18 @@ def is_nonlinear(document: Document) -> bool:
     return any(not _is_linear(material) for _, material in _materials(document))
 
 
+def notes_on_stress(document: Document) -> list[str]:
+    """Return a note on small-strain laws of updated Lagrangian elements: Kratos means another stress."""
+    names = {b.name for b in document.mesh.blocks if len(b) and b.name.startswith("UpdatedLagrangian")}
+    laws = {type(law).__name__ for _, law in _materials(document) if law.strain_measure == "small"}
+    if not (names and laws):
+        return []
+    return [
+        f"{', '.join(sorted(names))} with {', '.join(sorted(laws))}: C times Green's strain is the second "
+        "stress of Piola and Kirchhoff here, Cauchy's in Kratos; KirchhoffSaintVenant3DLaw is one in both"
+    ]
+
+
 def make_linear(document: Document) -> list[str]:
     """Give a document elements and laws of small strains, with their elasticity at rest; return notes."""
     notes, blocks = list[str](), list(document.mesh.blocks)

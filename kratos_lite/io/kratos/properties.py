@@ -216,7 +216,7 @@ def _use_material(entry: Settings, properties: Properties, notes: list[str]) -> 
     if name.endswith("Factory"):  # Kratos puts the name of the law together
         name = name.removesuffix("Factory") + "3D" + law.text("yield_surface") + law.text("plastic_potential")
     known = [*MATERIALS, *(alias for m in MATERIALS for alias in MATERIALS.aliases(m))]
-    text = f"part {part}: {name!r} is not a law that kratos_lite has;{nearest(name, known)}"
+    text = f"part {part}: {name!r} is not a law that kratos_lite has.{nearest(name, known)}"
     law.expect(name in MATERIALS, "name", f"{text} Choose one, or solve this part with Kratos")
     variables = body.section("Variables")
     values = {key.rsplit(".", 1)[-1]: _variable(variables, key) for key in variables.values}

@@ -17,7 +17,7 @@ from kratos_lite.io.formats.document import Document
 from kratos_lite.io.formats.part_files import part_files, read_part
 from kratos_lite.io.kratos.context import RunContext, module_of, times_of
 from kratos_lite.io.kratos.expected_values import COMPARISONS
-from kratos_lite.io.kratos.laws import is_nonlinear, make_linear, quasi_static_of
+from kratos_lite.io.kratos.laws import is_nonlinear, make_linear, notes_on_stress, quasi_static_of
 from kratos_lite.io.kratos.motion import add_motion
 from kratos_lite.io.kratos.processes import PROCESSES, Action, actions_of, run
 from kratos_lite.io.kratos.properties import use_materials
@@ -76,6 +76,7 @@ def read_kratos_project(
     small = linear or solver.text("analysis_type", "non_linear") == "linear"
     notes += make_linear(document) if small else []
     nonlinear = is_nonlinear(document)
+    notes += notes_on_stress(document)
     if not small and not nonlinear:
         notes.append("analysis_type is non_linear: the linear solution is computed, on the undeformed body")
     steps = quasi_static_of(solver, times) if nonlinear and not dynamic else None

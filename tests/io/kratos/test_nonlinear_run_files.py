@@ -125,6 +125,15 @@ def test_plastic_bar_pulled_in_steps_with_files_and_expected_values(tmp_path, ru
     assert kl.run(case).rows[0] == ("time", "1 … 1.25 s, 1 steps in 1 parts")
 
 
+def test_another_stress_of_kratos_is_noted(tmp_path):
+    for name, law_name in (("Updated", "LinearElastic3DLaw"), ("Updated", "KirchhoffSaintVenant3DLaw")):
+        folder = box(tmp_path, content=law(law_name))
+        text = (folder / "box.mdpa").read_text().replace("TotalLagrangian", f"{name}Lagrangian")
+        (folder / "box.mdpa").write_text(text)
+        notes = " ".join(read_case(write(folder, pressed(step=0.5))).model.notes)
+        assert ("Cauchy's in Kratos" in notes) == (law_name == "LinearElastic3DLaw")
+
+
 def test_linear_takes_elements_and_laws_of_small_strains(tmp_path, run):
     path = write(box(tmp_path), pressed(step=0.5))
     case = read_case(path, linear=True)
