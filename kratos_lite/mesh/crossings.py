@@ -6,7 +6,6 @@ import numpy as np
 
 from kratos_lite.mesh.blocks import NO_ROWS, select, with_rows
 from kratos_lite.mesh.boxes import cell_boxes, is_solid
-from kratos_lite.mesh.locate import locate
 from kratos_lite.mesh.mesh import Mesh
 from kratos_lite.typing import Array, Ints
 
@@ -16,17 +15,14 @@ SHORT = 1e-10
 
 def crossings(mesh: Mesh, a: Array, b: Array) -> Array:
     """Return where on the line from a to b elements begin and end: 0 = t_0 < t_1 < … < t_k = 1."""
-    near = Mesh(
-        mesh.points,
-        select(mesh.blocks, _near(mesh, a, b)),
-        node_ids=mesh.node_ids,
-        source=mesh.source,
-    )
+    rows = _near(mesh, a, b)
+    blocks = select(mesh.blocks, rows)
+    near = Mesh(mesh.points, blocks, node_ids=mesh.node_ids, source=mesh.source) if blocks else mesh
 
     def element(t: Array) -> Ints:
-        return locate(near if len(near.blocks) else mesh, a + t[:, None] * (b - a)).require().rows
+        return near.locate(a + t[:, None] * (b - a), required=True).rows
 
-    t = np.linspace(0, 1, 2 * near.n_elements + 2)
+    t = np.linspace(0, 1, 2 * len(rows) + 2)
     elements = element(t)
     while len(gaps := np.flatnonzero((np.diff(elements) != 0) & (np.diff(t) > SHORT))):
         middle = (t[gaps] + t[gaps + 1]) / 2

@@ -106,7 +106,7 @@ class Located:
                 yield at, block.nodes[cells[at]], block.shape.N(xi[at])
 
 
-def locate(mesh: Cells, points: ArrayLike) -> Located:
+def locate(mesh: Cells, points: ArrayLike, search: Search) -> Located:
     """Return the elements that contain points (..., 3), by the inverse isoparametric map.
 
     A tree of bounding boxes gives the candidates of each point, which are tried nearest first.
@@ -115,7 +115,6 @@ def locate(mesh: Cells, points: ArrayLike) -> Located:
     if x.shape[-1:] != (3,):
         raise InputError(f"points to locate must have shape (m, 3) or (3,); got {x.shape}")
     flat = x.reshape(-1, 3)
-    search = _Search(mesh)
     parts = [search.find(flat[i : i + POINTS_AT_ONCE]) for i in range(0, len(flat), POINTS_AT_ONCE)]
     rows = np.concatenate([NO_ROWS, *(part[0] for part in parts)])
     xi = np.concatenate([np.zeros((0, 3)), *(part[1] for part in parts)])
@@ -125,11 +124,11 @@ def locate(mesh: Cells, points: ArrayLike) -> Located:
     return Located(mesh, x, rows, block, cell, xi.reshape(x.shape))
 
 
-class _Search:
+class Search:
     """The elements of a mesh, ready to be searched; one without a shape contains nothing."""
 
     def __init__(self, mesh: Cells) -> None:
-        self.mesh = mesh
+        self.points, self.blocks = mesh.points, mesh.blocks
         ends = [0, *(at.stop for _, at in with_rows(mesh.blocks))]
         n, self.starts = ends[-1], np.array(ends[:-1])
         low, high, self.middle = np.full((n, 3), np.inf), np.full((n, 3), -np.inf), np.zeros((n, 3))
@@ -181,11 +180,11 @@ class _Search:
     def _by_block(self, rows: Ints) -> Iterator[tuple[type[Shape], Ints, Array]]:
         """Yield, for each block, which of some elements are in it, and their nodes (m, k, 3)."""
         numbers = self.block_of(rows)
-        for number, block in enumerate(self.mesh.blocks):
+        for number, block in enumerate(self.blocks):
             chosen = np.flatnonzero(numbers == number)
             if len(chosen) and block.shape is not None:
                 cells = rows[chosen] - self.starts[number]
-                yield block.shape, chosen, self.mesh.points[block.nodes[cells]]
+                yield block.shape, chosen, self.points[block.nodes[cells]]
 
     def _try(self, x: Array, at: Ints, rows: Ints, element: Ints, xi: Array) -> None:
         """Write element and xi of those points x[at] that lie in the elements in `rows`."""

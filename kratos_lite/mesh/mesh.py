@@ -30,7 +30,7 @@ from kratos_lite.validation import finite, instance, read_only, whole_numbers
 
 if TYPE_CHECKING:
     from kratos_lite.mesh.hanging import HangingNodes
-    from kratos_lite.mesh.locate import Located
+    from kratos_lite.mesh.locate import Located, Search
 
 PART = "kl.Part(nodes=[4, 5])"
 
@@ -389,8 +389,15 @@ class Mesh(Tabular):
         """
         from kratos_lite.mesh.locate import locate  # a quick start without it
 
-        located = locate(self, points)
+        located = locate(self, points, self._search)
         return located.require() if required else located
+
+    @cached_property
+    def _search(self) -> Search:
+        """The elements with their boxes, made once."""
+        from kratos_lite.mesh.locate import Search  # a quick start without it
+
+        return Search(self)
 
     # ---- for other programs ------------------------------------------------------------------
 
