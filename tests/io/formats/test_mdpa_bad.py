@@ -94,11 +94,6 @@ def test_every_malformed_file_has_its_expectation(malformed):
     assert names == REFUSED.keys() | ACCEPTED.keys()
 
 
-def test_two_nodes_on_a_line_are_read_without_strict(malformed):
-    document = read_mdpa(malformed / "40_two_values_on_line.mdpa", strict=False)
-    assert document.mesh.n_nodes == 8
-
-
 def test_unknown_element_is_kept_for_the_next_stage(malformed):
     (block,) = read_mdpa(malformed / "04_unknown_element.mdpa").mesh.blocks
     assert (block.name, block.shape, block.nodes.shape) == ("SmallDisplacementElement3D9N", None, (1, 8))
