@@ -109,8 +109,12 @@ class ElementGroup:
         return nodes, as_double(N), as_double(dN), as_double(rule.weights)
 
     def kernel_arguments(self) -> tuple[Array, Array | None]:
-        """Return C (6, 6) and the prestress, as kernels take them."""
-        return as_double(self.material.C), None if self.prestress is None else as_double(self.prestress)
+        """Return C (6, 6) and the initial stress of elements (m, 6), as kernels take them."""
+        C, stress = as_double(self.material.C), self.prestress
+        if self.heating is not None and self.is_evenly_heated:
+            thermal = self.heating.mean(axis=1)[:, None] * (C @ self.material.expansion)
+            stress = -thermal if stress is None else stress - thermal
+        return C, None if stress is None else as_double(stress)
 
     def strain_tables(self) -> StrainTables | None:
         """Return what the element adds to the strain of the displacements, as kernels take it."""
@@ -138,6 +142,11 @@ class ElementGroup:
         step = max(1, memory // per_element)
         for start in range(first, last, step):
             yield slice(start, min(start + step, last))
+
+    @property
+    def is_evenly_heated(self) -> bool:
+        """Whether an element has one thermal strain, as kernels take it, or none."""
+        return self.heating is None or self.element.shape.degree == 1
 
     @property
     def without_initial(self) -> ElementGroup:

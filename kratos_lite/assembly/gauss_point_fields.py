@@ -94,7 +94,7 @@ def at_gauss(points: Array, group: ElementGroup, u: Array, *, stress: bool = Tru
         return cauchy(points, group, u, found) if stress else strain
     if module := compiled("gauss", group.element):
         found = module.stress(*displaced(points, group, u, stress))
-        if not stress or group.heating is None:
+        if not stress or group.is_evenly_heated:
             return found
         return found - group.thermal_strain(slice(None)) @ group.material.C.T
     parts = [value_at(group.at(points, chunk), group, u, chunk, stress) for chunk in group.chunks()]
@@ -138,7 +138,7 @@ def internal_load(points: Array, groups: Sequence[ElementGroup], u: Array) -> Ar
     total = np.zeros_like(points)
     for group in groups:
         module = compiled("gauss", group.element)
-        if module and group.heating is None:
+        if module and group.is_evenly_heated:
             total += module.internal_load(*displaced(points, group, u))
             continue
         for chunk in group.chunks():
@@ -162,9 +162,9 @@ def totals(points: Array, groups: Sequence[ElementGroup], u: Array) -> tuple[flo
     """Return strain energy in J, largest von Mises stress at a Gauss point in Pa, index of its element."""
     energy, largest, row = 0.0, 0.0, 0
     for group in groups:
-        if not group.is_linear:
+        if not group.is_linear or group.heating is not None:
             parts = [totals_of(points, group, u)]
-        elif group.heating is None and (module := compiled("gauss", group.element)):
+        elif module := compiled("gauss", group.element):
             parts = [module.totals(*displaced(points, group, u))]
         else:
             parts = [_totals(points, group, u, chunk) for chunk in group.chunks()]
@@ -178,14 +178,12 @@ def totals(points: Array, groups: Sequence[ElementGroup], u: Array) -> tuple[flo
 def _totals(points: Array, group: ElementGroup, u: Array, chunk: slice) -> tuple[float, float, int]:
     element = group.at(points, chunk)
     C, displacements = group.material.C, u[group.nodes[chunk]]
-    strain = element.strain(displacements, C) - group.thermal_strain(chunk)
+    strain = element.strain(displacements, C)
     elastic = strain @ C.T
     energy = float(((strain * elastic).sum(axis=-1) * element.dV).sum()) / 2
     if "local_system" in element.custom:
         energy = float((custom.system(element, C, displacements)[1] * displacements).sum()) / 2
-    if group.prestress is not None:
-        elastic = elastic + group.prestress[chunk, None]
-    mises = voigt.von_mises(elastic).max(axis=1)
+    mises = voigt.von_mises(elastic + group.initial_stress(chunk)).max(axis=1)
     return energy, float(mises.max()), chunk.start + int(mises.argmax())
 
 
@@ -238,10 +236,12 @@ def cauchy(points: Array, group: ElementGroup, u: Array, stress: Array) -> Array
 
 def energy_density(points: Array, group: ElementGroup, u: Array) -> Array:
     """Return the stored energy (m, g) in J/m³ of a law at displacements u (n, 3)."""
-    strain, stress = of_law(points, group, u)
     law, states = group.material, group.states
+    if group.is_linear:
+        strain = at_gauss(points, group, u, stress=False) - group.thermal_strain(slice(None))
+        return np.asarray((strain @ law.C.T * strain).sum(axis=-1) / 2)
+    strain, stress = of_law(points, group, u)
     if states is None:
-        strain = strain - group.thermal_strain(slice(None))
         return law.energy(strain, strain @ law.C.T, {})
     return law.energy(strain + initial_strain(group), stress, states.variables)
 

@@ -56,7 +56,7 @@ def averages(
 def _averages(points: Array, group: ElementGroup, u: Array, stress: bool) -> tuple[Array, Array]:
     """Return the sums of the nodal values (n, 6) of a group and the means of its elements (m, 6)."""
     to_nodes = as_double(extrapolation(group.element, group.rule))
-    if not group.is_linear or group.heating is not None:
+    if not (group.is_linear and group.is_evenly_heated):
         value, volume = at_gauss(points, group, u, stress=stress), volumes(points, group)
         means = np.einsum("mg,mgc->mc", volume / volume.sum(axis=1, keepdims=True), value)
         return _sums(group, value, len(points)), means
