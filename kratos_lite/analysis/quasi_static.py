@@ -39,8 +39,8 @@ from kratos_lite.validation import number, whole_number
 
 Load: TypeAlias = tuple[Array, Changes]
 """Nodal forces (3a,) at some displacements, and their tangent."""
-Response: TypeAlias = tuple[Array, Array, BlockMatrix, Changes, States]
-"""Internal forces and load (3a,), tangents of both, and states at some displacements."""
+Response: TypeAlias = "tuple[Array, Array, BlockMatrix | None, Changes, States]"
+"""Internal forces and load (3a,), tangents of both, or None where none is needed, and states."""
 ROUNDING = 10 * float(np.finfo(float).eps)
 """Fraction of |K| |u| that rounding leaves of forces in balance."""
 SLACK, SEARCHES = 0.8, 6
@@ -213,6 +213,7 @@ class QuasiStaticAnalysis(ModelInTime):
         def solve(u: Array, known: Response, residuals: list[float]) -> list[Array]:
             internal, force, K, tangent, _ = known
             unit = self._loads(u, 1.0)[0] - self._loads(u, 0.0)[0]
+            assert K is not None
             forces = [unit, force - internal]
             return self.tangents.solve(K, tangent, forces, np.zeros_like(u), residuals, self.tolerance)
 
@@ -252,16 +253,21 @@ class QuasiStaticAnalysis(ModelInTime):
         self.reports.append(report)
         return report.iterations
 
-    def _balance(self, u: Array, load: Load, dt: float) -> tuple[float, Response]:
-        """Return the relative residual at displacements (3a,), and what is known there."""
-        internal, K, states = self.assembly.evaluate(u, self.states, dt, self.heating)
+    def _balance(self, u: Array, load: Load, dt: float, before: float = np.inf) -> tuple[float, Response]:
+        """Return the relative residual at displacements (3a,), and what is known there.
+
+        After a residual before it that is small, this one is converged, as a rule, and needs no tangent.
+        """
+        near = before <= self.tolerance**0.5
+        internal, K, states = self.assembly.evaluate(u, self.states, dt, self.heating, tangent=not near)
         force, tangent = load
-        assert K is not None
         scale = max(float(np.linalg.norm(v)) for v in (force, internal, self.load, self.internal))
         residual = float(np.linalg.norm(self.system.constraint_map.reduce(force - internal)))
         relative = residual / (scale or 1.0)
+        if K is None and relative > self.tolerance:
+            return self._balance(u, load, dt)
         known = float(np.linalg.norm(self.u) + np.linalg.norm(self.prescribed.part(u)))  # u may have run away
-        if residual <= ROUNDING * K.norm() * known:
+        if K is not None and residual <= ROUNDING * K.norm() * known:
             relative = min(relative, self.tolerance)
         return relative, (internal, force, K, tangent, states)
 
@@ -287,11 +293,16 @@ class QuasiStaticAnalysis(ModelInTime):
         """Return the same from a start, with a jump of what is prescribed."""
         reduce = self.system.constraint_map.reduce
 
+        last = np.inf
+
         def evaluate(u: Array) -> tuple[float, Response]:
-            return self._balance(u, load(u), dt)
+            nonlocal last
+            last, known = self._balance(u, load(u), dt, last)
+            return last, known
 
         def correction(u: Array, known: Response, residuals: list[float]) -> Array:
             internal, force, K, tangent, _ = known
+            assert K is not None
             first, r = len(residuals) == 1, force - internal
             moved = jump if first else 0.0 * jump
             (du,) = self.tangents.solve(K, tangent, [r], moved, residuals, self.tolerance)
