@@ -67,6 +67,8 @@ def reals(value: Any, what: str, error: Error = InputError, *, cure: str = "", c
     """Return real numbers as floats; they need not be finite, as results may not be."""
     try:
         array = np.asarray(value)
+        if array.dtype == np.float64 and array.size <= MOST:  # most are, and soon done
+            return array.copy("K") if copy else array
         if array.dtype.kind not in "buifO" or (array.dtype == object and None in array.ravel().tolist()):
             raise TypeError
         with np.errstate(all="ignore"):  # what is too large for a float becomes infinite

@@ -27,7 +27,7 @@ from kratos_lite.mesh.locate import Located
 from kratos_lite.model.mass_properties import MassProperties
 from kratos_lite.solvers.eigen import modes
 from kratos_lite.solvers.mass import Mass
-from kratos_lite.typing import Array, Ints
+from kratos_lite.typing import Array, Csr, Ints
 from kratos_lite.validation import finite
 
 LOCATED_MAX = 64
@@ -105,7 +105,7 @@ class FiniteElementBody(Deformable):
         self.integrators = {  # type: ignore[misc]
             word: alias for word, alias in self.integrators.items() if word not in self.formulation.without
         }
-        self._located: dict[bytes, Located] = {}
+        self._located: dict[bytes, tuple[Located, Csr]] = {}
         self._known: dict[bytes, tuple[Ints, Array]] = {}
         super().__init__(
             mesh, material, mass_properties, np.zeros(self.dofs), np.zeros(self.dofs), integrator, damping
@@ -131,7 +131,7 @@ class FiniteElementBody(Deformable):
         if X is self.points:
             return nodal.copy()
         points = points_of(X)
-        return np.asarray(self._in_mesh(np.atleast_2d(points)).interpolate(nodal).reshape(points.shape))
+        return np.asarray((self._in_mesh(np.atleast_2d(points))[1] @ nodal).reshape(points.shape))
 
     def set_configuration(self, q: ArrayLike) -> None:
         """Set the displacements (3n,) or (n, 3); see `Body.set_configuration`.
@@ -196,17 +196,19 @@ class FiniteElementBody(Deformable):
     def locate(self, X: Array) -> None:
         """Note where points X (3,) or (m, 3) lie in the mesh; MeshError if one lies outside."""
         points = np.atleast_2d(X)
-        located = self._in_mesh(points)
-        for i, point in enumerate(points):
-            self._known[point.tobytes()] = located.nodes_and_weights(i)
+        weights = self._in_mesh(points)[1]
+        for point, start, end in zip(points, weights.indptr, weights.indptr[1:], strict=False):
+            nodes = weights.indices[start:end].astype(np.int64)
+            self._known[point.tobytes()] = nodes, weights.data[start:end]
 
-    def _in_mesh(self, points: Array) -> Located:
-        """Return where points (m, 3) lie in the mesh; the last sets asked for are kept."""
+    def _in_mesh(self, points: Array) -> tuple[Located, Csr]:
+        """Return where points (m, 3) lie in the mesh, and N (m, n); the last sets asked for are kept."""
         key = points.tobytes()
         if key not in self._located:
             if len(self._located) >= LOCATED_MAX:
                 self._located.pop(next(iter(self._located)))
-            self._located[key] = self.mesh.locate(points).require()
+            located = self.mesh.locate(points)
+            self._located[key] = located, located.weights()
         return self._located[key]
 
     def _at(self, X: Array) -> tuple[Ints, Array]:
@@ -232,7 +234,7 @@ class FiniteElementBody(Deformable):
 
     def push_forward(self, vector: Array, X: Array, q: Array) -> Array:
         """Return F(X) times the vector; see `FreeBody.push_forward`."""
-        located = self._in_mesh(X[None])
+        located = self._in_mesh(X[None])[0]
         block, nodes = self.mesh.blocks[int(located.block[0])], self._at(X)[0]
         assert block.shape is not None
         dN = block.shape.dN(located.xi[0])
