@@ -48,7 +48,8 @@ class LocalAxes(ABC):
         -------
         (..., 3)
         """
-        return (self.directions(points) @ np.asarray(values, dtype=float)[..., None])[..., 0]
+        values, R = self._both(values, 3, points)
+        return (R @ values[..., None])[..., 0]
 
     def stresses(self, values: ArrayLike, points: ArrayLike) -> Array:
         """Return the components of stresses along the axes 1, 2, 3: 11, 22, 33, 12, 23, 31.
@@ -62,8 +63,18 @@ class LocalAxes(ABC):
         -------
         (..., 6)
         """
-        R = self.directions(points)
+        values, R = self._both(values, 6, points)
         return voigt.vector(R @ voigt.tensor(values) @ np.swapaxes(R, -1, -2))
+
+    def _both(self, values: ArrayLike, size: int, points: ArrayLike) -> tuple[Array, Array]:
+        """Return values (..., size) and the axes (..., 3, 3) there; InputError if they do not fit."""
+        values, R = finite(values, "values in local axes", ("...", size)), self.directions(points)
+        try:
+            np.broadcast_shapes(values.shape[:-1], R.shape[:-2])
+        except ValueError:
+            there = f"values {values.shape} and places {(*R.shape[:-2], 3)}"
+            raise InputError(f"{there} must have the same leading axes") from None
+        return values, R
 
     def __repr__(self) -> str:
         values = ", ".join(f"{name}={tuple(map(float, value))}" for name, value in vars(self).items())
@@ -100,7 +111,7 @@ class Cartesian(LocalAxes):
     def directions(self, points: ArrayLike) -> Array:
         """Return x', y', z' (..., 3, 3) at places (..., 3)."""
         x, y = _unit(self.x), _unit(self.y)
-        return np.broadcast_to(np.stack([x, y, np.cross(x, y)]), (*np.shape(points)[:-1], 3, 3))
+        return np.broadcast_to(np.stack([x, y, np.cross(x, y)]), (*_places(points).shape[:-1], 3, 3))
 
 
 class Cylindrical(LocalAxes):
@@ -142,7 +153,7 @@ class Cylindrical(LocalAxes):
 
     def directions(self, points: ArrayLike) -> Array:
         """Return r, t, z (..., 3, 3) at places (..., 3)."""
-        z, out = _unit(self.axis), np.asarray(points, dtype=float) - self.center
+        z, out = _unit(self.axis), _places(points) - self.center
         r = _unit(out - (out @ z)[..., None] * z)
         return np.stack([r, np.cross(z, r), np.broadcast_to(z, r.shape)], axis=-2)
 
@@ -169,9 +180,14 @@ class Spherical(LocalAxes):
 
     def directions(self, points: ArrayLike) -> Array:
         """Return r, t, p (..., 3, 3) at places (..., 3)."""
-        r = _unit(np.asarray(points, dtype=float) - self.center)
+        r = _unit(_places(points) - self.center)
         p = _unit(np.cross(self.axis, r))
         return np.stack([r, np.cross(p, r), p], axis=-2)
+
+
+def _places(points: ArrayLike) -> Array:
+    """Return places (..., 3) in m."""
+    return finite(points, "places of local axes", ("...", 3))
 
 
 def _unit(v: Array) -> Array:

@@ -116,6 +116,9 @@ CASES: Case = {
     ("Structure.release", "where"): (released, NODES),
     ("Structure.fix", "value"): (lambda v: changed("fix", "z+", "xyz", v), VECTOR),
     ("Structure.assign", "where"): (lambda v: changed("assign", ROCK, v), [0]),
+    ("Structure.symmetry", "where"): (lambda v: changed("symmetry", v), TOP),
+    ("Cartesian", "x"): (lambda v: kl.Cartesian(v).directions(POINT), VECTOR),
+    ("Cartesian", "y"): (lambda v: kl.Cartesian((0, 0, 1), v).directions(POINT), VECTOR),
     ("Structure.use_rule", "where"): (lambda v: changed("use_rule", 2, v), [0]),
     ("Structure.add_prestress", "stress"): (lambda v: changed("add_prestress", v), STRESS),
     ("Structure.add_prestress", "where"): (lambda v: changed("add_prestress", STRESS, v), [0]),
@@ -257,6 +260,15 @@ CASES |= {
 for made, owner in ((lambda **v: kl.Mesh(CUBE.points, **v), "Mesh"), (CUBE.replace, "Mesh.replace")):
     for name in ("blocks", "conditions"):
         CASES[owner, name] = (lambda v, m=made, n=name: m(**{n: {BRICK.__name__: v}}).boundary, CELLS)
+for axes in (kl.Cylindrical, kl.Spherical):
+    for name in ("center", "axis"):
+        CASES[axes.__name__, name] = (lambda v, a=axes, n=name: a(**{n: v}).directions(POINT), VECTOR)
+for axes in (kl.Cartesian(VECTOR), kl.Cylindrical(), kl.Spherical()):
+    own = type(axes).__name__
+    CASES[f"{own}.directions", "points"] = (axes.directions, [POINT])
+    for name, values in (("vectors", [VECTOR]), ("stresses", [STRESS])):
+        CASES[f"{own}.{name}", "values"] = (lambda v, f=getattr(axes, name): f(v, [POINT]), values)
+        CASES[f"{own}.{name}", "points"] = (lambda v, f=getattr(axes, name), s=values: f(s, v), [POINT])
 CASES["Mesh.replace", "points"] = (lambda v: CUBE.replace(points=v).points, CUBE.points)
 for kind in KINDS:
     own = kind.__name__
