@@ -266,9 +266,9 @@ for axes in (kl.Cylindrical, kl.Spherical):
 for axes in (kl.Cartesian(VECTOR), kl.Cylindrical(), kl.Spherical()):
     own = type(axes).__name__
     CASES[f"{own}.directions", "points"] = (axes.directions, [POINT])
-    for name, values in (("vectors", [VECTOR]), ("stresses", [STRESS])):
-        CASES[f"{own}.{name}", "values"] = (lambda v, f=getattr(axes, name): f(v, [POINT]), values)
-        CASES[f"{own}.{name}", "points"] = (lambda v, f=getattr(axes, name), s=values: f(s, v), [POINT])
+    for call, values in ((axes.vectors, [VECTOR]), (axes.stresses, [STRESS])):
+        CASES[f"{own}.{call.__name__}", "values"] = (lambda v, f=call: f(v, [POINT]), values)
+        CASES[f"{own}.{call.__name__}", "points"] = (lambda v, f=call, s=values: f(s, v), [POINT])
 CASES["Mesh.replace", "points"] = (lambda v: CUBE.replace(points=v).points, CUBE.points)
 for kind in KINDS:
     own = kind.__name__
