@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kratos_lite.ale.motion import Motion
-from kratos_lite.assembly import gauss_point_fields
 from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.assembly.gauss_point_fields import at_gauss
 from kratos_lite.assembly.mass_and_convection import inertia_matrices
 from kratos_lite.assembly.sparsity_pattern import Pattern
+from kratos_lite.assembly.stiffness import stress_stiffness
 from kratos_lite.solvers.constrained_system import select
 from kratos_lite.solvers.mass import Mass
 from kratos_lite.typing import Array, Ints, Mask
-from kratos_lite.voigt import tensor
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -182,12 +182,6 @@ class MotionMatrices:
         -------
         (nnz,) in N/m.
         """
-        pattern = self._own[0]
-        data = np.zeros(len(pattern.indices))
-        for number, group in enumerate(self.groups):
-            stress = tensor(gauss_point_fields.at_gauss(self.points, group, u0))
-            for chunk in group.chunks():
-                dV, D = group.at(self.points, chunk)._gauss
-                weighted = stress[chunk] * dV[..., None, None]
-                pattern.add(data, number, chunk, (np.swapaxes(D, -1, -2) @ weighted @ D).sum(axis=-3))
-        return self._spread(data)
+        return self._spread(
+            stress_stiffness(self.points, self.groups, self._own[0], lambda g: at_gauss(self.points, g, u0))
+        )

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
+from kratos_lite.analysis.preload import Preload, preload_stiffness
 from kratos_lite.analysis.solution_checks import Phases
 from kratos_lite.assembly.block_matrix import BlockMatrix
-from kratos_lite.errors import InputError
+from kratos_lite.errors import InputError, ModelError, SolveError
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constraints import ConstraintMap, rigid_modes
 from kratos_lite.solvers.eigen import (
@@ -34,14 +35,17 @@ def natural_modes(
     count: int,
     lumped: bool = False,
     near: float | None = None,
+    preload: Preload | None = None,
     progress: Progress | None = None,
 ) -> tuple[Array, Array]:
     """Return frequencies (count,) in rad/s and shapes (count, n, 3) of K φ = ω² M φ; see `Model.modes`."""
     near = None if near is None else number(near, "near", least=0, unit="rad/s")
+    if not (near is None or preload is None):
+        raise InputError("near does not go with a preload; leave near out for the lowest modes")
     solver = "auto" if near is None else "direct"
     phase = Phases(progress)
     with phase("check"):
-        e = EquationsOfMotion(model, lumped=lumped, solver=solver, progress=progress)
+        e = EquationsOfMotion(model, lumped=lumped, free=preload is None, solver=solver, progress=progress)
     constraints, n = e.system.constraint_map, len(e.system.constraint_map.free)
     if near is not None and n > FALLBACK_LIMIT:
         raise InputError(
@@ -51,6 +55,7 @@ def natural_modes(
     with phase("assemble"):
         small = is_small(n, count)
         equations, M = e.system.equations, e.mass.scalar
+        K_g = None if preload is None else preload_stiffness(e, preload, "a preload of modes")
     with phase("modes"):
         if near is not None:
             omega, shapes = modes_near(
@@ -58,28 +63,32 @@ def natural_modes(
             )
         elif small:
             K, M = equations.reduced_matrix, constraints.reduce_matrix(e.mass.matrix())
+            K = K if K_g is None else K + reduced(e, K_g)
             omega, shapes = dense_modes(K if isinstance(K, np.ndarray) else K.toarray(), M.toarray(), count)
         else:
-            omega, shapes = _by_iteration(e, equations, count, progress)
+            omega, shapes = _by_iteration(e, equations, count, progress, K_g)
+    if K_g is not None and not omega[0] > 0:  # ω² is not, or its sign is rounding
+        raise ModelError("the preload is beyond buckling; take less than model.buckling(1) times these loads")
     return omega, expanded(e, shapes)
 
 
 def _by_iteration(
-    e: EquationsOfMotion, solver: LinearSolver, count: int, progress: Progress | None
+    e: EquationsOfMotion, solver: LinearSolver, count: int, progress: Progress | None, K_g: Any = None
 ) -> tuple[Array, Array]:
     """Return ω (count,) and shapes (q, count): the rigid motions that are free, then the lowest others."""
     constraints, R = e.system.constraint_map, _free_motions(e)
     further = count - len(R)
     if further <= 0:
         return np.zeros(count), R[:count].T
-    times_K, times_M = (_reduced_product(constraints, times) for times in (solver.times, e.mass.times))
+    stiffness = solver.times if K_g is None else lambda u: solver.times(u) + K_g.times(u)
+    times_K, times_M = (_reduced_product(constraints, times) for times in (stiffness, e.mass.times))
     norms = solver.norm, float(abs(e.mass.scalar).sum(axis=1).max())
     known = (R, times_M(R)) if len(R) else None
     problem = Problem(
         len(constraints.free), times_K, times_M, _preconditioner(e, solver), norms, known, progress
     )
     squares, shapes = problem.lowest(further)
-    return np.sqrt(np.append(np.zeros(len(R)), squares)), np.vstack([R, shapes]).T
+    return np.sqrt(np.append(np.zeros(len(R)), np.maximum(squares, 0.0))), np.vstack([R, shapes]).T
 
 
 def _preconditioner(e: EquationsOfMotion, solver: LinearSolver) -> Callable[[Array], Array]:
@@ -171,24 +180,50 @@ def critical_rate(model: Structure, count: int = 1) -> Array:
 
 def critical_rates(e: EquationsOfMotion, count: int) -> Array:
     """Return the lowest critical rates (count,) of equations whose supports hold all rigid motions."""
-    constraints = e.system.constraint_map
-    n, H = len(constraints.free), _critical_terms(e)
+    largest = _largest(e, _critical_terms(e), count)[0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.sort(np.where(largest > 0, 1 / np.sqrt(np.maximum(largest, 1e-300)), np.inf))
+
+
+def buckling(
+    model: Structure, count: int, preload: Preload, progress: Progress | None = None
+) -> tuple[Array, Array]:
+    """Return factors (count,) and shapes (count, n, 3) of (K + λ K_g) φ = 0; see `Model.buckling`."""
+    count, phase = whole_number(count, "count"), Phases(progress)
+    with phase("check"):
+        e = EquationsOfMotion(model, free=False, massless=True, progress=progress)
+    with phase("assemble"):
+        K_g = preload_stiffness(e, preload, "buckling")
+        K_g.data *= -1
+    with phase("modes"):
+        try:
+            inverse, vectors = _largest(e, K_g, count)
+        except SolveError as error:
+            raise SolveError(f"{error}; loads that only pull do not buckle a body") from None
+    if not inverse[-1] > 1e-9 * K_g.norm() / e.K.norm():  # less is rounding: strains of 1e9
+        raise ModelError(f"the loads have less than {count} factors > 0; ask for fewer, or reverse the loads")
+    shapes = expanded(e, vectors)
+    return 1 / inverse, shapes / np.linalg.norm(shapes, axis=2).max(axis=1)[:, None, None]
+
+
+def _largest(e: EquationsOfMotion, H: BlockMatrix, count: int) -> tuple[Array, Array]:
+    """Return the largest μ (count,) of H x = μ K x, descending, and x (q, count)."""
+    constraints, n = e.system.constraint_map, len(e.system.constraint_map.free)
     if count > n:
-        raise InputError(f"this model has 1 … {n} critical rates; got {count}")
+        raise InputError(f"this model has up to {n} of them, one for each unknown; got {count}")
     few = 100 if count == 1 else DENSE_MODES  # one by iteration takes a tenth of the time of all
     if n <= few or count > n // 4:
         from scipy.linalg import eigh
 
         dense = (reduced(e, A).toarray() for A in (H, e.K))
-        largest = np.asarray(eigh(*dense, eigvals_only=True))[::-1][:count]
-    else:
-        solver = replace(e.system.equations, plan=stepped(n))
-        times_H, times_K = (_reduced_product(constraints, A.times) for A in (H, e.K))
-        norms = H.norm(), e.K.norm()
-        problem = Problem(n, lambda X: -times_H(X), times_K, solver.precondition, norms, power=2)
-        largest = -problem.lowest(count)[0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.sort(np.where(largest > 0, 1 / np.sqrt(np.maximum(largest, 1e-300)), np.inf))
+        values, vectors = eigh(*dense, subset_by_index=[n - count, n - 1])
+        return values[::-1], vectors[:, ::-1]
+    solver = replace(e.system.equations, plan=stepped(n))
+    times_H, times_K = (_reduced_product(constraints, A.times) for A in (H, e.K))
+    norms = H.norm(), e.K.norm()
+    problem = Problem(n, lambda X: -times_H(X), times_K, solver.precondition, norms, power=2)
+    values, vectors = problem.lowest(count)
+    return -values, vectors.T
 
 
 def _critical_terms(e: EquationsOfMotion) -> BlockMatrix:

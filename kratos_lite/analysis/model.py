@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from kratos_lite.analysis.matrices import LocalSystem, Matrices
+    from kratos_lite.analysis.preload import Preload
     from kratos_lite.analysis.quantities import Quantity
     from kratos_lite.analysis.quasi_static import QuasiStaticAnalysis
     from kratos_lite.analysis.transient import TransientAnalysis
@@ -278,18 +279,21 @@ class Model(Structure):
         *,
         near: float | None = None,
         lumped: bool = False,
+        preload: Preload | None = None,
         progress: Progress | None = None,
     ) -> tuple[Array, Array]:
         """Return natural frequencies and mode shapes.
 
         All supported degrees of freedom are fixed at zero.  A motion of the material is ignored: see
-        `complex_modes`.  Laws that are not linear count with C, their tangent at rest, and no stress.
+        `complex_modes`.  Laws that are not linear count with C, their tangent at rest, and no stress.  With a
+        preload, its stress stiffens or softens: K + K_g takes the place of K, K_g = ∫ grad N·σ grad N dV.
 
         Parameters
         ----------
         count : number of modes.
         near : rad/s, find the modes nearest to this frequency; the lowest if not given.
         lumped : concentrate the mass at the nodes.
+        preload : True for the loads of the model, other loads, or a result on its mesh; not with `near`.
         progress : called with the phase and the fraction done, 0 … 1.
 
         Returns
@@ -300,14 +304,45 @@ class Model(Structure):
         Raises
         ------
         MeshError, ModelError, InputError
-            If the model is broken, has no mass, has fewer modes, or is too large to factorize for `near`.
+            If the model is broken, has no mass, has fewer modes, or is too large to factorize for `near`; or
+            if the preload is beyond buckling or not that of linear statics, or leaves rigid motions free.
         SolveError
             If the iteration does not converge, or what it finds does not satisfy the equations.
         """
         from kratos_lite.analysis.modal import natural_modes
 
         with watched(progress) as shown:
-            return natural_modes(self, count, lumped, near, shown)
+            return natural_modes(self, count, lumped, near, preload, shown)
+
+    def buckling(
+        self, count: int = 5, *, preload: Preload = True, progress: Progress | None = None
+    ) -> tuple[Array, Array]:
+        """Return the factors λ of the loads at which the body buckles, and its shapes: (K + λ K_g) φ = 0.
+
+        K_g is that of `modes`, with all of the stress, also that of temperature and prestress.  Loads keep
+        their directions.  Factors < 0 belong to loads of the opposite sign, and are not found.
+
+        Parameters
+        ----------
+        count : number of factors.
+        preload, progress : as for `modes`.
+
+        Returns
+        -------
+        factors : (count,), ascending; where one is < 1, the loads are beyond buckling.
+        shapes : (count, n, 3), each with the largest displacement 1.
+
+        Raises
+        ------
+        MeshError, ModelError, InputError
+            If the model is broken, not linear, or has a motion, no stress, free rigid motions, or fewer factors.
+        SolveError
+            If the iteration does not converge, as where loads only pull.
+        """
+        from kratos_lite.analysis.modal import buckling
+
+        with watched(progress) as shown:
+            return buckling(self, count, preload, shown)
 
     def complex_modes(
         self, count: int = 6, *, progress: Progress | None = None

@@ -14,6 +14,7 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup, as_double, compiled
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.typing import Array, Progress
+from kratos_lite.voigt import tensor
 
 SCATTER_BYTES = 64_000_000
 """Memory of the element matrices that are added to the global matrix at once."""
@@ -60,6 +61,23 @@ def add_in_parts(
             blocks[place] = matrices(chunk).transpose(0, 2, 4, 1, 3)
         pattern.add(data, number, window, blocks)
         yield len(blocks)
+
+
+def stress_stiffness(
+    points: Array,
+    groups: Sequence[ElementGroup],
+    pattern: Pattern,
+    stress: Callable[[ElementGroup], Array],
+) -> Array:
+    """Return ∫ grad N_i·σ grad N_j dV, data (nnz,) in N/m, of the stresses (m, g, 6) in Pa of each group."""
+    data = np.zeros(len(pattern.indices))
+    for number, group in enumerate(groups):
+        sigma = tensor(stress(group))
+        for chunk in group.chunks():
+            dV, D = group.at(points, chunk)._gauss
+            weighted = sigma[chunk] * dV[..., None, None]
+            pattern.add(data, number, chunk, (np.swapaxes(D, -1, -2) @ weighted @ D).sum(axis=-3))
+    return data
 
 
 def assemble_dense(points: Array, groups: Sequence[ElementGroup]) -> Array:

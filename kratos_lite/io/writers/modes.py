@@ -16,11 +16,17 @@ from kratos_lite.io.formats.vtu import write_pvd, write_vtu
 from kratos_lite.io.writers.endings import check_modes
 from kratos_lite.mesh import Mesh
 from kratos_lite.typing import Array, Complexes
-from kratos_lite.validation import finite, instance, path_of
+from kratos_lite.validation import finite, flag, instance, path_of
 
 
 def write_modes(
-    path: str | Path, mesh: Mesh, values: ArrayLike, shapes: ArrayLike, *, mode: str = "binary"
+    path: str | Path,
+    mesh: Mesh,
+    values: ArrayLike,
+    shapes: ArrayLike,
+    *,
+    mode: str = "binary",
+    buckling: bool = False,
 ) -> None:
     """Write modes as a page for the browser, which lets them swing, or as a series for ParaView.
 
@@ -33,6 +39,7 @@ def write_modes(
         ``model.complex_modes``.
     shapes : (k, n, 3) of any size, real or complex; each is shown with the largest displacement 1.
     mode : of ``.vtu`` files: ``binary``, ``compressed`` or ``ascii``.
+    buckling : whether the values are factors as of ``model.buckling``.
 
     Raises
     ------
@@ -60,7 +67,9 @@ def write_modes(
         return
     from kratos_lite.io.writers.page.write import write_modes_page  # rarely needed
 
-    write_modes_page(path, mesh, names_of_modes(numbers.tolist()), forms)
+    factors = [f"{i}: factor {value:.5g}" for i, value in enumerate(numbers.tolist(), 1)]
+    names = factors if flag(buckling, "buckling") else names_of_modes(numbers.tolist())
+    write_modes_page(path, mesh, names, forms)
 
 
 def _numbers(value: ArrayLike, what: str, shape: tuple[int | str, ...]) -> Array | Complexes:

@@ -151,6 +151,12 @@ def test_a_large_page_holds_the_surface_alone(tmp_path, monkeypatch):
     assert abs(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() - 36) < 1e-5
 
 
+def test_factors_of_buckling_are_no_frequencies(tmp_path):
+    kl.write_modes(tmp_path / "a.html", kl.box(), [1.5, 2.5], np.ones((2, 8, 3)), buckling=True)
+    names = [frame["name"] for frame in content_of(tmp_path / "a.html")["frames"]]
+    assert names == ["1: factor 1.5", "2: factor 2.5"]
+
+
 def test_large_ids_keep_their_digits(tmp_path):
     box = kl.box()
     ids = box.node_ids + 2**62

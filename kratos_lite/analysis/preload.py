@@ -1,0 +1,40 @@
+"""What the stress of a preload adds to the stiffness of a model: K_g = ∫ grad N·σ grad N dV."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
+from kratos_lite.analysis.result import Result
+from kratos_lite.analysis.static import StaticAnalysis
+from kratos_lite.assembly.block_matrix import BlockMatrix
+from kratos_lite.assembly.stiffness import stress_stiffness
+from kratos_lite.errors import InputError, ModelError
+from kratos_lite.model.loads import Load
+from kratos_lite.solvers.constrained_system import renumber
+
+Preload: TypeAlias = "Result | Load | Sequence[Load] | Literal[True]"
+"""A result, loads of which one is made, or True for those of the model."""
+
+
+def preload_stiffness(e: EquationsOfMotion, preload: Preload, what: str) -> BlockMatrix:
+    """Return K_g (3a, 3a) in N/m of the stress of a preload; what needs it is named in errors."""
+    model, result = e.model, preload
+    model.require_linear(what)
+    if model.motion is not None:
+        raise ModelError(f"{what} takes no motion of the material; take a model without it")
+    if not isinstance(result, Result):
+        result = StaticAnalysis(model, progress=e.system.progress).solve(None if result is True else result)
+    if result.mesh is not model.mesh:
+        raise InputError("a preload must be a result on the mesh of the model; got one on another mesh")
+    nodes, groups = renumber(model.mesh.n_nodes, result.groups)
+    pattern = model.patterns.get(len(nodes), [group.nodes for group in groups])
+    data = stress_stiffness(model.mesh.points, result.groups, pattern, result.stress_in)
+    if not data.any():
+        raise ModelError("the preload makes no stress; add loads, or displace supports")
+    matrix = BlockMatrix(np.zeros((len(data), 3, 3)), pattern.indices, pattern.indptr)
+    matrix.add_scalar(data)
+    return matrix

@@ -1,0 +1,224 @@
+"""Buckling under loads, and modes of a body under stress: columns, plates, strings."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import kratos_lite as kl
+from kratos_lite.errors import InputError, KratosLiteError, ModelError, SolveError
+
+STEEL = {"E": 210e9, "nu": 0.3, "density": 7850.0}
+H, L = 0.1, 2.0
+EI = STEEL["E"] * H**4 / 12
+EULER = np.pi**2 * EI / L**2
+STRAIGHT = kl.Isotropic3D(**STEEL | {"nu": 0.0})  # ends that are held do not press from the side
+KINDS = [
+    ("EnhancedStrain3D8N", (1, 1, 24)),
+    ("KinematicLinear3D10N", (1, 1, 10)),
+    ("KinematicLinear3D20N", (1, 1, 10)),
+]
+
+
+def column(element="KinematicLinear3D20N", cells=(1, 1, 10), force=-1.0, **law):
+    """Return a column under a force in N, clamped at its foot."""
+    model = kl.Model(kl.box((H, H, L), cells, element), kl.Isotropic3D(**STEEL | law))
+    model.fix("z-")
+    model.add(kl.Traction("z+", (0, 0, force / H**2)))
+    return model
+
+
+def half_column(force=-1.0):
+    """Return half of a column with two hinges: its lower end slides in a plane of symmetry."""
+    model = kl.Model(kl.box((H, H, L / 2), (1, 1, 8), "KinematicLinear3D20N"), STRAIGHT)
+    model.fix("z-", "z")
+    model.fix("z+", "xy")
+    model.add(kl.Traction("z+", (0, 0, force / H**2)))
+    return model
+
+
+@pytest.mark.parametrize(("element", "cells"), KINDS)
+@pytest.mark.parametrize(("end", "euler"), [("free", 1 / 4), ("hinged", 2.0457), ("clamped", 4.0)])
+def test_euler_columns(element, cells, end, euler):
+    """Clamped at the foot; each factor twice, as the section is a square."""
+    model = column(element, cells, nu=0.0)
+    if end == "hinged":
+        model.fix("z+", "xy")
+    if end == "clamped":
+        model.fix("z+", "xy")
+        model.fix("z+", "z", -L / STEEL["E"] / H**2)
+    factors, shapes = model.buckling(2)
+    shear = 1 + euler * EULER / (5 / 6 * STEEL["E"] / 2 * H**2)
+    assert factors == pytest.approx(euler * EULER / shear, rel=1.5e-2)
+    assert np.linalg.norm(shapes, axis=2).max(axis=1) == pytest.approx(1.0, rel=1e-12)
+    assert np.abs(shapes[:, :, 2]).max() < 0.3  # they bend
+
+
+def test_column_with_two_hinges_by_symmetry():
+    assert half_column().buckling(2)[0] == pytest.approx(EULER, rel=1e-2)
+
+
+def test_of_two_columns_no_factor_is_missed():
+    """By iteration, those of two columns are those of each of them."""
+    alone, cells = [], (1, 1, 24)
+    meshes = [kl.box((H, H, length), cells, "KinematicLinear3D20N") for length in (2.0, 1.7)]
+    points = np.vstack([meshes[0].points, meshes[1].points + np.array([1.0, 0.0, 0.0])])
+    n = meshes[0].n_nodes
+    blocks = [kl.Block(b.name, np.vstack([b.nodes, b.nodes + n])) for b in meshes[0].blocks]
+    for mesh in (*meshes, kl.Mesh(points, blocks)):
+        model = kl.Model(mesh, kl.Isotropic3D(**STEEL))
+        model.fix(lambda X: X[:, 2] < 1e-9)
+        model.add(kl.BodyForce((0.0, 0.0, -1.0)))
+        alone.append(model.buckling(6)[0])
+    assert len(model.supports.fixed) * 3 > 1200
+    np.testing.assert_allclose(alone[2], np.sort(np.concatenate(alone[:2]))[:6], rtol=1e-8)
+
+
+def test_iteration_finds_what_lapack_finds(monkeypatch):
+    from kratos_lite.analysis import modal
+
+    model = column(cells=(1, 1, 12))
+    whole = model.buckling(5)[0]
+    stressed = model.modes(4, preload=True)[0]
+    monkeypatch.setattr(modal, "DENSE_MODES", 10)
+    monkeypatch.setattr("kratos_lite.solvers.eigen.DENSE_MODES", 10)
+    np.testing.assert_allclose(model.buckling(5)[0], whole, rtol=1e-8)
+    np.testing.assert_allclose(model.modes(4, preload=True)[0], stressed, rtol=1e-8)
+
+
+@pytest.mark.parametrize(("element", "cells"), [("EnhancedStrain3D8N", 16), ("KinematicLinear3D27N", 12)])
+def test_strip_of_a_plate(element, cells):
+    """In plane strain, clamped at one end: π² D / (2 L)² for each width."""
+    t = 0.02
+    model = kl.Model(kl.box((1, 0.1, t), (cells, 1, 1), element), kl.Isotropic3D(**STEEL))
+    model.fix("x-")
+    for side in ("y-", "y+"):
+        model.fix(side, "y")
+    model.add(kl.Traction("x+", (-1 / t, 0, 0)))
+    D = STEEL["E"] * t**3 / 12 / (1 - STEEL["nu"] ** 2)
+    assert model.buckling(2)[0] == pytest.approx(np.pi**2 * D / 4 * np.array([1, 9]), rel=1.5e-2)
+
+
+def test_heated_column():
+    """Between two walls, its load is E α ΔT A: K_g of the thermal stress, it bends about x alone."""
+    mesh = kl.box((H, H, L), (1, 1, 10), "KinematicLinear3D20N")
+    model = kl.Model(mesh, kl.Isotropic3D(**STEEL, alpha=1e-5))
+    for side in ("z-", "z+"):
+        model.fix(side, "z")
+        model.fix(mesh.nodes(side)[:1], "xy")
+    model.fix("x-", "x")
+    model.add(kl.Temperature(10.0))
+    factor = model.buckling(1)[0][0]
+    assert factor * STEEL["E"] * 1e-4 * H**2 == pytest.approx(4 * EULER, rel=2e-2)
+
+
+def stretched(strain):
+    """Return a thin bar between two clamps that stretch it."""
+    size = (0.02, 0.02, 2.0)
+    model = kl.Model(kl.box(size, (1, 1, 24), "KinematicLinear3D20N"), STRAIGHT)
+    model.fix("z-")
+    model.fix("z+", "xy")
+    model.fix("z+", "z", strain * size[2])
+    return model
+
+
+def of_string(strain, number):
+    """Return a frequency in rad/s of a clamped beam under tension: E I w'''' - N w'' = ρ A ω² w."""
+    b, length = 0.02, 2.0
+    bending, force, mass = STEEL["E"] * b**4 / 12, STEEL["E"] * strain * b**2, STEEL["density"] * b**2
+
+    def determinant(omega):
+        root = np.sqrt(force**2 + 4 * bending * mass * omega**2)
+        s, k = np.sqrt((root + force) / 2 / bending), np.sqrt((root - force) / 2 / bending)
+        tanh, sech = np.tanh(s * length), 1 / np.cosh(s * length)
+        return 2 * s * k * (sech - np.cos(k * length)) + (s**2 - k**2) * tanh * np.sin(k * length)
+
+    scale = np.pi / length * np.sqrt(force / mass + (np.pi / length) ** 2 * bending / mass)
+    grid = np.linspace(0.05, 4 * number, 4000) * scale
+    signs = np.sign([determinant(w) for w in grid])
+    at = np.flatnonzero(signs[1:] != signs[:-1])[number - 1]
+    return brentq(determinant, grid[at], grid[at + 1])
+
+
+@pytest.mark.parametrize("strain", [1e-5, 1e-3, 1e-2])
+def test_string(strain):
+    """Modes in pairs, of the beam under tension; the taut one sounds like a string."""
+    omega, _ = stretched(strain).modes(6, preload=True)
+    exact = [of_string(strain, number) for number in (1, 1, 2, 2, 3, 3)]
+    np.testing.assert_allclose(omega, exact, rtol=1.5e-2)
+    if strain == 1e-2:
+        string = np.pi / 2.0 * np.sqrt(STEEL["E"] * strain / STEEL["density"])
+        assert omega[0] == pytest.approx(string, rel=0.08)
+        assert omega[0] > string
+
+
+def test_frequencies_fall_to_zero_at_buckling():
+    """ω² = ω0² (1 - P / P_cr), as shapes stay alike; of a result, of loads and of the model the same."""
+    model = half_column()
+    free, critical = model.modes(1)[0][0], model.buckling(1)[0][0]
+    load, almost, beyond = (kl.Traction("z+", (0, 0, -critical * f / H**2)) for f in (0.5, 0.999, 1.001))
+    half = model.modes(1, preload=load)[0][0]
+    assert half == pytest.approx(free * np.sqrt(0.5), rel=2e-3)
+    assert 0 < model.modes(1, preload=[almost])[0][0] < 0.05 * free
+    with pytest.raises(ModelError, match="the preload is beyond buckling"):
+        model.modes(3, preload=beyond)
+    assert model.buckling(1, preload=beyond)[0][0] == pytest.approx(1 / 1.001, rel=1e-6)
+    loaded = half_column(-critical / 2)
+    for preload in (True, loaded.solve()):
+        assert loaded.modes(1, preload=preload)[0][0] == pytest.approx(half, rel=1e-8)
+    assert model.modes(1)[0][0] == free
+
+
+def test_beyond_buckling_by_iteration():
+    model = column(cells=(1, 1, 40))
+    beyond = kl.Traction("z+", (0, 0, -0.3 * EULER / H**2))
+    with pytest.raises(ModelError, match="the preload is beyond buckling"):
+        model.modes(2, preload=beyond)
+
+
+def test_loads_that_pull_do_not_buckle():
+    with pytest.raises(ModelError, match="less than 4 factors > 0; ask for fewer, or reverse"):
+        column(force=1.0).buckling(4)
+    with pytest.raises(SolveError, match="loads that only pull do not buckle"):
+        column(force=1.0, cells=(1, 1, 40)).buckling(2)
+
+
+def other_mesh():
+    return column(cells=(1, 1, 2)).solve()
+
+
+@pytest.mark.parametrize(
+    ("change", "options", "kind", "message"),
+    [
+        (lambda m: m.loads.clear(), {}, ModelError, "the preload makes no stress; add loads"),
+        (lambda m: m.release("z-"), {}, ModelError, "rigid"),
+        (lambda m: None, {"count": 0}, InputError, "count"),
+        (lambda m: None, {"count": 10**6}, InputError, "got 1000000"),
+        (lambda m: None, {"preload": "wind"}, KratosLiteError, "load"),
+        (lambda m: None, {"preload": False}, KratosLiteError, "load"),
+        (lambda m: None, {"preload": other_mesh()}, InputError, "got one on another mesh"),
+    ],
+)
+@pytest.mark.parametrize("analysis", ["buckling", "modes"])
+def test_bad_input_is_refused(change, options, kind, message, analysis):
+    model = column(cells=(1, 1, 2))
+    change(model)
+    with pytest.raises(kind, match=message):
+        getattr(model, analysis)(**{"preload": True} | options)
+
+
+def test_what_is_not_linear_is_refused():
+    model = kl.Model(kl.box(), kl.NeoHookean3D(E=1e6, nu=0.3, density=1.0))
+    model.fix("z-")
+    with pytest.raises(ModelError, match="buckling takes linear laws"):
+        model.buckling()
+    with pytest.raises(ModelError, match="a preload of modes takes linear laws"):
+        model.modes(preload=True)
+    wheel = kl.Model(kl.annulus(0.3, 1.0, 0.1, cells=(1, 8, 1)), kl.Isotropic3D(**STEEL))
+    wheel.fix("inner")
+    wheel.add(kl.ale.Rotation("z", rate=1.0))
+    with pytest.raises(ModelError, match="buckling takes no motion of the material"):
+        wheel.buckling()
+    with pytest.raises(ModelError, match="a preload of modes takes no motion of the material"):
+        wheel.modes(preload=True)
+    with pytest.raises(InputError, match="near does not go with a preload"):
+        column().modes(near=1.0, preload=True)
