@@ -335,7 +335,7 @@ class Model(Structure):
         Raises
         ------
         MeshError, ModelError, InputError
-            If the model is broken, not linear, or has a motion, no stress, free rigid motions, or fewer factors.
+            If the model is broken or not linear, has a motion, no stress, rigid motions or fewer factors.
         SolveError
             If the iteration does not converge, as where loads only pull.
         """
