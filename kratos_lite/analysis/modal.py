@@ -180,7 +180,9 @@ def critical_rate(model: Structure, count: int = 1) -> Array:
 
 def critical_rates(e: EquationsOfMotion, count: int) -> Array:
     """Return the lowest critical rates (count,) of equations whose supports hold all rigid motions."""
-    largest = _largest(e, _critical_terms(e), count)[0]
+    few = 100 if count == 1 else DENSE_MODES  # one by iteration takes a tenth of the time of all
+    solver = replace(e.system.equations, plan=stepped(len(e.system.constraint_map.free)))
+    largest = _largest(e, _critical_terms(e), solver, count, few)[0]
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.sort(np.where(largest > 0, 1 / np.sqrt(np.maximum(largest, 1e-300)), np.inf))
 
@@ -191,36 +193,37 @@ def buckling(
     """Return factors (count,) and shapes (count, n, 3) of (K + λ K_g) φ = 0; see `Model.buckling`."""
     count, phase = whole_number(count, "count"), Phases(progress)
     with phase("check"):
-        e = EquationsOfMotion(model, free=False, massless=True, progress=progress)
+        e = EquationsOfMotion(model, free=False, massless=True, solver="auto", progress=progress)
     with phase("assemble"):
         K_g = preload_stiffness(e, preload, "buckling")
         K_g.data *= -1
     with phase("modes"):
         try:
-            inverse, vectors = _largest(e, K_g, count)
+            inverse, vectors = _largest(e, K_g, e.system.equations, count, DENSE_MODES)
         except SolveError as error:
             raise SolveError(f"{error}; loads that only pull do not buckle a body") from None
-    if not inverse[-1] > 1e-9 * K_g.norm() / e.K.norm():  # less is rounding: strains of 1e9
+    if not inverse[-1] > 1e-9 * K_g.norm() / e.system.norm:  # less is rounding: strains of 1e9
         raise ModelError(f"the loads have less than {count} factors > 0; ask for fewer, or reverse the loads")
     shapes = expanded(e, vectors)
     return 1 / inverse, shapes / np.linalg.norm(shapes, axis=2).max(axis=1)[:, None, None]
 
 
-def _largest(e: EquationsOfMotion, H: BlockMatrix, count: int) -> tuple[Array, Array]:
-    """Return the largest μ (count,) of H x = μ K x, descending, and x (q, count)."""
+def _largest(
+    e: EquationsOfMotion, H: BlockMatrix, solver: LinearSolver, count: int, few: int
+) -> tuple[Array, Array]:
+    """Return the largest μ (count,) of H x = μ K x, descending, and x (q, count); of `few` by LAPACK."""
     constraints, n = e.system.constraint_map, len(e.system.constraint_map.free)
     if count > n:
         raise InputError(f"this model has up to {n} of them, one for each unknown; got {count}")
-    few = 100 if count == 1 else DENSE_MODES  # one by iteration takes a tenth of the time of all
     if n <= few or count > n // 4:
         from scipy.linalg import eigh
 
-        dense = (reduced(e, A).toarray() for A in (H, e.K))
-        values, vectors = eigh(*dense, subset_by_index=[n - count, n - 1])
+        K = solver.reduced_matrix
+        K = K if isinstance(K, np.ndarray) else K.toarray()
+        values, vectors = eigh(reduced(e, H).toarray(), K, subset_by_index=[n - count, n - 1])
         return values[::-1], vectors[:, ::-1]
-    solver = replace(e.system.equations, plan=stepped(n))
-    times_H, times_K = (_reduced_product(constraints, A.times) for A in (H, e.K))
-    norms = H.norm(), e.K.norm()
+    times_H, times_K = (_reduced_product(constraints, A.times) for A in (H, solver))
+    norms = H.norm(), solver.norm
     problem = Problem(n, lambda X: -times_H(X), times_K, solver.precondition, norms, power=2)
     values, vectors = problem.lowest(count)
     return -values, vectors.T

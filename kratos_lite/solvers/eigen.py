@@ -260,7 +260,7 @@ class Problem:
     def _errors(self, residual: Array, W: Array, X: Array, squares: Array, allowed: float) -> Array:
         """Return the relative errors of λ, r K⁻¹ r^T / λ or r M⁻¹ r^T / λ²; 0 where r is rounding."""
         norm_K, norm_M = self.norms
-        rounding = allowed * (norm_K + np.abs(squares) * norm_M) * _lengths(X)
+        rounding = allowed * (norm_K + squares * norm_M) * _lengths(X)
         energies = np.abs(np.einsum("ij,ij->i", residual, W)) / np.abs(squares) ** self.power
         return np.where(_lengths(residual) <= rounding, 0.0, energies)
 

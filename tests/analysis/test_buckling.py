@@ -1,11 +1,20 @@
 """Buckling under loads, and modes of a body under stress: columns, plates, strings."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 from scipy.optimize import brentq
+from scipy.sparse import csr_array, kron
 
 import kratos_lite as kl
+from kratos_lite.analysis import modal
+from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
+from kratos_lite.assembly import finite_strain
+from kratos_lite.assembly.stiffness import stress_stiffness
 from kratos_lite.errors import InputError, KratosLiteError, ModelError, SolveError
+from tests.analysis.test_block_modes import random_model
 
 STEEL = {"E": 210e9, "nu": 0.3, "density": 7850.0}
 H, L = 0.1, 2.0
@@ -57,6 +66,12 @@ def test_column_with_two_hinges_by_symmetry():
     assert half_column().buckling(2)[0] == pytest.approx(EULER, rel=1e-2)
 
 
+def test_nearly_incompressible_column_by_iteration():
+    model = column("EnhancedStrain3D8N", (4, 4, 24), nu=0.49999)
+    assert model.mesh.n_nodes * 3 > 1200
+    assert model.buckling(2)[0] == pytest.approx(EULER / 4, rel=3e-2)  # the clamp holds the section, too
+
+
 def test_of_two_columns_no_factor_is_missed():
     """By iteration, those of two columns are those of each of them."""
     alone, cells = [], (1, 1, 24)
@@ -73,9 +88,34 @@ def test_of_two_columns_no_factor_is_missed():
     np.testing.assert_allclose(alone[2], np.sort(np.concatenate(alone[:2]))[:6], rtol=1e-8)
 
 
-def test_iteration_finds_what_lapack_finds(monkeypatch):
-    from kratos_lite.analysis import modal
+@pytest.mark.parametrize("seed", range(12))
+def test_random_models(seed, monkeypatch):
+    """K_g is what a prestress adds to the tangent of large displacements; factors are those of LAPACK."""
+    model, _ = random_model(seed)
+    model.fix("z-")
+    rng = np.random.default_rng(seed)
+    model.add(kl.BodyForce(-1e5 * rng.random(3)))
+    e = EquationsOfMotion(model)
+    at, pattern = e.system.points, e.system.pattern
+    free = [replace(g, prestress=None) for g in e.system.groups]
+    stressed = [replace(g, prestress=1e11 * rng.standard_normal((len(g), 6))) for g in free]
+    tangents = (finite_strain.stiffness(at, groups, pattern, 0 * at).data for groups in (stressed, free))
+    found = stress_stiffness(at, stressed, pattern, lambda g: g.prestress[:, None].repeat(len(g.rule), 1))
+    np.testing.assert_allclose(
+        np.subtract(*tangents), found[:, None, None] * np.eye(3), atol=1e-10 * abs(found).max()
+    )
 
+    made, result = model.matrices(), model.solve()
+    data = stress_stiffness(at, result.groups, pattern, result.stress_in)
+    K_g = kron(csr_array((data, pattern.indices, pattern.indptr)), np.eye(3)).tocsr()
+    dense = ((made.T.T @ A @ made.T).toarray() for A in (-K_g, made.K))
+    largest = eigh(*dense, eigvals_only=True)[::-1][:3]
+    for limit in (modal.DENSE_MODES, 10):
+        monkeypatch.setattr(modal, "DENSE_MODES", limit)
+        np.testing.assert_allclose(model.buckling(3)[0], 1 / largest, rtol=1e-6)
+
+
+def test_iteration_finds_what_lapack_finds(monkeypatch):
     model = column(cells=(1, 1, 12))
     whole = model.buckling(5)[0]
     stressed = model.modes(4, preload=True)[0]
