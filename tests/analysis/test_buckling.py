@@ -235,7 +235,7 @@ def other_mesh():
         (lambda m: None, {"count": 10**6}, InputError, "got 1000000"),
         (lambda m: None, {"preload": "wind"}, KratosLiteError, "load"),
         (lambda m: None, {"preload": False}, KratosLiteError, "load"),
-        (lambda m: None, {"preload": other_mesh()}, InputError, "got one on another mesh"),
+        (lambda m: None, {"preload": other_mesh()}, InputError, "a linear result on the mesh of the model"),
     ],
 )
 @pytest.mark.parametrize("analysis", ["buckling", "modes"])
@@ -249,6 +249,10 @@ def test_bad_input_is_refused(change, options, kind, message, analysis):
 def test_what_is_not_linear_is_refused():
     model = kl.Model(kl.box(), kl.NeoHookean3D(E=1e6, nu=0.3, density=1.0))
     model.fix("z-")
+    linear = kl.Model(model.mesh, kl.Isotropic3D(**STEEL))
+    linear.fix("z-")
+    with pytest.raises(InputError, match="a preload must be a linear result on the mesh"):
+        linear.buckling(preload=model.solve())
     with pytest.raises(ModelError, match="buckling takes linear laws"):
         model.buckling()
     with pytest.raises(ModelError, match="a preload of modes takes linear laws"):
