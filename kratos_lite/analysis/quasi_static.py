@@ -198,10 +198,11 @@ class QuasiStaticAnalysis(ModelInTime):
 
         error = in_parts(advance)[1]
         if error:
+            limit = "the load may be beyond the limit load (prescribe displacements in its place), "
             raise SolveError(
                 f"the step from t = {start:g} s to {end:g} s converges up to t = {self.time:g} s only, cut "
-                f"to {SMALLEST_PART / 2:.1e} of its length: {error}; the load may be beyond the limit load, "
-                "or the law may soften: prescribe displacements in place of loads, or take smaller steps"
+                f"to {SMALLEST_PART / 2:.1e} of its length: {error}; {limit if self.model.loads else ''}"
+                "a law may soften, or its tangent be wrong: kratos-lite check my_law.py"
             )
 
     def _advance_along(self, h: float) -> None:
@@ -234,7 +235,10 @@ class QuasiStaticAnalysis(ModelInTime):
             return self._commit(u, known, StepReport(time, tuple(residuals), fraction - done))
 
         if error := in_parts(advance)[1]:
-            raise SolveError(f"no equilibrium was found beyond the load factor {self.time:g}: {error}")
+            raise SolveError(
+                f"no equilibrium was found beyond the load factor {self.time:g}: {error}; take smaller "
+                "steps, or prescribe displacements in place of loads"
+            )
 
     def _loads(self, u: Array, time: float) -> Load:
         following, tangent = self.applied.following(time, u)

@@ -46,7 +46,8 @@ def groups_of(bodies: Sequence[Body]) -> list[list[Body]]:
     """Return the bodies of a list in groups: those that form a batch together, any other alone."""
     if not isinstance(bodies, Sequence) or isinstance(bodies, str):
         raise InputError(
-            f"a body or a sequence of bodies is needed; got {type(bodies).__name__}; of a model: transient()"
+            f"a body or a sequence of bodies is needed; got {type(bodies).__name__}; of a model: transient() "
+            "or quasi_static()"
         )
     if not bodies:
         raise InputError("there is no body to advance")

@@ -88,6 +88,7 @@ class Supports:
         self.fixed.flags.writeable = self.values.flags.writeable = False
         self.hanging = self._constraints = hanging_constraints(mesh)
         self._inclined = Constraints.none()  # of conditions in local axes
+        self._by_axes = np.zeros(mesh.points.shape, dtype=bool)  # what these prescribe along x, y or z
         self._inclined_rows: list[tuple[Ints, Array, Array]] = []  # nodes, directions and values of these
         self._hangs = np.zeros(mesh.n_nodes, dtype=bool)
         if mesh.hanging is not None:
@@ -138,7 +139,7 @@ class Supports:
         """Take a condition away; what others prescribe stays."""
         self.conditions = [other for other in self.conditions if other is not condition]
         self._fixed[:], self._values[:], self._function[:] = False, 0.0, CONSTANT
-        self._inclined, self._inclined_rows = Constraints.none(), []
+        self._inclined, self._inclined_rows, self._by_axes[:] = Constraints.none(), [], False
         self.version += 1
         self.value_version += 1
         for other in self.conditions:
@@ -153,6 +154,8 @@ class Supports:
             self._fixed[at], self._values[at], self._function[at] = False, 0.0, CONSTANT
             self.version += 1
             self.value_version += 1
+            if self._inclined_rows:
+                self._resolve_inclined()
             return
         follows = self._hangs[nodes]
         if len(nodes) and follows.all():
@@ -195,9 +198,13 @@ class Supports:
         self._resolve_inclined()
 
     def _resolve_inclined(self) -> None:
-        """Make constraints of all components along local axes, those of one node together."""
+        """Find what components along local axes mean, with all others that are prescribed at their nodes."""
+        self._fixed[self._by_axes], self._by_axes[:] = False, False
         rows, a, v = (np.concatenate(parts) for parts in zip(*self._inclined_rows, strict=True))
-        nodes, at = np.unique(rows, return_inverse=True)
+        nodes = np.unique(rows)
+        i, axis = np.nonzero(self._fixed[nodes] & (self._function[nodes] == CONSTANT))
+        rows, a = np.concatenate([rows, nodes[i]]), np.concatenate([a, np.eye(3)[axis]])
+        v, at = np.concatenate([v, self._values[nodes[i], axis]]), np.searchsorted(nodes, rows)
         G, g = np.zeros((len(nodes), 3, 3)), np.zeros((len(nodes), 3))  # Σ a aᵀ u = Σ a v at each node
         np.add.at(G, at, a[:, :, None] * a[:, None])
         np.add.at(g, at, a * v[:, None])
@@ -207,7 +214,7 @@ class Supports:
         wrong = np.abs((a * u[at]).sum(axis=1) - v) > 1e-9 * np.abs(v).max(initial=0.0)
         if wrong.any():
             node = self.mesh.node_ids[rows[wrong.argmax()]]
-            raise ModelError(f"node {node} has supports in local axes that contradict each other")
+            raise ModelError(f"supports along local axes and others contradict each other at node {node}")
         self._inclined = Constraints.none()
         for rank in (1, 2, 3):
             some = known.sum(axis=1) == rank
@@ -216,7 +223,7 @@ class Supports:
 
     def _resolve(self, nodes: Ints, A: Array, u: Array) -> None:
         """Let k components of displacements follow from the others where A (m, k, 3) times them is A u."""
-        k, free = A.shape[1], 1 - 0.999 * self._fixed[nodes]  # what is prescribed follows from nothing else
+        k, free = A.shape[1], 1 - 0.999 * self._fixed[nodes]  # what moves in time follows from nothing else
         first = np.zeros(len(nodes), dtype=int)
         if k < 3:
             size = np.abs(A[:, 0]) * free if k == 1 else np.abs(np.cross(A[:, 0], A[:, 1])) / free
@@ -225,14 +232,19 @@ class Supports:
         A, u = np.take_along_axis(A, order[:, None], axis=2), np.take_along_axis(u, order, axis=1)
         W = -np.linalg.solve(A[:, :, :k], A[:, :, k:])
         W = np.where(np.abs(W) < AXIAL, 0.0, W)
-        c = u[:, :k] - (W @ u[:, k:, None])[..., 0]
+        c = (u[:, :k] - (W @ u[:, k:, None])[..., 0]).ravel()
         dofs = 3 * nodes[:, None] + order
-        alone = ~W.any(axis=(1, 2))
-        self._fixed.flat[dofs[alone, :k]], self._values.flat[dofs[alone, :k]] = True, c[alone]
-        if not alone.all():
-            others = np.broadcast_to(dofs[~alone, None, k:], W[~alone].shape).reshape(-1, 3 - k)
-            weights, constants = np.asarray(W[~alone].reshape(-1, 3 - k), dtype=float), c[~alone].ravel()
-            self._inclined += Constraints.of(dofs[~alone, :k].ravel(), others, weights, constants)
+        others, weights = (
+            np.broadcast_to(dofs[:, None, k:], W.shape).reshape(len(c), 3 - k),
+            W.reshape(len(c), 3 - k),
+        )
+        dependents, alone = dofs[:, :k].ravel(), ~weights.any(axis=1)
+        self._by_axes.flat[dependents[alone]] = ~self._fixed.flat[dependents[alone]]
+        self._fixed.flat[dependents[alone]], self._values.flat[dependents[alone]] = True, c[alone]
+        some = ~alone
+        if some.any():
+            inclined = dependents[some], others[some], np.asarray(weights[some], dtype=float), c[some]
+            self._inclined += Constraints.of(*inclined)
 
     def _number(self, function: Callable[[float], float]) -> tuple[int, float]:
         """Return the number of a function of time, and its value at the time 0."""

@@ -146,6 +146,8 @@ def _forgotten(kind: type) -> list[Finding]:
         base, what = BASES[signs[0]].__name__, " and ".join(signs[0])
         text = f"{kind.__name__} has {what} but is no {base}, so nothing uses it: "
         return [Finding("base class", False, inf, 0, text + f"write class {kind.__name__}({base})")]
+    if issubclass(kind, Material) and is_dataclass(kind) and not kind.__dataclass_params__.frozen:
+        return [Finding("dataclass", False, inf, 0, f"{kind.__name__} may change: write {FROZEN} above it")]
     if _lacks_decorator(kind):
         text = f"{kind.__name__} lists constants: add {FROZEN} above it"
         return [Finding("dataclass", False, inf, 0, text)]

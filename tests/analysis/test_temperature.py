@@ -187,11 +187,17 @@ def test_what_is_no_temperature_is_refused(act, words):
         act()
 
 
+def test_a_body_that_does_not_swell_is_named():
+    model = rod(kl.Isotropic3D(E, NU))
+    model.add(kl.Temperature(100.0))
+    assert any("no material there has an alpha" in text for text in model.solve().report.warnings)
+
+
 def test_large_strains_are_refused():
     model = kl.Model(kl.box(element="TotalLagrangianElement3D8N"), STEEL)
     model.fix("z-")
     model.add(kl.Temperature(100.0))
-    with pytest.raises(ModelError, match="a temperature strains elements of small strains"):
+    with pytest.raises(ModelError, match="a temperature is for small strains"):
         model.solve()
 
 

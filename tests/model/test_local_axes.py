@@ -1,5 +1,7 @@
 """Supports and results in local axes: turned bodies, sectors, planes of symmetry; what is refused."""
 
+from itertools import permutations
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -93,6 +95,34 @@ def test_a_sector_of_a_sphere_and_a_finer_one():
         assert np.abs(u[:, 1:]).max() < 1e-3 * np.abs(u).max()
     model.release("cut")
     assert len(model.supports.constraints) == 0
+
+
+@pytest.mark.parametrize("order", list(permutations(range(4))))
+def test_supports_that_meet_in_a_node_act_together_in_any_order(order):
+    """A wedge that swells freely between planes; one corner is held, too."""
+    box = kl.box((1, 1, 1), (2, 2, 2), "Element3D8N")
+    points = box.points + np.outer(box.points[:, 1], (0, 0, 1.0))
+    model = kl.Model(box.replace(points=points), kl.Isotropic3D(200e9, 0.3, alpha=1e-5))
+    bottom = np.flatnonzero(box.points[:, 2] == 0)
+    supports = (
+        lambda: model.symmetry("x-"),
+        lambda: model.symmetry(bottom),
+        lambda: model.fix((0.0, 0.0, 0.0), "xyz"),
+        lambda: model.fix(box.nodes("y-"), "y", local=kl.Cartesian((1, 0, 0), (0, 1, 0))),
+    )
+    for number in order:
+        supports[number]()
+    model.add(kl.Temperature(100.0))
+    result = model.solve()
+    assert np.abs(result.u - 1e-3 * points).max() < 1e-12
+    assert np.abs(result.stress()).max() < 1.0
+
+
+def test_contradicting_supports_are_named_by_their_node():
+    model = kl.Model(kl.box(), STEEL)
+    model.fix("x-", "x", 1e-3)
+    with pytest.raises(ModelError, match="contradict each other at node"):
+        model.fix("x-", "x", local=kl.Cartesian((1, 0, 0)))
 
 
 @pytest.mark.parametrize(

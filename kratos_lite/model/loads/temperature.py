@@ -96,6 +96,14 @@ class Temperature(Load):
         """Return no forces: a temperature strains, and pushes nothing."""
         return np.zeros_like(mesh.points)
 
+    def warnings(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
+        """Return a warning if no element swells."""
+        has = np.zeros(mesh.n_elements, dtype=bool)
+        has[mesh.elements(self.where)] = True
+        if any(has[group.rows].any() and group.material.expansion.any() for group in groups):
+            return []
+        return [f"{self!r} strains nothing: no material there has an alpha, its thermal expansion"]
+
     def refined(self, finer: RefinedMesh) -> Load:
         """Return the temperature on a finer mesh."""
         nodal = not callable(self.values) and np.ndim(self.values)
@@ -125,7 +133,7 @@ def _heated(group: ElementGroup, heating: Array) -> ElementGroup:
         return group
     if group.element.finite or "local_system" in group.element.custom:
         raise ModelError(
-            f"{group.element.__name__}: a temperature strains elements of small strains that have a B; take "
-            "those, or leave the temperature out"
+            f"{group.element.__name__}: a temperature is for small strains, and for no local system of one's "
+            "own; take another formulation, or leave the temperature out"
         )
     return replace(group, heating=heating)
