@@ -183,7 +183,7 @@ def test_arguments_of_solutions_are_checked_with_a_motion_too():
         model.transient(progress=3)
     with pytest.raises(kl.InputError, match="a Result or a State is needed; got NoneType"):
         kl.reaction_resultant(model, None)
-    with pytest.raises(kl.InputError, match="critical rates; got 100000"):
+    with pytest.raises(kl.InputError, match="one for each unknown; got 100000"):
         critical_rate(model, 100_000)
 
 
