@@ -28,7 +28,6 @@ Blocks of 1 × 1 × 2 m on a clamped side, sheared at the top in {steps} steps, 
 (`J2Plasticity3D`, linear hardening, B-bar) and rubber (`NeoHookean3D`, total Lagrangian); relative residual
 1e-8. `python -m benchmarks laws`, two cores, seconds of whole processes from Python's start to the last step;
 Kratos takes AMGCL with 3 × 3 blocks to 1e-10. The last column is the difference of the largest displacement.
-The machine was busy with other work: ratios are rough, and seconds and points a second are low.
 
 """
 POINTS = "\nGauss points a second of `evaluate` with the tangent on one core, in millions: "
