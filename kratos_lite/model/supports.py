@@ -88,7 +88,6 @@ class Supports:
         self.fixed.flags.writeable = self.values.flags.writeable = False
         self.hanging = self._constraints = hanging_constraints(mesh)
         self._inclined = Constraints.none()  # of conditions in local axes
-        self._by_axes = np.zeros(mesh.points.shape, dtype=bool)  # what these prescribe along x, y or z
         self._inclined_rows: list[tuple[Ints, Array, Array]] = []  # nodes, directions and values of these
         self._hangs = np.zeros(mesh.n_nodes, dtype=bool)
         if mesh.hanging is not None:
@@ -139,7 +138,7 @@ class Supports:
         """Take a condition away; what others prescribe stays."""
         self.conditions = [other for other in self.conditions if other is not condition]
         self._fixed[:], self._values[:], self._function[:] = False, 0.0, CONSTANT
-        self._inclined, self._inclined_rows, self._by_axes[:] = Constraints.none(), [], False
+        self._inclined, self._inclined_rows = Constraints.none(), []
         self.version += 1
         self.value_version += 1
         for other in self.conditions:
@@ -199,7 +198,6 @@ class Supports:
 
     def _resolve_inclined(self) -> None:
         """Find what components along local axes mean, with all others that are prescribed at their nodes."""
-        self._fixed[self._by_axes], self._by_axes[:] = False, False
         rows, a, v = (np.concatenate(parts) for parts in zip(*self._inclined_rows, strict=True))
         nodes = np.unique(rows)
         i, axis = np.nonzero(self._fixed[nodes] & (self._function[nodes] == CONSTANT))
@@ -239,7 +237,6 @@ class Supports:
             W.reshape(len(c), 3 - k),
         )
         dependents, alone = dofs[:, :k].ravel(), ~weights.any(axis=1)
-        self._by_axes.flat[dependents[alone]] = ~self._fixed.flat[dependents[alone]]
         self._fixed.flat[dependents[alone]], self._values.flat[dependents[alone]] = True, c[alone]
         some = ~alone
         if some.any():

@@ -254,3 +254,7 @@ def test_a_step_begins_where_the_last_ones_lead():
     assert max(counts[3:8]) < counts[0]  # on the way up; then the load turns
     assert len(counts) == 16
     assert np.abs(analysis.u).max() < 1e-6
+    bar_of_glue = bar(kl.GeneralizedMaxwell3D(1e6, 0.3, 0.0, 1.0), size=(1, 1, 1))
+    bar_of_glue.add(kl.Traction("z+", (0, 0, 1e3)), amplitude=lambda t: t**2)  # a parabola all the way
+    parts = steps(bar_of_glue, 1.0, 8).reports
+    assert [report.iterations for report in parts][3:] == [0] * 5

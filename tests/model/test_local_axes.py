@@ -121,6 +121,7 @@ def test_supports_that_meet_in_a_node_act_together_in_any_order(order):
 def test_contradicting_supports_are_named_by_their_node():
     model = kl.Model(kl.box(), STEEL)
     model.fix("x-", "x", 1e-3)
+    model.fix("x-", "x", 1e-3, local=kl.Cartesian((1, 0, 0)))
     with pytest.raises(ModelError, match="contradict each other at node"):
         model.fix("x-", "x", local=kl.Cartesian((1, 0, 0)))
 
