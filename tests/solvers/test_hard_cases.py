@@ -15,7 +15,7 @@ from kratos_lite.solvers.multigrid import Compiled
 from kratos_lite.solvers.plate_level import bending_modes, plate_axes, plate_level
 
 pytestmark = compiled
-LIMIT = 60
+LIMIT = 75
 STEEL = kl.Isotropic3D(E=2e11, nu=0.3)
 CELLS = {"4N": (9, 9, 9), "8N": (9, 9, 9), "10N": (4, 4, 4), "20N": (5, 5, 5), "27N": (4, 4, 4)}
 
