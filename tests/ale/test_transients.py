@@ -64,15 +64,19 @@ def reference(wheels):
     return done.y[: len(free), -1]
 
 
-@pytest.mark.parametrize("integrator", [kl.Newmark(), kl.GeneralizedAlpha(0.3)], ids=str)
+@pytest.mark.parametrize(
+    "integrator",
+    [kl.Newmark(), kl.HHT(-0.3), kl.GeneralizedAlpha(0.3)],
+    ids=str,
+)
 def test_order_two_while_the_rate_changes(integrator, wheels, reference):
     transient = shaken_wheel(wheels).transient(integrator=integrator)
     free, errors = transient.equations.system.constraint_map.free, []
-    for steps in (75, 150):
+    for steps in (150, 300):
         transient = shaken_wheel(wheels).transient(integrator=integrator)
         list(kl.integrate(transient, SPAN / steps, steps, every=steps))
         errors.append(np.abs(transient.u[free] - reference).max() / np.abs(reference).max())
-    assert errors[1] < 2e-2
+    assert errors[1] < 4e-3
     assert 1.95 < np.log2(errors[0] / errors[1]) < 2.05
 
 
@@ -163,8 +167,8 @@ def contact(wheels, mesh, turned=0.0):
 @pytest.mark.parametrize(
     ("element", "cells", "start", "spin", "T", "steps", "tolerance"),
     [
-        ("8N", (2, 16), 60.0, 0.0, np.pi / 60, 100, 1.7e-3),
-        ("20N", (1, 32), 0.0, 872.664626, 0.03, 50, 5e-6),
+        ("8N", (4, 32), 30.0, 0.0, np.pi / 60, 200, 1.7e-3),
+        ("20N", (1, 32), 0.0, 872.664626, 0.03, 100, 5e-6),
     ],
 )
 def test_the_same_in_axes_that_turn_with_the_material(
@@ -248,15 +252,15 @@ def graded(wheels, **options):
 def test_energy_is_constant_on_a_graded_mesh(wheels):
     transient = graded(wheels)
     start = transient.energy()
-    energies = [transient.energy() for _ in kl.integrate(transient, STEP, 600, every=100)]
-    assert np.abs(np.array(energies) / start - 1).max() < 600 * EPS  # each step rounds once
+    energies = [transient.energy() for _ in kl.integrate(transient, STEP, 2000, every=250)]
+    assert np.abs(np.array(energies) / start - 1).max() < 2000 * EPS  # each step rounds once
 
 
 def test_energy_grows_without_the_skew_form(wheels):
     transient = graded(wheels, skew=False)
     start = transient.energy()
-    *_, _ = kl.integrate(transient, 4 * STEP, 500, every=500)
-    assert transient.energy() > 1.005 * start
+    *_, _ = kl.integrate(transient, STEP, 6000, every=6000)
+    assert transient.energy() > 1.05 * start
 
 
 # ---- bars ------------------------------------------------------------------------------------------------
@@ -293,8 +297,8 @@ def pulse(x):
 
 WAVES = [
     ("8N", 100, 400, 0.0, (1.5e-2, 2.9e-2, 8.5e-4)),
-    ("27N", 40, 200, 0.0, (6e-2, 5e-3, 1e-3)),
-    ("8N", 100, 200, 400.0, (5e-2, 5e-2, 4e-3)),
+    ("27N", 50, 400, 0.0, (1.3e-2, 1.1e-3, 1.3e-4)),
+    ("8N", 100, 400, 400.0, (1.5e-2, 1.2e-2, 1e-3)),
 ]
 
 

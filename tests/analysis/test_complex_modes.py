@@ -68,7 +68,7 @@ def random_model(seed):
     return model
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(12))
 def test_random_models_have_the_eigenvalues_of_lapack(seed, monkeypatch):
     model = random_model(seed)
     compare(model)

@@ -60,16 +60,16 @@ def test_a_linear_law_moves_as_the_linear_model(integrator):
         assert np.abs(one - other).max() < 1e-6 * np.abs(other).max() > 0
 
 
-@pytest.mark.parametrize("integrator", [IMPLICIT[0], *INTEGRATORS[3:]], ids=str)
+@pytest.mark.parametrize("integrator", INTEGRATORS, ids=str)
 def test_order_and_energy_of_a_hyperelastic_body(integrator):
     model = kl.Model(kl.box((1, 1, 1), (1, 1, 2), "Element3D8N"), RUBBER)
     model.fix("z-")
     z = model.mesh.points[:, 2:]
     shapes, energies = [], []
-    for count in (64, 16, 8):
+    for count in (256, 64, 32):
         transient = model.transient(velocity=np.hstack([3 * z * z, 0 * z, 8 * z]), integrator=integrator)
         start = transient.energy()
-        shapes.append(after(transient, 0.02 / count, count).u)
+        shapes.append(after(transient, 0.04 / count, count).u)
         energies.append(abs(transient.energy() / start - 1))
     fine, coarse = (np.abs(u - shapes[0]).max() for u in shapes[1:])
     assert coarse < 0.01 * np.abs(shapes[0]).max() > 1e-3
@@ -91,9 +91,9 @@ def test_one_element_of_rubber_swings_as_the_differential_equation_says(integrat
         return x[1], (3e5 - stress) / 500.0
 
     exact = solve_ivp(rate, (0, 0.1), (0, 0), rtol=1e-11, atol=1e-13).y[:, -1]
-    state = after(model.transient(integrator=integrator, lumped=True), 1e-3, 100)
-    assert abs(state.u[:, 2].max() - exact[0]) < 5e-4 * abs(exact[0])
-    assert abs(state.v[:, 2].min() - exact[1]) < 5e-3 * abs(exact[1])
+    state = after(model.transient(integrator=integrator, lumped=True), 2e-4, 500)
+    assert abs(state.u[:, 2].max() - exact[0]) < 1e-4 * abs(exact[0])
+    assert abs(state.v[:, 2].min() - exact[1]) < 1e-3 * abs(exact[1])
 
 
 @pytest.mark.parametrize("integrator", [kl.Newmark(), kl.CentralDifference()], ids=str)

@@ -25,25 +25,15 @@ def carried(s) -> kl.Model:
 
 @pytest.mark.parametrize("integrator", INTEGRATORS, ids=lambda s: s.name)
 def test_reactions_are_those_of_the_acceleration(integrator):
-    """m s'' from the first step to the last."""
+    """m s'' from the first step to the last: nothing rings, nothing grows."""
     steady = carried(lambda t: 0.5 * 9.81 * t * t)
-    for state in kl.integrate(steady.transient(integrator=integrator), 1e-3, 20):
+    for state in kl.integrate(steady.transient(integrator=integrator), 1e-3, 50):
         assert state.reactions[:, 2].sum() == pytest.approx(9.81 * RHO, rel=1e-5)
         assert state.v[:, 2] == pytest.approx(9.81 * state.time)
-
-
-@pytest.mark.parametrize(
-    ("integrator", "steps"),
-    [(INTEGRATORS[3], (1e-3,))]
-    + [(s, h) for s in INTEGRATORS[:3] for h in ((2e-3, 1e-3), (1e-3, 1e-4), (1e-5, 1e-3))],
-    ids=str,
-)
-def test_reactions_do_not_ring_nor_grow(integrator, steps):
-    transient = carried(lambda t: 1e-2 * np.sin(30 * t)).transient(integrator=integrator)
-    for h in steps:
-        for state in kl.integrate(transient, h, 60):
-            exact = -9.0 * RHO * np.sin(30 * state.time)
-            assert state.reactions[:, 2].sum() == pytest.approx(exact, abs=4e-4 * 9.0 * RHO)
+    swinging = carried(lambda t: 1e-2 * np.sin(30 * t))
+    for state in kl.integrate(swinging.transient(integrator=integrator), 1e-3, 400):
+        exact = -9.0 * RHO * np.sin(30 * state.time)
+        assert state.reactions[:, 2].sum() == pytest.approx(exact, abs=1e-4 * 9.0 * RHO)
 
 
 def test_a_kink_gives_its_whole_impulse():
@@ -60,6 +50,16 @@ def test_a_kink_gives_its_whole_impulse():
         errors.append(np.abs(end.u[model.mesh.nodes("z+"), 2] - exact).max())
     assert errors[1] < 1e-4 * V
     assert errors[0] / errors[1] > 3
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS[:3], ids=lambda s: s.name)
+@pytest.mark.parametrize("steps", [(2e-3, 1e-3), (1e-3, 1e-4), (1e-5, 1e-3)])
+def test_another_step_does_not_make_reactions_ring(integrator, steps):
+    transient = carried(lambda t: 1e-2 * np.sin(30 * t)).transient(integrator=integrator)
+    for h in steps:
+        for state in kl.integrate(transient, h, 100):
+            exact = -9.0 * RHO * np.sin(30 * state.time)
+            assert state.reactions[:, 2].sum() == pytest.approx(exact, abs=4e-4 * 9.0 * RHO)
 
 
 @pytest.mark.parametrize("hertz", [1e3, 1e5, 1e6])
@@ -86,7 +86,7 @@ def test_supports_that_come_to_be_equal():
         model.fix(everywhere, "xy")
         model.fix("z-", "z", TimeSeries([0.0, 0.2, 1.0], [0.0, 1e-3, 1e-3]))
         model.fix("z+", "z", TimeSeries([0.0, 0.2, 1.0], [0.0, 1e-3 + apart, 1e-3 + apart]))
-        ends.append(np.array([state.u[:, 2] for state in kl.integrate(model.transient(), 4e-3, 60)]))
+        ends.append(np.array([state.u[:, 2] for state in kl.integrate(model.transient(), 2e-3, 200)]))
     assert np.abs(ends[0] - ends[1]).max() < 2e-9
 
 
@@ -134,7 +134,7 @@ def test_what_is_tied_to_a_support_moves_with_it():
     base = int(model.mesh.nodes("z-")[0])
     for node in np.flatnonzero(model.mesh.points[:, 2] > 0).tolist():
         model.constrain((node, "z"), {(base, "z"): 1.0})
-    for state in kl.integrate(model.transient(), 1e-3, 60):
+    for state in kl.integrate(model.transient(), 1e-3, 200):
         np.testing.assert_allclose(state.u[:, 2], 1e-2 * np.sin(30 * state.time), atol=1e-13)
         np.testing.assert_allclose(state.v[:, 2], 0.3 * np.cos(30 * state.time), atol=1e-4)
         np.testing.assert_allclose(state.a[:, 2], -9.0 * np.sin(30 * state.time), atol=2e-3)

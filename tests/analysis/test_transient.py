@@ -60,7 +60,7 @@ def test_order_two(name):
     model, integrator = bar(), INTEGRATORS[name]
     omega, mode = wave(4, lumped=name == "central"), shape(bar())
     errors = []
-    for steps in (32, 64, 128):
+    for steps in (64, 128, 256):
         transient = model.transient(integrator=integrator, displacement=mode, velocity=0.5 * omega * mode)
         end = last(transient, 1.3 / omega / steps * 4, steps)
         t = omega * end.time
@@ -69,7 +69,7 @@ def test_order_two(name):
         errors.append(np.hypot(np.abs(end.u - u).max(), np.abs(end.v - v).max() / omega))
     rates = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
     assert (np.abs(rates - 2) < 0.15).all()
-    assert errors[-1] < 8e-3
+    assert errors[-1] < 2e-3
 
 
 @pytest.mark.parametrize(
@@ -133,7 +133,7 @@ def test_critical_step():
         kl.integrate(transient, 2 / omega * 1.3, 10)
     v = np.random.default_rng(0).standard_normal(model.mesh.points.shape)
     safe = model.transient(integrator=CentralDifference(), velocity=v)
-    assert np.abs(last(safe, 0.5 / omega, 400).u).max() < 1.0
+    assert np.abs(last(safe, 0.5 / omega, 2000).u).max() < 1.0
 
 
 # ---- energy and damping --------------------------------------------------------------------------------
@@ -145,7 +145,7 @@ def test_energy_of_the_trapezoidal_rule():
     x, y, z = model.mesh.points.T
     transient = model.transient(velocity=np.column_stack([z * z, x * z, y * z]))
     start = transient.energy()
-    energies = [transient.energy() for _ in kl.integrate(transient, 2.0**-9, 300, every=50)]
+    energies = [transient.energy() for _ in kl.integrate(transient, 2.0**-9, 1000, every=100)]
     assert np.abs(np.array(energies) / start - 1).max() < 1e-12
 
 
@@ -161,7 +161,7 @@ def test_rayleigh_damping(alpha, beta, name):
         integrator=INTEGRATORS[name], displacement=mode, velocity=-xi * omega * mode, rayleigh=(alpha, beta)
     )
     period = 2 * np.pi / damped
-    n = 200 if name == "trapezoidal" else 1000
+    n = 400 if name == "trapezoidal" else 2000
     end = last(transient, 2 * period / n, n)
     exact = np.exp(-xi * omega * 2 * period)
     np.testing.assert_allclose(
@@ -181,17 +181,21 @@ def pulled(factor) -> kl.Model:
 
 W = wave(1, lumped=False)
 RAMP = TimeSeries([0.0, 10 / W], [0.0, 1.0])
-LOADS = {  # amplitude, and u k / F of one cell from rest, up to the time 10 / ω
-    "at once": (None, lambda x: 1 - np.cos(x)),
-    "harmonic": (lambda t: np.sin(0.6 * W * t), lambda x: (np.sin(0.6 * x) - 0.6 * np.sin(x)) / 0.64),
-    "ramp": (RAMP, lambda x: (x - np.sin(x)) / 10),
+LOADS = {  # amplitude, u k / F of one cell from rest, ω h, steps and what they may miss
+    "at once": (None, lambda x: 1 - np.cos(x), 0.01, 600, 2e-7),
+    "harmonic": (
+        lambda t: np.sin(0.6 * W * t),
+        lambda x: (np.sin(0.6 * x) - 0.6 * np.sin(x)) / 0.64,
+        *(0.005, 1500, 3e-8),
+    ),
+    "ramp": (RAMP, lambda x: (x - np.sin(x)) / 10, 0.01, 1000, 1e-7),
 }
 
 
-@pytest.mark.parametrize(("factor", "exact"), LOADS.values(), ids=LOADS)
-def test_loads_in_time(factor, exact):
-    for state in kl.integrate(pulled(factor).transient(), 0.02 / W, 500, every=50):
-        assert state.u[:, 2].max() == pytest.approx(max(1e3 / E * exact(W * state.time), 0), abs=1.5e-6)
+@pytest.mark.parametrize(("factor", "exact", "step", "steps", "off"), LOADS.values(), ids=LOADS)
+def test_loads_in_time(factor, exact, step, steps, off):
+    for state in kl.integrate(pulled(factor).transient(), step / W, steps, every=steps // 10):
+        assert state.u[:, 2].max() == pytest.approx(max(1e3 / E * exact(W * state.time), 0), abs=off)
 
 
 def test_statics_take_a_load_at_the_time_0():
@@ -208,13 +212,13 @@ def test_support_that_moves(name):
     model = kl.Model(kl.box((1, 1, LENGTH)), kl.Isotropic3D(E=E, nu=0.0, density=RHO))
     model.fix(lambda X: np.ones(len(X), dtype=bool), "xy")
     model.fix("z-", "z", lambda t: amplitude * np.sin(drive * t))
-    h = 0.016 / omega
-    end = last(model.transient(integrator=INTEGRATORS[name]), h, 250)
+    h = 0.004 / omega
+    end = last(model.transient(integrator=INTEGRATORS[name]), h, 2000)
     t, m = end.time, RHO / (2 if lumped else 3)
     push = E + (0 if lumped else RHO / 6 * drive**2)
     A = amplitude * push / (E - m * drive**2)
     exact = A * (np.sin(drive * t) - drive / omega * np.sin(omega * t))
-    assert end.u[:, 2].max() == pytest.approx(max(exact, amplitude * np.sin(drive * t)), abs=3e-6)
+    assert end.u[:, 2].max() == pytest.approx(max(exact, amplitude * np.sin(drive * t)), abs=2e-7)
     bottom = model.mesh.nodes("z-")
     np.testing.assert_allclose(end.u[bottom, 2], amplitude * np.sin(drive * t), atol=1e-15)
     velocity = amplitude * drive * np.cos(drive * t)
@@ -299,7 +303,7 @@ def test_lumped_mass_is_another_frequency():
     mode = shape(bar())
     for lumped in (False, True):
         omega = wave(4, lumped)
-        end = last(bar().transient(displacement=mode, lumped=lumped), 2 * np.pi / omega / 200, 200)
+        end = last(bar().transient(displacement=mode, lumped=lumped), 2 * np.pi / omega / 1000, 1000)
         np.testing.assert_allclose(end.u, mode, atol=1e-4)
 
 

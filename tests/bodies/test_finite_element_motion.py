@@ -228,6 +228,49 @@ def test_a_homogeneous_motion_of_elements_is_that_of_the_pseudo_rigid_body(brick
 # ---- natural frequencies ---------------------------------------------------------------------------
 
 
+PARENTS = {
+    "KinematicLinear3D4N": (0.128205128, 0.128205128, 0.212521895, 0.320512821, 0.320512821, 1.005426823),
+    "KinematicLinear3D5N": (
+        *(0.135327635, 0.206552707, 0.206552707, 0.256410256, 0.256410256, 0.436387511),
+        *(0.769230769, 0.769230769, 2.448227873),
+    ),
+    "KinematicLinear3D6N": (
+        *(0.016025641, 0.120192308, 0.158760638, 0.185326991, 0.248397436, 0.256410256),
+        *(0.272435897, 0.520585824, 0.641025641, 0.744160188, 0.769230769, 2.237320205),
+    ),
+    "KinematicLinear3D8N": (
+        *(0.128205128,) * 2,
+        *(0.235042735,) * 3,
+        *(0.384615385,) * 3,
+        0.512820513,
+        *(0.769230769,) * 8,
+        2.5,
+    ),
+}
+SHARES = {
+    "KinematicLinear3D4N": (1 / 6, [1 / 4] * 4),
+    "KinematicLinear3D5N": (4 / 3, [3 / 16] * 4 + [1 / 4]),
+    "KinematicLinear3D6N": (1.0, [1 / 6] * 6),
+    "KinematicLinear3D8N": (8.0, [1 / 8] * 8),
+}
+
+
+@pytest.mark.parametrize("name", PARENTS)
+def test_stiffness_and_lumped_mass_of_single_elements(name):
+    """The lowest value of the pyramid is 0.106743 with the derivative of Solfec-1.0."""
+    X = ELEMENTS[name].nodes
+    if name.endswith("5N"):
+        X = np.array([[1.0, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]])
+    body = one_element(name, X, lumped=True)
+    K = body.formulation.K0.scipy().toarray()
+    values = np.linalg.eigvalsh(K)
+    assert np.abs(values[:6]).max() < 1e-14
+    np.testing.assert_allclose(values[6:], PARENTS[name], rtol=2e-8)
+    volume, shares = SHARES[name]
+    assert float(body.mass) == pytest.approx(volume, rel=1e-14)
+    np.testing.assert_allclose(body._mass.nodal, volume * np.array(shares), rtol=1e-13)
+
+
 @pytest.mark.parametrize("name", NAMES[:4])
 def test_the_stiffness_of_a_body_at_rest_is_that_of_small_strains(name):
     body = one_element(name, ELEMENTS[name].nodes)
@@ -248,6 +291,21 @@ def test_frequencies_of_lame():
         omega, shapes = body.modes(40)
         assert np.abs(omega - expected).min() < 1e-8
         np.testing.assert_allclose(shapes.T @ (body._mass.matrix() @ shapes), np.eye(40), atol=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("n", "lowest"),
+    [
+        (1, [0.716114874] * 2 + [0.969624123] * 3 + [1.240347346] * 3 + [1.432229748]),
+        (2, [1.432229748] * 2 + [1.704694373] * 2 + [1.754116039] * 4 + [1.832397908] * 3),
+        (4, [1.667629594] * 2 + [2.163240563] * 3 + [2.314509271] + [2.409169897] * 3),
+    ],
+)
+def test_frequencies_of_cubes_with_lumped_mass_are_those_of_solfec(n, lowest):
+    omega, shapes = unit_cube(n, lumped=True).modes(6 + len(lowest))
+    np.testing.assert_allclose(omega[6:], lowest, rtol=1e-8)
+    M = unit_cube(n, lumped=True)._mass.matrix()
+    np.testing.assert_allclose(shapes.T @ (M @ shapes), np.eye(len(omega)), atol=1e-10)
 
 
 def bar(cells=(2, 2, 20), element="KinematicLinear3D8N", **options):

@@ -62,8 +62,8 @@ def bar(kind, **options):
 
 @pytest.mark.parametrize(
     ("kind", "integrator", "h", "error"),
-    [(kl.RigidBody, integrator, 4e-3, 5e-5) for integrator in RIGID]
-    + [(kl.PseudoRigidBody, "ENERGY_MOMENTUM", 5e-3, 2e-3), (kl.PseudoRigidBody, "DEF_LIM", 2e-3, 2e-3)]
+    [(kl.RigidBody, integrator, 2e-3, 1e-5) for integrator in RIGID]
+    + [(kl.PseudoRigidBody, "ENERGY_MOMENTUM", 5e-3, 2e-3), (kl.PseudoRigidBody, "DEF_LIM", 1e-3, 2e-3)]
     + [(kl.FiniteElementBody, "ENERGY_MOMENTUM", 1e-2, 2e-3)],
 )
 def test_a_pinned_bar_is_released(kind, integrator, h, error):
@@ -93,12 +93,12 @@ PERIOD = 2.3606811980
 
 @pytest.mark.parametrize(
     ("kind", "integrator", "h"),
-    [(kl.RigidBody, integrator, PERIOD / 150) for integrator in RIGID]
-    + [(kl.PseudoRigidBody, "DEF_LIM", PERIOD / 150), (kl.FiniteElementBody, "ENERGY_MOMENTUM", PERIOD / 75)]
-    + [(kl.PseudoRigidBody, "DEF_EXP", PERIOD / 500)],
+    [(kl.RigidBody, integrator, PERIOD / 300) for integrator in RIGID]
+    + [(kl.PseudoRigidBody, "DEF_LIM", PERIOD / 300), (kl.FiniteElementBody, "ENERGY_MOMENTUM", PERIOD / 150)]
+    + [(kl.PseudoRigidBody, "DEF_EXP", PERIOD / 1000)],
 )
 def test_a_pendulum_released_from_the_level(kind, integrator, h):
-    body = cube(kind, integrator, side=0.04, E=4e3, center=(1, 0, 0))
+    body = cube(kind, integrator, side=0.04, E=2e4, center=(1, 0, 0))
     link = kl.RigidLink((1, 0, 0), (0, 0, 0))
     body.constrain(link)
     body.add(kl.Gravity((0, 0, -(np.pi**2))))
@@ -113,7 +113,7 @@ def test_a_pendulum_released_from_the_level(kind, integrator, h):
     a, b, c = x[i - 1 : i + 2]
     period = h * (i + (a - c) / (2 * (a - 2 * b + c)))
     assert longest < 1e-11
-    soft = 3e-3 if kind is not kl.RigidBody else 5e-4
+    soft = 3e-3 if kind is not kl.RigidBody else 2e-4
     assert period == pytest.approx(PERIOD, rel=soft)
     assert abs(float(body.energy()) - start) < 2e-3 * m * np.pi**2
 
@@ -134,14 +134,14 @@ def test_the_link_of_a_pendulum_pulls_with_three_weights_at_the_lowest_point():
 
 @each_body
 def test_a_fixed_direction_leaves_the_others_free(kind, integrator):
-    body = cube(kind, integrator, E=1e5)
+    body = cube(kind, integrator)
     corners = body.mesh.points
     feet = corners[corners[:, 2] < 0]
     rail = kl.FixDirection(feet, (0, 0, 2.0))
     body.constrain(rail)
     body.add(kl.Gravity((2.0, 0, -G)))
     body.set_velocity((1, -1, 0))
-    end(body, 4e-3, 25)
+    end(body, 1e-3, 100)
     np.testing.assert_allclose(body.position(feet)[:, 2], feet[:, 2], atol=1e-13)
     assert body.mass_center()[0] == pytest.approx(0.1 + 0.01, rel=1e-10)
     assert body.mass_center()[1] == pytest.approx(-0.1, rel=1e-10)
@@ -174,12 +174,12 @@ def test_reactions_are_those_of_statics(kind):
 
 @each_body
 def test_a_prescribed_displacement_is_met_at_every_step(kind, integrator):
-    body = cube(kind, integrator, E=1e5)
+    body = cube(kind, integrator)
     corners = body.mesh.points
     path = kl.TimeSeries([0, 0.02, 0.05], [0.0, 0.004, 0.001])
     body.constrain(kl.PrescribedDisplacement(corners[[0, 1, 2, 3]], (0, 0, 1), path))
     body.constrain(kl.PrescribedDisplacement(corners[[0, 1, 2, 3]], (1, 0, 0), lambda t: t * t))
-    for state in kl.integrate(body, 3e-3, 20):
+    for state in kl.integrate(body, 1e-3, 60):
         moved = body.position(corners[:4]) - corners[:4]
         np.testing.assert_allclose(moved[:, 2], path(state.time), atol=1e-13)
         np.testing.assert_allclose(moved[:, 0], state.time**2, atol=1e-13)
@@ -211,11 +211,11 @@ PRESCRIBED = {
 def test_prescribed_velocities_and_accelerations_are_met_at_every_step(
     kind, integrator, make, nodes, way, given, expected, start
 ):
-    body = cube(kind, integrator, E=1e5)
+    body = cube(kind, integrator)
     body.set_velocity((start, 0, 0))
     points, unit = body.mesh.points[nodes], np.array(way) / np.linalg.norm(way)
     body.constrain(make(points, way, given))
-    for state in kl.integrate(body, 3e-3, 20):
+    for state in kl.integrate(body, 1e-3, 60):
         np.testing.assert_allclose(body.velocity(points) @ unit, expected(state.time), rtol=1e-11, atol=1e-12)
 
 
@@ -241,11 +241,11 @@ def test_work_of_reactions_counts():
     body.constrain(
         kl.PrescribedVelocity(body.center, (0, 0, 1), kl.TimeSeries([0, 0.1, 0.4, 0.5], [0, 1, 1, 0]))
     )
-    end(body, 5e-3, 100)
+    end(body, 1e-3, 500)
     assert body.mass_center()[2] == pytest.approx(0.4, rel=1e-9)
     assert body.kinetic_energy() == pytest.approx(0, abs=1e-12)
     assert body.external_work == pytest.approx(0, abs=1e-10)
-    end(body, 5e-3, 1)
+    end(body, 1e-3, 1)
     assert body.potential_energy() == pytest.approx(8 * G * 0.4, rel=1e-9)
 
 
@@ -254,10 +254,10 @@ def test_work_of_reactions_counts():
 
 @each_body
 def test_a_spring_swings_with_its_frequency(kind, integrator):
-    body = cube(kind, integrator, E=5e5)
+    body = cube(kind, integrator, E=2e6)
     k = 8.0 * (2 * np.pi) ** 2  # 1 Hz
     body.add(kl.Spring((0, 0, 0), (0, 0, 1), k, length=0.9))
-    h = 2e-2 if integrator != "DEF_EXP" else 2e-3
+    h = 1e-2 if integrator != "DEF_EXP" else 1e-3
     count = round(1 / h)
     start = float(body.energy())
     end(body, h, count // 2)
@@ -282,7 +282,7 @@ def test_a_damped_spring_decays():
     m, k, c = 8.0, 8.0 * 100, 8.0
     body.add(kl.Spring((0, 0, 0), (0, 0, 1), k, damping=c, length=0.9))
     rate, omega = c / (2 * m), np.sqrt(k / m - (c / (2 * m)) ** 2)
-    h = 2e-3
+    h = 5e-4
     steps = round(2 * np.pi / omega / h)
     end(body, h, steps)
     assert 0.1 - body.mass_center()[2] == pytest.approx(0.1 * np.exp(-rate * h * steps), rel=2e-3)

@@ -180,7 +180,7 @@ def vertex(times, values, i):
     return times[i] + (times[1] - times[0]) * (a - c) / (2 * (a - 2 * b + c))
 
 
-@pytest.mark.parametrize(("W", "angle", "steps"), [(50.0, 0.05, 350), (25.0, 0.5, 500)])
+@pytest.mark.parametrize(("W", "angle", "steps"), [(50.0, 0.05, 700), (25.0, 0.5, 1000)])
 def test_the_heavy_top_nods_and_turns_as_lagrange_says(W, angle, steps):
     """With u = cos θ: u'² = (u0 - u) (8 (1 - u²) - s² (u0 - u)) and φ' = s (u0 - u) / (1 - u²), s = W / 5."""
     body, energy = heavy("RIG_IMP", W, angle)
@@ -190,16 +190,16 @@ def test_the_heavy_top_nods_and_turns_as_lagrange_says(W, angle, steps):
     lowest, beyond = np.sort(np.roots([8, -(s**2), s**2 * highest - 8]))
     u = (lowest + highest) / 2 + (highest - lowest) / 2 * np.cos(np.pi * (np.arange(64) + 0.5) / 64)
     rates = np.sqrt(8 * (beyond - u))
-    states = list(kl.integrate(body, 4e-3, steps))
+    states = list(kl.integrate(body, 2e-3, steps))
     times, theta = np.array([state.time for state in states]), np.arccos([state.q[8] for state in states])
     assert theta.min() > angle - 1e-5
-    assert theta.max() == pytest.approx(np.arccos(lowest), abs=4e-4)
+    assert theta.max() == pytest.approx(np.arccos(lowest), abs=1e-4)
     period = 2 * np.pi * (1 / rates).mean()
     back = vertex(times, theta, int(np.argmin(theta + (np.abs(times - period) > period / 2))))
-    assert back == pytest.approx(period, abs=2e-3)
+    assert back == pytest.approx(period, abs=5e-4)
     turn = np.unwrap([np.arctan2(state.q[7], state.q[6]) for state in states])
     expected = 2 * np.pi * (s * (highest - u) / (1 - u**2) / rates).mean()
-    assert np.interp(back, times, turn) + np.pi / 2 == pytest.approx(expected, abs=8e-3)
+    assert np.interp(back, times, turn) + np.pi / 2 == pytest.approx(expected, abs=2e-3)
     assert abs(body.angular_momentum()[2] / vertical - 1) < 1e-12
 
 

@@ -15,7 +15,7 @@ from kratos_lite.solvers.multigrid import Compiled
 from kratos_lite.solvers.plate_level import bending_modes, plate_axes, plate_level
 
 pytestmark = compiled
-LIMIT = 75
+LIMIT = 60
 STEEL = kl.Isotropic3D(E=2e11, nu=0.3)
 CELLS = {"4N": (9, 9, 9), "8N": (9, 9, 9), "10N": (4, 4, 4), "20N": (5, 5, 5), "27N": (4, 4, 4)}
 
@@ -272,7 +272,8 @@ def outside(x):
 )
 def test_stiff_and_soft_materials(elements, height, soft, rtol):
     for element in elements:
-        model = body(element, (1.0, 1.0, height), "z-", contrast=soft)
+        cells = (11, 11, 11) if (element, soft) == ("4N", outside) else None
+        model = body(element, (1.0, 1.0, height), "z-", cells, soft)
         u, rounding = factorized(model)
         check(model, u, rtol + rounding)
 
