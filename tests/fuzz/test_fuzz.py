@@ -16,10 +16,10 @@ BAD = ROOT / "tests" / "fixtures" / "bad"
 
 
 def test_damaged_and_random_inputs_end_in_a_result_or_in_one_error():
-    words = [sys.executable, "-m", "tests.fuzz", "--count", "200", "--seed", "12"]
+    words = [sys.executable, "-m", "tests.fuzz", "--count", "400", "--seed", "12"]
     run = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stdout
-    assert "200 inputs of seed 12: 0 findings" in run.stdout
+    assert "400 inputs of seed 12: 0 findings" in run.stdout
 
 
 def test_an_input_depends_on_its_seed_and_number_alone(tmp_path, monkeypatch):

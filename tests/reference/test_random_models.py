@@ -7,7 +7,7 @@ from tests.reference import rules, shapes, solid
 from tests.reference.compare import LIMIT, compare
 from tests.reference.problems import random_problem
 
-SEEDS = range(40)
+SEEDS = range(60)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -26,7 +26,7 @@ def test_the_random_models_have_everything_that_is_to_be_compared():
     for name in ("gravity", "body_force", "prestress", "stress_free"):
         assert sum(getattr(problem, name) is not None for problem in problems) > 10, name
     assert any(len(constants) == 9 for problem in problems for *_, constants in problem.materials)
-    assert all("refused" in compare(seed) for seed in (11, 20))
+    assert 3 <= sum("refused" in compare(seed) for seed in SEEDS[:40]) < 20
 
 
 # ---- the reference itself ----------------------------------------------------------------------------

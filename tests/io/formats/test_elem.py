@@ -607,7 +607,7 @@ def cut(data, _):
 
 def flipped(data, rng):
     """Return copies of data, each with one byte that is another."""
-    at = [(rng.randrange(len(data)), bytes([rng.randrange(256)])) for _ in range(80)]
+    at = [(rng.randrange(len(data)), bytes([rng.randrange(256)])) for _ in range(300)]
     return [data[:i] + byte + data[i + 1 :] for i, byte in at]
 
 

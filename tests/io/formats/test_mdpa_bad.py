@@ -100,10 +100,10 @@ def test_unknown_element_is_kept_for_the_next_stage(malformed):
 
 
 def test_every_prefix_is_read_or_refused(tmp_path):
-    """Strictly, and every fifth one also as Kratos reads."""
+    """Strictly, and every second one also as Kratos reads."""
     path = tmp_path / "a.mdpa"
     assert list(outcome(path, SAMPLE).mesh.parts) == ["A", "A.b"]
-    for n in range(0, len(SAMPLE), 5):
+    for n in range(0, len(SAMPLE), 2):
         outcome(path, SAMPLE[:n], strict=False)
     results = [outcome(path, SAMPLE[:n]) for n in range(len(SAMPLE))]
     whole = [n for n, result in enumerate(results) if isinstance(result, Document)]
@@ -116,13 +116,13 @@ def test_every_prefix_is_read_or_refused(tmp_path):
 
 def test_every_flip_is_read_or_refused(tmp_path):
     rng, refused = np.random.default_rng(0), 0
-    for _ in range(300):
+    for _ in range(1000):
         data = bytearray(SAMPLE)
         data[rng.integers(len(data))] ^= 1 << int(rng.integers(8))
         result = outcome(tmp_path / "a.mdpa", bytes(data), strict=bool(rng.integers(2)))
         assert isinstance(result, (Document, InputError))
         refused += isinstance(result, InputError)
-    assert refused > 60
+    assert refused > 200
 
 
 def test_twenty_problems_are_shown_and_the_rest_counted(tmp_path):
