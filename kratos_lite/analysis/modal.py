@@ -14,16 +14,9 @@ from kratos_lite.analysis.solution_checks import Phases
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.errors import InputError, ModelError, SolveError
 from kratos_lite.model.structure import Structure
+from kratos_lite.solvers.complex_eigen import Pencil, unresisted_modes
 from kratos_lite.solvers.constraints import ConstraintMap, rigid_modes
-from kratos_lite.solvers.eigen import (
-    Operator,
-    Pencil,
-    Problem,
-    dense_modes,
-    is_small,
-    modes_near,
-    unresisted_modes,
-)
+from kratos_lite.solvers.eigen import Operator, Problem, dense_modes, is_small, modes_near
 from kratos_lite.solvers.linear_solver import LinearSolver
 from kratos_lite.solvers.plan import DENSE_MODES, FALLBACK_LIMIT, stepped
 from kratos_lite.typing import Array, Complexes, Progress
