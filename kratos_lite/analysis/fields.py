@@ -287,7 +287,7 @@ class GaussPoints:
     @property
     def elastic(self) -> tuple[Array, Array]:
         """The elastic strain and its stress (m, g, 6) in Pa, without prestress."""
-        strain = self.strain - self.group.thermal_strain(slice(None))
+        strain = self.strain - self.group.thermal_strain()
         return strain, strain @ self.group.material.C.T
 
     @property

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from itertools import chain
+from typing import TypeAlias
 
 import numpy as np
 
@@ -18,6 +19,9 @@ from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.tangents import Changes
 from kratos_lite.typing import Array
+
+Temperatures: TypeAlias = list[tuple[float, Load]]
+"""Temperatures that act, each with a factor."""
 
 
 def external_loads(mesh: Mesh, groups: Sequence[ElementGroup], loads: Sequence[Load]) -> Array:
@@ -42,15 +46,15 @@ def stress_load(model: Structure, groups: Sequence[ElementGroup], u: Array) -> A
     return internal_load(model.mesh.points, groups, u if u0 is None else u - u0)
 
 
+def temperatures(model: Structure, time: float) -> Temperatures:
+    """Return the temperatures of a model at a time in s, each with a factor."""
+    acting = chain.from_iterable(load.acting(time) for load in model.loads)
+    return [(factor, load) for factor, load in acting if isinstance(load, Temperature)]
+
+
 def at_temperature(model: Structure, groups: Sequence[ElementGroup], time: float) -> list[ElementGroup]:
     """Return groups with the temperatures of the model at a time in s; the same ones without any."""
-    return heated(model.mesh, groups, chain.from_iterable(load.acting(time) for load in model.loads))
-
-
-def heating_of(model: Structure, groups: Sequence[ElementGroup], time: float) -> list[Array | float] | None:
-    """Return the temperatures (m, k) of the nodes of each group at a time in s, or 0; None without any."""
-    found = [group.heating for group in at_temperature(model, groups, time)]
-    return None if all(values is None for values in found) else [0.0 if v is None else v for v in found]
+    return heated(model.mesh, groups, temperatures(model, time))
 
 
 class AppliedLoads:

@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion, Solve
-from kratos_lite.analysis.nodal_loads import at_temperature, heating_of
+from kratos_lite.analysis.nodal_loads import at_temperature
 from kratos_lite.analysis.quasi_static import assembly_of
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
@@ -62,7 +62,7 @@ class NonlinearMotion(EquationsOfMotion):
         self, u: Array, time: float, tangent: bool = False
     ) -> tuple[History, BlockMatrix | None, Changes]:
         h, before = time - self.history.time, self.history.states
-        heating = heating_of(self.model, self.groups, time)
+        heating = [group.heating for group in at_temperature(self.model, self.groups, time)]
         forces, K, states = self.assembly.evaluate(u, before, h, heating, tangent=tangent)
         more, changes = self.applied.following(time, u)
         self._found = History(time, u, forces - more, states)

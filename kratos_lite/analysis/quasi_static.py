@@ -9,23 +9,17 @@ from typing import TypeAlias
 
 import numpy as np
 
-from kratos_lite.analysis.nodal_loads import AppliedLoads, heating_of
+from kratos_lite.analysis.nodal_loads import AppliedLoads, Temperatures, temperatures
 from kratos_lite.analysis.prescribed_motion import PrescribedMotion
 from kratos_lite.analysis.report import Report, StepReport
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.state import ModelInTime, State, check_state
 from kratos_lite.assembly.block_matrix import BlockMatrix
-from kratos_lite.assembly.nonlinear_assembly import (
-    Heating,
-    NonlinearAssembly,
-    States,
-    heated_by,
-    named,
-    unnamed,
-)
+from kratos_lite.assembly.nonlinear_assembly import NonlinearAssembly, States, named, unnamed
 from kratos_lite.assembly.stiffness import assemble_stiffness
 from kratos_lite.errors import InputError, ModelError, SolveError
 from kratos_lite.mesh.mesh import place_of
+from kratos_lite.model.loads.temperature import heated
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.arc_length import along_path
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
@@ -129,11 +123,17 @@ class QuasiStaticAnalysis(ModelInTime):
         self.increment, self.speed = np.zeros_like(self.u), 0.0
         self.load, self.rate, self.curvature = (np.zeros_like(self.u) for _ in range(3))
         self.last = 0.0  # s, duration of the last part
-        self.heating: Heating | None = None  # at the end of the present step
+        self._heat([])
         self.internal = self._forces(self.u)
         self.reports: list[StepReport] = []
         if arc_length:
             self._check_factor()
+
+    def _heat(self, acting: Temperatures) -> None:
+        """Let temperatures, each with a factor, act."""
+        self.temperatures = [(factor, load) for factor, load in acting if factor]
+        groups = heated(self.model.mesh, self.groups, self.temperatures)
+        self.heating = [group.heating for group in groups]
 
     def _forces(self, u: Array) -> Array:
         """Return the internal forces (3a,) of the committed states at displacements (3a,)."""
@@ -141,7 +141,7 @@ class QuasiStaticAnalysis(ModelInTime):
 
     def _check_factor(self) -> None:
         """Refuse loads that are no constant ones and a factor times others, and supports that move."""
-        if heating_of(self.model, self.groups, 1.0):
+        if temperatures(self.model, 1.0):
             raise InputError("the arc length scales loads, not temperatures; leave them out")
         f = [self._loads(self.u, t)[0] for t in (0.0, 1.0, 2.0)]
         if self.model.supports.motions or np.abs(f[2] - 2 * f[1] + f[0]).max() > 1e-9 * np.abs(f[1]).max():
@@ -181,7 +181,10 @@ class QuasiStaticAnalysis(ModelInTime):
         """Come to the loads of a time, in parts where one step does not converge."""
         start, begin, dead = self.time, self.load, self.applied(end)
         fields = self.prescribed.part(self.u), self.prescribed(end)
-        cold, hot = self.heating, heating_of(self.model, self.groups, end)
+        cold, hot = self.temperatures, temperatures(self.model, end)
+
+        def heat(fraction: float) -> None:
+            self._heat([((1 - fraction) * w, T) for w, T in cold] + [(fraction * w, T) for w, T in hot])
 
         def advance(done: float, fraction: float) -> int:
             def load(u: Array) -> Load:
@@ -190,14 +193,15 @@ class QuasiStaticAnalysis(ModelInTime):
                 return now, [(nodes, fraction * k) for nodes, k in tangent]
 
             field = (1 - fraction) * fields[0] + fraction * fields[1]
-            self.heating = _between(cold, hot, fraction)
+            heat(fraction)
             with one_thread():
                 u, known, residuals = self._newton(load, field, (fraction - done) * (end - start))
             time = start + fraction * (end - start)
             return self._commit(u, known, StepReport(time, tuple(residuals), fraction - done))
 
-        error = in_parts(advance)[1]
+        done, error = in_parts(advance)
         if error:
+            heat(done)
             limit = "the load may be beyond the limit load (prescribe displacements in its place), "
             raise SolveError(
                 f"the step from t = {start:g} s to {end:g} s converges up to t = {self.time:g} s only, cut "
@@ -380,7 +384,7 @@ class QuasiStaticAnalysis(ModelInTime):
             self.increment, self.speed = get["increment"].copy(), float(get["speed"])
         self.states = unnamed(get, self.states)
         self.time, self.step = float(state.time), int(state.step)
-        self.heating = heating_of(self.model, self.groups, self.time) if self.last else None
+        self._heat(temperatures(self.model, self.time) if self.last else [])
 
     def _whole(self, values: Array) -> Array:
         return self.system.scatter(values)
@@ -417,17 +421,9 @@ class QuasiStaticAnalysis(ModelInTime):
             work=self.work,
         )
         groups = [replace(g, states=s) for g, s in zip(self.groups, self.states, strict=True)]
-        groups = heated_by(groups, self.heating) if self.heating else groups
+        groups = heated(model.mesh, groups, self.temperatures)
         u0 = model.initial_displacement
         return Result(model.mesh, groups, self._whole(self.u).copy(), reactions, loads, report, u0)
-
-
-def _between(cold: Heating | None, hot: Heating | None, fraction: float) -> Heating | None:
-    """Return temperatures of groups at a fraction of a step; None are 0."""
-    if (given := hot or cold) is None:
-        return None
-    rest = [0.0] * len(given)
-    return [(1 - fraction) * a + fraction * b for a, b in zip(cold or rest, hot or rest, strict=True)]
 
 
 def assembly_of(model: Structure, system: ConstrainedSystem) -> NonlinearAssembly:

@@ -153,18 +153,13 @@ class ElementGroup:
         """The group without prestress and thermal strain."""
         return replace(self, prestress=None, heating=None)
 
-    def thermal_strain(self, chunk: slice, N: Array | None = None) -> Any:
-        """Return α ΔT of a chunk, (m, g, 6) at points with N (g, k), the Gauss points if not given, or 0.
-
-        Linear elements have the mean of their nodes.
-        """
+    def thermal_strain(self, chunk: slice = slice(None)) -> Any:
+        """Return α ΔT at the Gauss points of a chunk, (m, g, 6), or 0; linear elements have their mean."""
         if self.heating is None:
             return 0.0
-        heating, nodes = self.heating[chunk], self.nodes.shape[1]
-        if N is None:
-            N = tabulate(self.element.shape, self.rule)[0]
-            N = np.full_like(N, 1 / nodes) if self.element.shape.degree == 1 else N
-        return np.einsum("mk,gk,i->mgi", heating, N, self.material.expansion)
+        N = tabulate(self.element.shape, self.rule)[0]
+        N = np.full_like(N, 1 / N.shape[1]) if self.is_evenly_heated else N
+        return np.einsum("mk,gk,i->mgi", self.heating[chunk], N, self.material.expansion)
 
     def initial_stress(self, chunk: slice) -> Array | float:
         """Return the stress of a chunk where nothing is displaced, (m, 1 or g, 6), or 0."""

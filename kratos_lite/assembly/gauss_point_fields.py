@@ -96,7 +96,7 @@ def at_gauss(points: Array, group: ElementGroup, u: Array, *, stress: bool = Tru
         found = module.stress(*displaced(points, group, u, stress))
         if not stress or group.is_evenly_heated:
             return found
-        return found - group.thermal_strain(slice(None)) @ group.material.C.T
+        return found - group.thermal_strain() @ group.material.C.T
     parts = [value_at(group.at(points, chunk), group, u, chunk, stress) for chunk in group.chunks()]
     return np.concatenate(parts)
 
@@ -238,7 +238,7 @@ def energy_density(points: Array, group: ElementGroup, u: Array) -> Array:
     """Return the stored energy (m, g) in J/m³ of a law at displacements u (n, 3)."""
     law, states = group.material, group.states
     if group.is_linear:
-        strain = at_gauss(points, group, u, stress=False) - group.thermal_strain(slice(None))
+        strain = at_gauss(points, group, u, stress=False) - group.thermal_strain()
         return np.asarray((strain @ law.C.T * strain).sum(axis=-1) / 2)
     strain, stress = of_law(points, group, u)
     if states is None:

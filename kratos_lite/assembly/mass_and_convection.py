@@ -84,9 +84,7 @@ def lumped_mass(points: Array, groups: Sequence[ElementGroup]) -> Array:
     for group in groups:
         for part in by_mass_rule(points, group, 2):
             for chunk in part.chunks():
-                some = replace(
-                    part, nodes=part.nodes[chunk], rows=part.rows[chunk], prestress=None, heating=None
-                )
+                some = replace(part.without_initial, nodes=part.nodes[chunk], rows=part.rows[chunk])
                 add_nodal(total, some.nodes, _element_masses(points, some)[..., None])
     return total[:, 0]
 

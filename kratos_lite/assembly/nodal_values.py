@@ -102,7 +102,7 @@ def at_located(groups: Sequence[ElementGroup], located: Located, u: Array, *, st
                 value = value @ group.material.C.T
                 value = value if group.prestress is None else value + group.prestress[cells]
                 if group.heating is not None:
-                    heating = _extrapolated(group, cells, xi[at], lambda g: g.thermal_strain(slice(None)))
+                    heating = _extrapolated(group, cells, xi[at], lambda g: g.thermal_strain())
                     value = value - heating @ group.material.C.T
         out[at] = value
     return out.reshape(*located.rows.shape, 6)

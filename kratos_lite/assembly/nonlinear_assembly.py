@@ -10,7 +10,7 @@ points alone, so that they serve every law.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Any, TypeAlias
@@ -29,8 +29,8 @@ from kratos_lite.errors import MaterialError, SolveError
 from kratos_lite.shapes.inverse import determinant
 from kratos_lite.typing import Array
 
-Heating: TypeAlias = "Sequence[Array | float]"
-"""Temperatures (m, k) in K of the nodes of each group beyond those without strain, or 0."""
+Heating: TypeAlias = "Sequence[Array | None]"
+"""Temperatures (m, k) in K of the nodes of each group beyond those without strain, or None."""
 States: TypeAlias = "list[PointStates | None]"
 """States of each group of elements; None where the law is linear."""
 POINTS = 4000
@@ -56,8 +56,8 @@ class NonlinearAssembly:
         self.place = place  # the words for an element in messages, of its index
         self._u0 = np.zeros(3 * len(points)) if u0 is None else u0
         self.symmetric = all(group.material.symmetric_tangent for group in groups)
-        self._linear = _only(groups, is_linear)
-        self._lagrange = _only(groups, lambda group: group.element.finite and group.material.is_linear)
+        self._linear = _only(groups, (group.is_linear for group in groups))
+        self._lagrange = _only(groups, (g.element.finite and g.material.is_linear for g in groups))
         self._dilatations = [None if g.material.is_linear else dilatation(self.points, g) for g in groups]
 
     def start(self) -> States:
@@ -71,7 +71,7 @@ class NonlinearAssembly:
         return assemble_stiffness(self.points, self._linear, self.pattern), at_rest
 
     def evaluate(
-        self, u: Array, states: States, dt: float, heating: Heating | None = None, *, tangent: bool = True
+        self, u: Array, states: States, dt: float, heating: Heating = (), *, tangent: bool = True
     ) -> tuple[Array, BlockMatrix | None, States]:
         """Return internal forces (3n,) in N, tangent stiffness and new states at displacements u (3n,).
 
@@ -80,9 +80,11 @@ class NonlinearAssembly:
         """
         u = self.strained(u)
         K, at_rest = self._linear_part
-        groups = self.groups if heating is None else heated_by(self.groups, heating)
-        if heating is not None:
-            at_rest = internal_load(self.points, _only(groups, is_linear), np.zeros_like(self.points))
+        groups = self.groups
+        if any(values is not None for values in heating):
+            groups = [replace(g, heating=values) for g, values in zip(groups, heating, strict=True)]
+            linear = _only(groups, (group.is_linear for group in groups))
+            at_rest = internal_load(self.points, linear, np.zeros_like(self.points))
         forces = at_rest + (K @ u.ravel()).reshape(-1, 3)
         data = K.data.copy() if tangent else None
         if any(map(len, self._lagrange)):
@@ -108,20 +110,9 @@ class NonlinearAssembly:
         return (u - self._u0).reshape(-1, 3)
 
 
-def is_linear(group: ElementGroup) -> bool:
-    """Return whether stresses of a group are linear in the displacements."""
-    return group.is_linear
-
-
-def heated_by(groups: Sequence[ElementGroup], heating: Heating) -> list[ElementGroup]:
-    """Return groups with temperatures."""
-    every = zip(groups, heating, strict=True)
-    return [replace(group, heating=np.asarray(values) if np.any(values) else None) for group, values in every]
-
-
-def _only(groups: Sequence[ElementGroup], wanted: Callable[[ElementGroup], bool]) -> list[ElementGroup]:
+def _only(groups: Sequence[ElementGroup], wanted: Iterable[bool]) -> list[ElementGroup]:
     """Return the groups, empty but where they are wanted, so that they keep their numbers."""
-    return [group.take(np.full(len(group), wanted(group))) for group in groups]
+    return [g.take(np.full(len(g), keep)) for g, keep in zip(groups, wanted, strict=True)]
 
 
 def initial_states(points: Array, group: ElementGroup) -> PointStates:

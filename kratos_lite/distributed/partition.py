@@ -152,7 +152,7 @@ class Partition:
 
     def _groups_of_all(self, groups: list[ElementGroup]) -> list[ElementGroup]:
         """Return the groups that any rank has, in the same order on all, empty where this one has none."""
-        empty = [replace(g, nodes=g.nodes[:0], rows=g.rows[:0], prestress=None, heating=None) for g in groups]
+        empty = [replace(g.without_initial, nodes=g.nodes[:0], rows=g.rows[:0]) for g in groups]
         here = {pickle.dumps(kind): group for kind, group in zip(empty, groups, strict=True)}
         every = dict.fromkeys(itertools.chain(*self.ranks.gather(list(here))))
         return [here[kind] if kind in here else pickle.loads(kind) for kind in every]

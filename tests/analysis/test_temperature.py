@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.errors import InputError, KratosLiteError, ModelError
+from kratos_lite.errors import InputError, KratosLiteError, ModelError, SolveError
 from kratos_lite.mesh.refinement import refine
 from kratos_lite.model.refined import refined
 
@@ -142,6 +142,21 @@ def test_steps_of_any_law_flow_where_it_is_too_hot():
     one, other = linear.solve(), any_law.solve()
     assert np.abs(one.u - other.u).max() < 1e-8 * np.abs(one.u).max()
     assert abs(one.energy() - other.energy()) < 1e-6 * one.energy()
+
+
+def test_a_step_that_breaks_off_keeps_the_temperature_that_it_reached():
+    mesh = kl.box((1, 1, 2), (1, 1, 2), "Element3D8N")
+    model = kl.Model(mesh, kl.J2Plasticity3D(E, NU, 200e6, alpha=ALPHA))
+    model.assign(STEEL, [1])  # its stress is of the strain and the temperature
+    for side, axis in (("x-", "x"), ("y-", "y"), ("z-", "z")):
+        model.fix(side, axis)
+    model.add(kl.Traction("z+", (0, 0, 400e6)))
+    model.add(kl.Temperature(1e5), amplitude=lambda t: t)
+    analysis = model.quasi_static(iterations=8)
+    with pytest.raises(SolveError, match="limit load"):
+        list(kl.integrate(analysis, dt=1.0, steps=1))
+    assert 0.49 < analysis.time < 0.6
+    assert abs(analysis.result().stress()[1, :, 2].mean() - 400e6 * analysis.time) < 1e-6 * 200e6
 
 
 @pytest.mark.parametrize("law", [STEEL, kl.J2Plasticity3D(E, NU, 1e12, density=7800.0, alpha=ALPHA)])
