@@ -121,7 +121,7 @@ def complex_modes(
     with phase("assemble"):
         M, C, K = (reduced(e, e.matrix(0.0, *factors)) for factors in ((1, 0, 0), (0, 1, 0), (0, 0, 1)))
     with phase("modes"):
-        solver = replace(e.system.equations, plan=stepped(len(e.system.constraint_map.free)))
+        solver = replace(e.system.equations, plan=stepped(e.system.facts))
 
         def start(number: int) -> Array:
             return _by_iteration(e, solver, number + len(_free_motions(e)), progress)[1].T
@@ -174,7 +174,7 @@ def critical_rate(model: Structure, count: int = 1) -> Array:
 def critical_rates(e: EquationsOfMotion, count: int) -> Array:
     """Return the lowest critical rates (count,) of equations whose supports hold all rigid motions."""
     few = 100 if count == 1 else DENSE_MODES  # one by iteration takes a tenth of the time of all
-    solver = replace(e.system.equations, plan=stepped(len(e.system.constraint_map.free)))
+    solver = replace(e.system.equations, plan=stepped(e.system.facts))
     largest = _largest(e, _critical_terms(e), solver, count, few)[0]
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.sort(np.where(largest > 0, 1 / np.sqrt(np.maximum(largest, 1e-300)), np.inf))

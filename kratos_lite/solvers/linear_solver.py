@@ -66,30 +66,33 @@ class LinearSolver:
         progress: Progress | None = None,
         prescribed: Array | None = None,
         start: Array | None = None,
-        reduction: float = 1.0,
+        reduction: float = 0.0,
     ) -> Solution:
         """Return the displacements (3n,) under nodal forces f (3n,) as a Solution.
 
         `prescribed` displacements (3n,) take the place of c of the constraint map.  An iteration begins at
-        `start` (3n,), of which the free components count, if that is nearer than 0; then it ends not before
-        the residual of the start is reduced to a fraction.
+        `start` (3n,), of which the free components count, if that is nearer than 0.  With a `reduction` it
+        ends where the residual is this fraction of that of 0 or the start, whichever is less.
         """
         reduce, expand = self.constraint_map.reduce, self.constraint_map.expand
         c = self.constraint_map.c if prescribed is None else prescribed
         u, b = c, reduce(f - self.K @ c)
-        size = float(np.linalg.norm(b))
-        tolerance *= self._fraction(f, c, size)
+        size = norm = float(np.linalg.norm(b))
+        aim = tolerance * self._fraction(f, c, size) * size
         if start is not None and self.plan.iterates:
             near = expand((start - c)[self.constraint_map.free], c)
             residual = reduce(f - self.K @ near)
-            norm = float(np.linalg.norm(residual))
-            if norm <= size:
-                rounding = 2 * float(np.finfo(float).eps) * (self.norm * float(np.linalg.norm(near)) + size)
-                u, b = near, residual
-                tolerance = max(min(tolerance * size, reduction * norm), rounding) / (norm or 1.0)
+            if float(np.linalg.norm(residual)) <= size:
+                u, b, norm = near, residual, float(np.linalg.norm(residual))
+            if reduction:
+                aim = reduction * norm
+            if u is near or reduction:
+                rounding = 2 * float(np.finfo(float).eps)
+                aim = max(aim, rounding * (self.norm * float(np.linalg.norm(near)) + size))
+        tolerance = aim / (norm or 1.0)
         q, iterations, plan = np.zeros(len(b)), 0, self.plan
         if len(b) and (u is c or tolerance < 1):
-            q, iterations, plan = self._solve(b, tolerance, progress, u is not c)
+            q, iterations, plan = self._solve(b, tolerance, progress, u is not c or reduction > 0)
         u = expand(q, u)
         error = backward_error(reduce(f - self.K @ u), self.norm, u, f)
         return Solution(u, plan.method, plan.reason, iterations, error)

@@ -222,14 +222,24 @@ def test_energy_is_kept_by_iterations(element, cells, monkeypatch):
     assert abs(transient.energy(end) / energy - 1) < 1e-9
 
 
-def test_iterations_and_factors_come_to_the_same(monkeypatch):
+OF_STEP = 2e-5
+"""What iterations may miss, as a fraction of what the steps themselves miss in time."""
+
+
+def missed(ends):
+    """Return what iterations with steps h miss beside factors, over what half the step changes."""
+    by_iterations, by_factors, halved = ends
+    return np.abs(by_iterations - by_factors).max() / np.abs(halved - by_factors).max()
+
+
+def test_iterations_miss_far_less_than_the_steps(monkeypatch):
     ends = []
-    for limit in (0, 40_000):
+    for limit, n in ((0, 20), (40_000, 20), (40_000, 40)):
         monkeypatch.setattr("kratos_lite.solvers.plan.STEPPED_LIMIT", limit)
         transient, period = struck("KinematicLinear3D20N", (2, 2, 4), rayleigh=(3.0, 1e-6))
-        *_, end = kl.integrate(transient, period / 20, 20, every=20)
+        *_, end = kl.integrate(transient, period / n, n, every=n)
         ends.append(end.u)
-    assert np.abs(ends[0] - ends[1]).max() < 1e-8 * np.abs(ends[1]).max()
+    assert missed(ends) < OF_STEP
 
 
 def test_the_linear_level_of_a_step_has_mass():
@@ -250,14 +260,14 @@ def test_the_linear_level_of_a_step_has_mass():
 
 def test_transport_terms_by_minimal_residuals_come_to_what_factors_give(monkeypatch):
     ends = []
-    for limit in (0, 40_000):
+    for limit, n in ((0, 20), (40_000, 20), (40_000, 40)):
         monkeypatch.setattr("kratos_lite.solvers.plan.STEPPED_LIMIT", limit)
         model = wheel((2, 16, 1), 300.0, damping=20.0)
         model.add(kl.Traction("outer", (1e6, 0, 0)))
-        *_, end = kl.integrate(model.transient(), 1e-4, 20, every=20)
+        *_, end = kl.integrate(model.transient(), 2e-3 / n, n, every=n)
         ends.append(end.u)
     assert np.abs(ends[1]).max() > 0
-    assert np.abs(ends[0] - ends[1]).max() < 1e-7 * np.abs(ends[1]).max()
+    assert missed(ends) < OF_STEP
 
 
 def test_equations_out_of_reach_of_minimal_residuals_are_refused(monkeypatch):
