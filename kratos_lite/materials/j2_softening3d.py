@@ -88,6 +88,16 @@ class J2Softening3D(VonMises):
         "element_radius": 1,
     }
 
+    @property
+    def cones(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Factors of tr σ and √J₂ in the equivalent stress, and in the potential of the flow."""
+        return (0.0, 3**0.5), (0.0, 3**0.5)
+
+    @property
+    def strength(self) -> float:
+        """The equivalent stress in Pa at which a bar begins to flow."""
+        return self.yield_stress
+
     @classmethod
     def from_variables(cls, values: dict[str, Any]) -> Material:
         """Make the material from the variables of a file; YIELD_STRESS stands for that of tension."""
@@ -105,31 +115,47 @@ class J2Softening3D(VonMises):
         if self.compression not in (0, self.yield_stress):
             raise MaterialError(
                 f"{self._name('compression')} {self.compression:g} must be that of tension, "
-                f"{self.yield_stress:g} Pa: von Mises knows no difference"
+                f"{self.yield_stress:g} Pa: one fracture energy stands for both"
             )
 
     def response(self, strain: Array, state: GaussState, dt: float) -> Response:
         """Return stress, consistent tangent and internal variables; SolveError for what would snap back."""
-        G = self.elastic.lame[1]
+        lam, G = self.elastic.lame
+        K, (mean, root), (mean_flow, root_flow) = lam + 2 * G / 3, *self.cones
         stress, n, q = self.trial(strain, state)
+        volume, root_J2 = stress[..., :3].sum(axis=-1), q / 3**0.5
+        q, work = mean * volume + root * root_J2, mean_flow * volume + root_flow * root_J2
         kappa = state["plastic_dissipation"][..., 0]
         per_energy = state["element_radius"][..., 0] / self.fracture_energy  # 1/g
         power = {LINEAR: 0.5, EXPONENTIAL: 1.0, PERFECT: 0.0}[int(self.curve)]
-        limit = self.yield_stress * (1 - kappa) ** power
+        limit = self.strength * (1 - kappa) ** power
         soft = power * limit / (1 - kappa) * per_energy
-        plastic, slope = q > limit * (1 + 1e-10), 3 * G - soft * q
+        plastic = q > limit * (1 + 1e-10)
+        slope = 9 * K * mean * mean_flow + G * root * root_flow - soft * work
         if (plastic & (slope <= 0)).any():
             raise SolveError(
                 f"{type(self).__name__}: an element of radius {float(state['element_radius'].max()):.3g} m "
                 "would snap back; take a finer mesh, or smaller steps"
             )
         dp = np.where(plastic, (q - limit) / slope, 0.0)
-        flow = (1.5**0.5 * dp)[..., None] * n
-        work = (q - 3 * G * dp) * dp * per_energy
+        loss = G * root_flow * dp / np.where(plastic, root_J2, 1.0)  # fraction of the deviator that goes
+        apex = (loss > 1) & (mean > 0)
+        beta = np.where(apex, 1.0, loss)
+        volumetric = np.where(apex, (volume - limit / (mean or 1.0)) / (9 * K), mean_flow * dp)
+        work = (volume - 9 * K * volumetric) * volumetric + (1 - beta) * beta * root_J2**2 / G
+        deviatoric = (beta * root_J2 / 2**0.5 / G)[..., None] * n
+        flow = volumetric[..., None] * voigt.UNIT + deviatoric * voigt.SHEAR_TWICE
         new = {
-            "plastic_strain": state["plastic_strain"] + flow * voigt.SHEAR_TWICE,
-            "plastic_dissipation": np.minimum(kappa + work, MOST)[..., None],
+            "plastic_strain": state["plastic_strain"] + flow,
+            "plastic_dissipation": np.clip(kappa + work * per_energy, 0, MOST)[..., None],
             "element_radius": state["element_radius"].copy(),
         }
-        growth = np.where(plastic, (1 + soft * dp) / slope, 0.0)
-        return stress - 2 * G * flow, self.tangent(n, q, dp, growth), new
+        across, along = (
+            3 * K * a * voigt.UNIT + 2**0.5 * G * b * n for a, b in ((mean, root), (mean_flow, root_flow))
+        )
+        growth = np.where(plastic, 1 / slope, 0.0)[..., None] * (across + (soft * dp)[..., None] * along)
+        D = np.einsum("...i,...j->...ij", 2 * G * beta[..., None] * n, n)
+        D -= np.einsum("...i,...j->...ij", along, growth)
+        D += self.elastic.C - 2 * G * beta[..., None, None] * voigt.DEVIATOR
+        D[apex] = 0.0
+        return stress - voigt.times(flow, self.elastic.C), D, new

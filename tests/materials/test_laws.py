@@ -15,6 +15,8 @@ LAWS = [
     (kl.J2Softening3D(200e9, 0.3, 250e6, 4e6), 3e-3),
     (kl.J2Softening3D(200e9, 0.3, 250e6, 4e5, curve=3), 3e-3),
     (kl.J2Softening3D(200e9, 0.3, 250e6, 4e6, curve=0), 3e-3),
+    (kl.ConeSoftening3D(20e9, 0.3, 1e8, 4e6, friction=12.0, dilatancy=5.0), 3e-3),
+    (kl.ConeSoftening3D(20e9, 0.3, 1e8, 4e6, 0, friction=10.0, dilatancy=10.0), 3e-3),
     (kl.DruckerPrager3D(20e6, 0.3, 1e4, 30.0), 2e-3),
     (kl.DruckerPrager3D(20e6, 0.3, 1e4, 30.0, 10.0, 1e5), 2e-3),
     (kl.DruckerPrager3D(20e6, 0.3, 1e4, 30.0, 30.0, 1e5), 2e-3),
@@ -154,6 +156,33 @@ def test_softening_is_linear_or_exponential_and_dissipates_the_fracture_energy(c
     assert errors[1] < 0.6 * errors[0] < 0.02
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_cone_that_softens_meets_its_strengths_and_its_dilatancy(sign):
+    """σ_Y of tension, (3 + sin φ) / (3 - 3 sin φ) σ_Y of compression; dε_v / dε of the potential."""
+    law = kl.ConeSoftening3D(50e9, 0.2, 10e6, 1e5, 3, friction=30.0, dilatancy=15.0)
+    stress, state = uniaxial(law, sign * np.linspace(1e-5, 2e-3, 9))
+    s, flow = 0.5, np.sin(np.radians(15))
+    strength = 10e6 if sign > 0 else 10e6 * (3 + s) / (3 - 3 * s)
+    assert abs(stress[-1] - sign * strength) < 1e-9 * strength
+    plastic = state["plastic_strain"]
+    mean, root = 2 * flow / (3 - 3 * flow), 3**0.5 * (3 - flow) / (3 - 3 * flow)
+    ratio = 3 * mean / (mean + sign * root / 3**0.5)
+    assert abs(plastic[:3].sum() / plastic[0] - ratio) < 1e-9 * abs(ratio)
+    expected = np.abs(stress[-1] * plastic[0]) * 0.1 / 1e5
+    assert abs(state["plastic_dissipation"][0] - expected) < 1e-9 * expected
+
+
+def test_the_apex_of_a_cone_that_softens():
+    """tr σ = (3 + sin φ) / (2 sin φ) σ_Y, and an energy of p Δε_v."""
+    law = kl.ConeSoftening3D(50e9, 0.2, 10e6, 1e8, 3, friction=30.0, dilatancy=10.0)
+    strain = np.array([2e-3, 2e-3, 2e-3, 1e-5, 0, 0])
+    stress, _, state = law.evaluate(strain, start(law), 1.0)
+    assert np.abs(stress - 35e6 / 3 * (np.arange(6) < 3)).max() < 1e-8 * 35e6
+    plastic = strain - np.linalg.solve(law.C, stress)
+    assert np.abs(state["plastic_strain"] - plastic).max() < 1e-12
+    assert abs(state["plastic_dissipation"][0] / (stress @ plastic * 0.1 / 1e8) - 1) < 1e-9
+
+
 def test_a_softening_element_that_is_too_large_is_refused():
     law = kl.J2Softening3D(200e9, 0.3, 250e6, 1e3)
     state = start(law)
@@ -279,6 +308,8 @@ def test_a_law_cannot_use_its_own_tangent_at_rest(monkeypatch):
         (lambda: kl.J2Plasticity3D(200e9, 0.5, 1.0), "POISSON_RATIO"),
         (lambda: kl.DruckerPrager3D(1e6, 0.3, 1e3, 95.0), "FRICTION_ANGLE"),
         (lambda: kl.DruckerPrager3D(1e6, 0.3, 1e3, 20.0, 30.0), "DILATANCY"),
+        (lambda: kl.ConeSoftening3D(1.0, 0.2, 1.0, 1.0), r"friction \(FRICTION_ANGLE\) 0 must"),
+        (lambda: kl.ConeSoftening3D(1, 0.2, 1, 1, friction=9, dilatancy=10), "DILATANCY"),
         (lambda: kl.MooneyRivlin3D(-1.0, 0.0, 1.0), "shear modulus"),
         (lambda: kl.Ogden3D(1.0, -2.0, 1.0), "shear modulus"),
         (lambda: kl.IsotropicDamage3D(1.0, 0.2, 1.0, 0.0), "FRACTURE_ENERGY"),
