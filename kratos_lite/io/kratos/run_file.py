@@ -9,6 +9,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+from kratos_lite.analysis.model import Model
 from kratos_lite.analysis.result import Result
 from kratos_lite.errors import Problems, nearest
 from kratos_lite.io.case import Case
@@ -17,6 +18,7 @@ from kratos_lite.io.formats.document import Document
 from kratos_lite.io.formats.part_files import part_files, read_part
 from kratos_lite.io.kratos.context import RunContext, module_of, times_of
 from kratos_lite.io.kratos.expected_values import COMPARISONS
+from kratos_lite.io.kratos.initial_state import MODULE, initial_state_of
 from kratos_lite.io.kratos.laws import is_nonlinear, make_linear, notes_on_stress, quasi_static_of
 from kratos_lite.io.kratos.motion import add_motion
 from kratos_lite.io.kratos.processes import PROCESSES, Action, actions_of, run
@@ -84,11 +86,13 @@ def read_kratos_project(
     if not dynamic and not in_steps:
         text = "supports, loads and motion are taken at the end of the run"
         notes.append(f"{text}: those at t = {times[-1]:g} s")
-    actions, checks = _read_processes(settings, context, notes)
+    actions, checks, states = _read_processes(settings, context, notes)
     in_time = ProcessesInTime(actions, context, dynamic, nonlinear) if dynamic or in_steps else None
     processes = partial(run, actions, context, notes) if in_time is None else in_time.prepare
     initial_displacement = initial_displacement and in_time is None
     model = model_from(document, initial_displacement=initial_displacement, processes=processes)
+    for initial_state in states:
+        initial_state(model)
     add_motion(model, settings, None if in_time else times[-1])
     model.notes += notes
     if in_time is None:
@@ -164,10 +168,11 @@ def _use_materials(solver: Settings, context: RunContext, document: Document, no
 
 def _read_processes(
     settings: Settings, context: RunContext, notes: list[str]
-) -> tuple[list[Action], list[Callable[[Result], str]]]:
-    """Return what the processes do and check; all that are unknown are reported together."""
+) -> tuple[list[Action], list[Callable[[Result], str]], list[Callable[[Model], None]]]:
+    """Return what processes do, check and begin with; all that are unknown are reported together."""
     actions: list[Action] = []
     checks: list[Callable[[Result], str]] = []
+    states: list[Callable[[Model], None]] = []
     problems = Problems()
     for section in (settings.section("processes"), settings.section("output_processes")):
         # Kratos keeps the lists in alphabetical order; later processes replace earlier values.
@@ -176,14 +181,16 @@ def _read_processes(
                 module = module_of(entry)
                 if module in PROCESSES:
                     actions += actions_of(entry, module, context)
+                elif module == MODULE:
+                    states.append(initial_state_of(entry.section("Parameters", required=True), context))
                 elif module in COMPARISONS:
                     checks += COMPARISONS[module](entry.section("Parameters", required=True), context)
                 elif module.endswith("_output_process") or module in OUTPUTS:
                     text = f"{module} is not run; ask kratos_lite for files with --output"
                     notes.append(f"{entry.path}: {text}")
                 else:
-                    known = [*PROCESSES, *COMPARISONS]
+                    known = [*PROCESSES, *COMPARISONS, MODULE]
                     text = f"unknown process {module!r}.{nearest(module, known)} Known are {', '.join(known)}"
                     problems.add(str(entry.error("", text)))
     problems.raise_if_any()
-    return actions, checks
+    return actions, checks, states
