@@ -11,7 +11,7 @@ from typing import Any, ClassVar, TypeAlias
 import numpy as np
 
 from kratos_lite import voigt
-from kratos_lite.errors import MaterialError, SolveError
+from kratos_lite.errors import MaterialError, SolveError, nearest
 from kratos_lite.registry import Registry
 from kratos_lite.tabular import names_of
 from kratos_lite.typing import Array
@@ -109,6 +109,16 @@ class Material:
                 f"{{'plastic_strain': 6}}; got {sizes!r}"
             )
         MATERIALS.add(cls.__name__, cls, cls.__dict__.get("aliases", ()))
+
+    def __new__(cls, *constants: Any, **named: Any) -> Any:
+        """Refuse constants that the law does not have."""
+        known = names_of(cls)
+        if known and (unknown := sorted(named.keys() - set(known))):
+            hint = nearest(unknown[0], known)
+            raise MaterialError(f"{cls.__name__} has no {unknown[0]!r}.{hint} It has {', '.join(known)}")
+        if (constants or named) and cls.__init__ is object.__init__:
+            raise TypeError(f"{cls.__name__}() takes no arguments")  # as Python says it
+        return super().__new__(cls)
 
     def __post_init__(self) -> None:
         for name in names_of(type(self)):
@@ -258,6 +268,18 @@ class Material:
             view.flags.writeable = False
         try:
             return self.response(views[0], dict(zip(state, views[1:], strict=True)), dt)
+        except KeyError as error:
+            name, law = str(error.args[0]), type(self).__name__
+            have = ", ".join(self.internal_variables) or "none"
+            cure = "start with its initial_state()"
+            if name not in self.internal_variables:
+                cure = f"add it to internal_variables of the class.{nearest(name, self.internal_variables)}"
+            elif name in state:
+                raise
+            raise MaterialError(
+                f"{law}.response takes the internal variable {name!r}, which its state does not have; "
+                f"declared are {have}; {cure}"
+            ) from error
         except ValueError as error:
             if "read-only" not in str(error):
                 raise

@@ -18,7 +18,6 @@ PYTHON = Path(traceback.__file__).parent
 
 CURES = {
     "truth value of an array": "many points come at once: np.where(condition, a, b) chooses for each",
-    "KeyError": "a law finds in its state what internal_variables of its class lists",
     "response() takes": "a law has response(self, strain, state, dt)",
 }
 """What to do about errors of Python that say this."""

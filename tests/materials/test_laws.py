@@ -323,3 +323,48 @@ def test_a_law_cannot_use_its_own_tangent_at_rest(monkeypatch):
 def test_constants_beyond_their_bounds(make, says):
     with pytest.raises(MaterialError, match=says):
         make()
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (
+            lambda: kl.Isotropic3D(youngs=1.0, nu=0.3),
+            "Isotropic3D has no 'youngs'. It has E, nu, density, alpha",
+        ),
+        (lambda: kl.Isotropic3D(E=1.0, nu=0.3, densty=1.0), "no 'densty'. Did you mean density?"),
+        (
+            lambda: kl.J2Plasticity3D(1.0, 0.3, yield_stres=1.0),
+            "no 'yield_stres'. Did you mean yield_stress?",
+        ),
+    ],
+)
+def test_a_constant_that_a_law_does_not_have(make, says):
+    with pytest.raises(MaterialError) as raised:
+        make()
+    assert says in str(raised.value)
+
+
+def test_an_internal_variable_that_a_law_or_its_state_does_not_have():
+    @dataclass(frozen=True)
+    class Misspelt(Material):
+        density: float = 0.0
+
+        internal_variables = {"plastic_strain": 6, "hardening": 1}  # noqa: RUF012
+
+        def response(self, strain, state, dt):
+            return strain - state["plastic_stain"], None, dict(state)
+
+    says = "'plastic_stain', .* plastic_strain, hardening; add .* Did you mean plastic_strain"
+    with pytest.raises(MaterialError, match=says):
+        kl.material_point(Misspelt(), {"xx": [0.1]})
+    law = kl.J2Plasticity3D(200e9, 0.3, 250e6)
+    with pytest.raises(MaterialError, match=r"'back_stress', which .*start with its initial_state"):
+        law.evaluate(np.zeros(6), {}, 1.0)
+
+
+def test_an_error_of_a_response_that_is_no_missing_variable_stays(monkeypatch):
+    monkeypatch.setattr(kl.J2Plasticity3D, "response", lambda self, e, q, dt: {}["plastic_strain"])
+    law = kl.J2Plasticity3D(200e9, 0.3, 250e6)
+    with pytest.raises(KeyError):
+        law.evaluate(np.zeros(6), law.initial_state(), 1.0)

@@ -178,7 +178,7 @@ def test_a_material_is_checked_as_the_instance_that_the_file_makes(checked, text
         (
             '    internal_variables = {"plastic_strain": 6}\n',
             "",
-            "'plastic_strain' at .*; a law finds in its",
+            "'plastic_strain', which .* declared are none; add it to internal_variables",
         ),
         ("state, dt)", "state)", r"a law has response\(self, strain, state, dt\)"),
         (', {"plastic_strain": new}', "", "got 2 values$"),
