@@ -62,6 +62,27 @@ def test_a_pinched_hemisphere_with_a_hole():
     assert abs(-u[pushed, 1] / 5.902 - 1) < 0.05
 
 
+def test_an_open_cylinder_is_pulled_apart():
+    """Sze, Liu & Lo (2004): 2.768 under P = 40,000, and 4.551 inwards at a quarter of the circumference.
+
+    18 × 12 of these elements have 2.738 and 4.546.
+    """
+    radius, length, h = 4.953, 10.35, 0.094
+    box = kl.box((1, 1, 1), (8, 4, 1), "Element3D20N")
+    s, t, z = box.points.T
+    angle, r = np.pi / 2 * s, radius + h * (z - 0.5)
+    mesh = box.replace(points=np.stack([r * np.cos(angle), -length / 2 * t, r * np.sin(angle)], axis=1))
+    model = kl.Model(mesh, kl.Isotropic3D(10.5e6, 0.3125), formulation="total_lagrangian")
+    model.use_rule(2)
+    for place, axis in ((s == 0, "z"), (s == 1, "x"), (t == 0, "y")):
+        model.fix(np.flatnonzero(place), axis)
+    pulled, side = nearest(mesh, (0, 0, radius)), nearest(mesh, (radius, 0, 0))
+    model.add(kl.PointLoad(pulled, (0, 0, 10e3)), amplitude=lambda t: t)  # a quarter of P
+    u = last(model, 2, tolerance=1e-4)
+    assert abs(u[pulled, 2] / 2.768 - 1) < 0.05
+    assert abs(-u[side, 0] / 4.551 - 1) < 0.04
+
+
 def test_a_slit_annular_plate_is_lifted():
     """Sze, Liu & Lo (2004): 13.891 and 17.528 at the ends of the edge under 0.8 N/m."""
     h = 0.03
