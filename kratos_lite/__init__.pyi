@@ -106,8 +106,10 @@ from kratos_lite.materials.mooney_rivlin3d import MooneyRivlin3D as MooneyRivlin
 from kratos_lite.materials.neo_hookean3d import NeoHookean3D as NeoHookean3D
 from kratos_lite.materials.ogden3d import Ogden3D as Ogden3D
 from kratos_lite.materials.orthotropic3d import Orthotropic3D as Orthotropic3D
+from kratos_lite.materials.rankine_damage3d import RankineDamage3D as RankineDamage3D
 from kratos_lite.materials.saint_venant_kirchhoff3d import SaintVenantKirchhoff3D as SaintVenantKirchhoff3D
 from kratos_lite.materials.umat import UMAT as UMAT
+from kratos_lite.materials.von_mises_damage3d import VonMisesDamage3D as VonMisesDamage3D
 from kratos_lite.mesh import Block as Block
 from kratos_lite.mesh import Mesh as Mesh
 from kratos_lite.mesh import Part as Part

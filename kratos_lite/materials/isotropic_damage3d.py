@@ -79,25 +79,25 @@ class IsotropicDamage3D(IsotropicLaw):
     def response(self, strain: Array, state: GaussState, dt: float) -> Response:
         """Return stress, tangent and internal variables; see `Material.response`."""
         effective = strain @ self.elastic.C.T
-        norm = np.sqrt((strain * effective).sum(axis=-1))
-        first = self.strength / self.E**0.5
+        norm, gradient, first = self._equivalent(strain, effective)
         old = np.maximum(state["threshold"][..., 0], first)
-        r, length = np.maximum(norm, old), state["element_length"][..., 0]
-        d, slope = self._damage(r / first, length)
+        r, (size,) = np.maximum(norm, old), self.internal_variables.keys() - {"damage", "threshold"}
+        d, slope = self._damage(r / first, state[size][..., 0])
         growing = (norm > old) & (d > 0)
-        rate = np.where(growing, slope / (first * np.where(norm > 0, norm, 1.0)), 0.0)
+        rate = np.where(growing, slope / first, 0.0)
         D = (1 - d)[..., None, None] * self.elastic.C
-        D = D - rate[..., None, None] * effective[..., :, None] * effective[..., None, :]
-        new = {
-            "damage": d[..., None],
-            "threshold": r[..., None],
-            "element_length": state["element_length"].copy(),
-        }
+        D = D - rate[..., None, None] * effective[..., :, None] * gradient[..., None, :]
+        new = {"damage": d[..., None], "threshold": r[..., None], size: state[size].copy()}
         return (1 - d)[..., None] * effective, D, new
 
     def energy(self, strain: Array, stress: Array, state: GaussState) -> Array:
         """Return ½ σ:ε; see `Material.energy`."""
         return np.asarray((strain * stress).sum(axis=-1) / 2)
+
+    def _equivalent(self, strain: Array, effective: Array) -> tuple[Array, Array, float]:
+        """Return what damages (...), its derivative by the strain (..., 6), and where a bar softens."""
+        norm = np.sqrt((strain * effective).sum(axis=-1))
+        return norm, effective / np.where(norm > 0, norm, 1.0)[..., None], self.strength / self.E**0.5
 
     def _damage(self, x: Array, length: Array) -> tuple[Array, Array]:
         """Return d and its slope at thresholds x ≥ 1 relative to the first one, of elements of a length."""

@@ -22,6 +22,8 @@ LAWS = [
     (kl.DruckerPrager3D(20e6, 0.3, 1e4, 30.0, 30.0, 1e5), 2e-3),
     (kl.IsotropicDamage3D(30e9, 0.2, 3e6, 100.0), 2e-4),
     (kl.IsotropicDamage3D(30e9, 0.2, 3e6, 100.0, linear=1), 2e-4),
+    (kl.VonMisesDamage3D(30e9, 0.2, 3e6, 100.0), 2e-4),
+    (kl.RankineDamage3D(30e9, 0.2, 3e6, 100.0, linear=1), 2e-4),
     (kl.GeneralizedMaxwell3D(1e9, 0.3, 0.3, 10.0, 0.2, 1.0), 1e-2),
     (kl.SaintVenantKirchhoff3D(1e6, 0.3), 0.1),
     (kl.NeoHookean3D(1e6, 0.3), 0.1),
@@ -126,11 +128,13 @@ def test_the_cone_of_soils_in_triaxial_tests(sign):
 
 
 @pytest.mark.parametrize("linear", [0, 1])
-def test_damage_dissipates_the_fracture_energy(linear):
+@pytest.mark.parametrize("make", [kl.IsotropicDamage3D, kl.VonMisesDamage3D, kl.RankineDamage3D])
+def test_damage_dissipates_the_fracture_energy(make, linear):
     for length in (0.05, 0.1, 0.2):
-        law = kl.IsotropicDamage3D(30e9, 0.2, 3e6, 100.0, linear=linear)
+        law = make(30e9, 0.2, 3e6, 100.0, linear=linear)
         state = law.initial_state()
-        state["element_length"][:] = length
+        for name in state.keys() & {"element_length", "element_radius"}:
+            state[name][:] = length
         strains = np.concatenate([[0.5e-4, 1e-4], np.geomspace(1.01e-4, 4e-2 if not linear else 2e-3, 200)])
         stress, _ = uniaxial(law, strains, state)
         energy = np.diff(strains, prepend=0) @ (stress + np.concatenate([[0], stress[:-1]])) / 2 * length
@@ -189,6 +193,19 @@ def test_a_softening_element_that_is_too_large_is_refused():
     state["element_radius"][:] = 10.0
     with pytest.raises(SolveError, match="an element of radius 10 m would snap back"):
         law.evaluate(np.array([0.01, 0, 0, 0, 0, 0]), state, 1.0)
+
+
+def test_what_damages_is_the_stress_of_von_mises_or_the_largest_tension():
+    """√3 τ and τ under shear, nothing under pressure, and under a thrust the one alone."""
+    shear, pressure, thrust = (
+        np.array(stress) * 1e6 for stress in ([0, 0, 0, 2, 0, 0], [-9, -9, -9, 0, 0, 0], [-4, 0, 0, 0, 0, 0])
+    )
+    for make, sizes in ((kl.VonMisesDamage3D, (2 * 3**0.5, 0, 4)), (kl.RankineDamage3D, (2, 0, 0))):
+        law = make(30e9, 0.2, 1e3, 100.0)
+        for stress, size in zip((shear, pressure, thrust), sizes, strict=True):
+            strain = np.linalg.solve(law.elastic.C, stress)
+            threshold = law.evaluate(strain, law.initial_state(), 1.0)[2]["threshold"][0]
+            assert abs(threshold - max(size * 1e6, 1e3)) < 1e-6 * 1e6
 
 
 def test_damage_does_not_heal():
@@ -313,6 +330,7 @@ def test_a_law_cannot_use_its_own_tangent_at_rest(monkeypatch):
         (lambda: kl.MooneyRivlin3D(-1.0, 0.0, 1.0), "shear modulus"),
         (lambda: kl.Ogden3D(1.0, -2.0, 1.0), "shear modulus"),
         (lambda: kl.IsotropicDamage3D(1.0, 0.2, 1.0, 0.0), "FRACTURE_ENERGY"),
+        (lambda: kl.RankineDamage3D.from_variables({"SOFTENING_TYPE": 2.0}), "SOFTENING_TYPE must be 0"),
         (lambda: kl.J2Softening3D(1.0, 0.2, 1.0, 0.0), "FRACTURE_ENERGY"),
         (lambda: kl.J2Softening3D(1.0, 0.2, 1.0, 1.0, curve=2), "HARDENING_CURVE"),
         (lambda: kl.J2Softening3D(1.0, 0.2, 1.0, 1.0, compression=2.0), "YIELD_STRESS_COMPRESSION"),
@@ -368,3 +386,10 @@ def test_an_error_of_a_response_that_is_no_missing_variable_stays(monkeypatch):
     law = kl.J2Plasticity3D(200e9, 0.3, 250e6)
     with pytest.raises(KeyError):
         law.evaluate(np.zeros(6), law.initial_state(), 1.0)
+
+
+@pytest.mark.parametrize(("kind", "linear"), [(0, 1), (1, 0)])
+def test_damage_of_a_file_softens_as_it_says(kind, linear):
+    values = {"YOUNG_MODULUS": 30e9, "POISSON_RATIO": 0.2, "FRACTURE_ENERGY": 100.0, "SOFTENING_TYPE": kind}
+    law = kl.VonMisesDamage3D.from_variables(values | {"YIELD_STRESS_TENSION": 3e6})
+    assert law == kl.VonMisesDamage3D(30e9, 0.2, 3e6, 100.0, linear=linear)
