@@ -17,6 +17,7 @@ from kratos_lite.materials import MATERIALS
 from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.loads.nodal import PointLoad
 from kratos_lite.model.loads.surface import Pressure, Resultant, Traction
+from kratos_lite.model.loads.temperature import Temperature
 
 if TYPE_CHECKING:
     from kratos_lite.ale import Motion
@@ -124,6 +125,8 @@ def _add_to_model(model: Model, options: Namespace) -> None:
     for name, load in LOADS.items():
         for part, value in getattr(options, name):
             model.add(load(part, value))
+    for value, reference in options.temperature:
+        model.add(Temperature(value, reference))
     if motions := given(options, "rotation", "translation"):
         model.add(_motion(model, options, *motions))
 

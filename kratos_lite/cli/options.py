@@ -87,6 +87,7 @@ GROUPS = {
             Option("--pressure", "PART:P", "pressure in Pa, positive into the body"),
             Option("--point-load", "PART:X,Y,Z", "force in N on a part of one node"),
             Option("--resultant", "PART:X,Y,Z", "force in N in all, spread over the faces of the part"),
+            Option("--temperature", "T[:REFERENCE]", "of the whole model, and that without strain (0)"),
             many=True,
             only="models",
         ),

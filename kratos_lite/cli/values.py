@@ -112,6 +112,16 @@ def displacement(text: str) -> tuple[str, float]:
     return axes, number(value) if equals else 0.0
 
 
+def temperature(text: str) -> list[float]:
+    """Return temperature and reference of ``T[:REFERENCE]``.
+
+    >>> temperature("120:20")
+    [120.0, 20.0]
+    """
+    value, _, reference = text.partition(":")
+    return [number(value), number(reference or "0")]
+
+
 def integrator(text: str) -> ModelIntegrator:
     """Return the integrator of ``NAME[:NUMBERS]``.
 
@@ -160,6 +170,7 @@ def material(text: str) -> tuple[str | None, Material]:
 
 FORMS: dict[str, Callable[[str], Any]] = {
     "N": count,
+    "T[:REFERENCE]": temperature,
     "NUMBER": number,
     "ALPHA": number,
     "P": number,

@@ -46,6 +46,7 @@ class Isotropic3D(LinearMaterial):
         "LinearElasticIsotropic3DLaw",
         "KratosMultiphysics.StructuralMechanicsApplication.LinearElastic3DLaw",
         "ElasticIsotropic3D",
+        "ThermalElasticIsotropic3D",
     )
     variables: ClassVar[dict[str, str]] = {
         "E": "YOUNG_MODULUS",

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import malformed
@@ -145,6 +146,16 @@ def test_options_say_the_same_as_a_script(run, box, ending):
     ):
         model.add(load)
     assert same(displacement("out.json"), model.solve().displacement())
+
+
+def test_a_temperature_says_the_same_as_a_script(run, box):
+    words = ["--material", f"{STEEL},alpha=12e-6", "--fix", "z-:xyz", "--temperature", "120:20"]
+    assert run("solve", "box.vtu", *words, "--temperature", "5", "--json", "out.json").code == 0
+    model = kl.Model(box, replace(LAW, alpha=12e-6))
+    model.fix("z-")
+    model.add(kl.Temperature(105.0))
+    assert same(displacement("out.json"), model.solve().displacement())
+    assert run("solve", "box.vtu", *words, "--temperature", "1:2:3").refuses("--temperature: ")
 
 
 def test_material_by_property_and_by_law(run, box):

@@ -178,3 +178,25 @@ def test_steps_of_a_table_and_supports_in_turn_are_those_of_kratos(tmp_path):
         supports[-1]["Parameters"]["interval"] = interval
     table = {"time_step_table": [[0.05, 0.06], [0.5, 0.15], [0.9, 0.1]]}
     compare(tmp_path, run_file(supports, [], end=1.0, time_stepping=table, **EXACT), 11)
+
+
+@pytest.mark.parametrize("solver", ["static", "dynamic"])
+def test_temperatures_in_time_are_those_of_kratos(tmp_path, solver):
+    (tmp_path / "box.mdpa").write_text(box_mdpa())
+    own = {"THERMAL_EXPANSION_COEFFICIENT": 1e-5, "REFERENCE_TEMPERATURE": 20.0}
+    law = "ThermalElasticIsotropic3D"
+    write(tmp_path, materials("Structure.Body", 7850.0, 2e9, 0.3, law, **own), "materials.json")
+    hot = "20 + 1000*t*(1 + t)"  # linear elements take the mean temperature of their nodes here
+    heat = process("assign_scalar_variable_process", "Structure", "TEMPERATURE", value=hot, constrained=False)
+    heat["Parameters"]["interval"] = [0.0, "End"]
+    settings = {"auxiliary_variables_list": ["TEMPERATURE"], "step": 0.01, "end": 0.035}
+    content = run_file([CLAMP], [heat], solver_type=solver, **settings)
+    if solver == "dynamic":
+        compare(tmp_path, content, 4)
+        return
+    path = write(tmp_path, content)
+    run_kratos(tmp_path)
+    known = json.loads((tmp_path / "kratos.json").read_text())["steps"][-1]
+    result = read_case(path).model.solve()
+    reference = np.array([known[str(i)] for i in result.mesh.node_ids])
+    assert np.abs(result.u - reference).max() < 1e-10 * np.abs(reference).max()

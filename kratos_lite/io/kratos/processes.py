@@ -17,7 +17,7 @@ import numpy as np
 
 from kratos_lite.io.kratos.context import Interval, RunContext, interval_of
 from kratos_lite.io.kratos.expressions import evaluate
-from kratos_lite.io.kratos.variables import PRESSURES, VECTORS, Variables
+from kratos_lite.io.kratos.variables import PRESSURES, TEMPERATURE, VECTORS, Variables
 from kratos_lite.io.names import nearest_variable
 from kratos_lite.io.settings import Settings, is_number, shown
 from kratos_lite.mesh import Mesh
@@ -28,7 +28,7 @@ Factors = tuple[Value, ...] | None
 IDLE = ("ROTATION", "VELOCITY", "ACCELERATION", "ANGULAR_VELOCITY", "ANGULAR_ACCELERATION", "REACTION")
 """Vector variables that files set although a static solution of solids does not use them."""
 KNOWN_VECTORS = (*VECTORS, *IDLE)
-KNOWN_SCALARS = (*(f"{v}_{a}" for v in KNOWN_VECTORS for a in "XYZ"), *PRESSURES)
+KNOWN_SCALARS = (*(f"{v}_{a}" for v in KNOWN_VECTORS for a in "XYZ"), *PRESSURES, TEMPERATURE)
 COMMON = ("help", "mesh_id", "model_part_name", "variable_name", "interval", "local_axes")
 NORMALS = ("automatic_inwards_normal", "automatic_outwards_normal")
 
@@ -165,9 +165,6 @@ def refuse_local_axes(settings: Settings) -> None:
 def _variable(settings: Settings, process: Process) -> str:
     kind, known = ("vector", KNOWN_VECTORS) if process.is_vector else ("scalar", KNOWN_SCALARS)
     name = settings.text("variable_name").rsplit(".", 1)[-1]
-    if name == "TEMPERATURE":
-        text = "a TEMPERATURE is imposed, which run files do not take; add a kl.Temperature in a script"
-        raise settings.error("variable_name", text)
     if name not in known:
         text = f"{name!r} is not a {kind} variable of static solids.{nearest_variable(name, known)}"
         raise settings.error("variable_name", f"{text} Known are {', '.join(known[:5])} …")

@@ -11,7 +11,7 @@ import numpy as np
 
 from kratos_lite.analysis.model import Model
 from kratos_lite.errors import InputError, KratosLiteError, MaterialError, ModelError, Problems, nearest
-from kratos_lite.io.formats.document import Document, Properties
+from kratos_lite.io.formats.document import Document, Note, Properties
 from kratos_lite.io.kratos.context import RunContext
 from kratos_lite.io.names import PRESTRESS
 from kratos_lite.io.settings import Settings, is_number, shown
@@ -25,12 +25,19 @@ ELASTIC = {name for law in MATERIALS.values() for name in law.variables.values()
 BODY_LOADS = ("VOLUME_ACCELERATION", "GRAVITY", "BODY_FORCE")
 USED = ELASTIC | {
     "DENSITY", "CONSTITUTIVE_LAW", "INTEGRATION_ORDER", "INSITU_STRESS", "PRESTRESS", "PRESTRESS_FACTOR",
-    "ELASTICITY_TENSOR",
+    "ELASTICITY_TENSOR", "REFERENCE_TEMPERATURE",
     *BODY_LOADS, *(f"{name}_{axis}" for name in BODY_LOADS for axis in "XYZ"),
 }  # fmt: skip
 """Variables of Properties that change a static linear solution."""
 USER_LAW = "UserProvidedLinearElastic3DLaw"
 """The law of Kratos that takes any ELASTICITY_TENSOR (6, 6) in Pa; it has no orthotropic one for solids."""
+
+THERMAL_LAW = "ThermalElasticIsotropic3D"
+"""The linear law of Kratos that temperatures strain, of KratosConstitutiveLawsApplication."""
+NO_EXPANSION = (
+    "no element expands by its TEMPERATURE: give Properties a THERMAL_EXPANSION_COEFFICIENT and a "
+    "REFERENCE_TEMPERATURE, or leave it out"
+)
 
 
 def apply_properties(model: Model, properties: Properties, materials: bool, problems: Problems) -> None:
@@ -70,6 +77,34 @@ def _apply_prestress(model: Model, properties: Properties) -> None:
         raise InputError("PRESTRESS and INSITU_STRESS are two names of one stress, but differ; keep one")
     if stresses:
         model.add_prestress(-factor * stresses[0], properties.id)
+
+
+def expanding(document: Document, materials: bool) -> list[Properties]:
+    """Return the properties of elements that a temperature strains; all if their materials come later."""
+    used = sorted({int(number) for block in document.mesh.blocks for number in np.unique(block.properties)})
+    if not materials:
+        own = (document.properties.get(number, Properties(number)) for number in used)
+        return [replace(p, values={**p.values, "CONSTITUTIVE_LAW": None}) for p in own]
+    stated = [p for number in used if (p := document.properties.get(number)) and names_material(p.values)]
+    return [properties for properties in stated if material_from(properties.values).expansion.any()]
+
+
+def reference_temperature(properties: Properties, source: str) -> float:
+    """Return the temperature without thermal strain of elements with these properties in a file.
+
+    Source: `THERMAL_LAW`, σ = C (B u - THERMAL_EXPANSION_COEFFICIENT (TEMPERATURE - REFERENCE_TEMPERATURE)).
+    """
+    law, name = str(properties.values.get("CONSTITUTIVE_LAW") or "Isotropic3D"), "REFERENCE_TEMPERATURE"
+    text = f"nodes have a TEMPERATURE; give a {name}, one number, at which it strains nothing"
+    if law not in list(MATERIALS) and "Thermal" not in law:
+        text = (
+            f"CONSTITUTIVE_LAW {law} has no thermal strain in Kratos, but nodes have a TEMPERATURE; write "
+            f"{THERMAL_LAW} or {MATERIALS[law].__name__}, or leave the thermal expansion out"
+        )
+    elif (value := _array(properties.values.get(name, ()))).shape == ():
+        return float(value)
+    line = _line_of(properties, text)
+    raise InputError(str(Note(line, f"Properties {properties.id}: {text}", properties.source or source)))
 
 
 def _numbers(properties: Properties, name: str, default: Any, shape: tuple[int, ...], what: str) -> Array:

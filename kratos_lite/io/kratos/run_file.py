@@ -22,7 +22,7 @@ from kratos_lite.io.kratos.initial_state import MODULE, initial_state_of
 from kratos_lite.io.kratos.laws import is_nonlinear, make_linear, notes_on_stress, quasi_static_of
 from kratos_lite.io.kratos.motion import add_motion
 from kratos_lite.io.kratos.processes import PROCESSES, Action, actions_of, run
-from kratos_lite.io.kratos.properties import use_materials
+from kratos_lite.io.kratos.properties import NO_EXPANSION, expanding, use_materials
 from kratos_lite.io.kratos.time_dependent import (
     DYNAMIC,
     DYNAMIC_KEYS,
@@ -30,6 +30,7 @@ from kratos_lite.io.kratos.time_dependent import (
     time_integration_of,
 )
 from kratos_lite.io.kratos.to_model import model_from
+from kratos_lite.io.kratos.variables import TEMPERATURE
 from kratos_lite.io.settings import Settings, find_file, read_settings
 
 ROOT_KEYS = ("problem_data", "solver_settings", "processes", "output_processes", "ale")
@@ -87,6 +88,9 @@ def read_kratos_project(
         text = "supports, loads and motion are taken at the end of the run"
         notes.append(f"{text}: those at t = {times[-1]:g} s")
     actions, checks, states = _read_processes(settings, context, notes)
+    for action in actions:
+        if action.component == TEMPERATURE:
+            action.settings.expect(expanding(document, True), "variable_name", NO_EXPANSION)
     in_time = ProcessesInTime(actions, context, dynamic, nonlinear) if dynamic or in_steps else None
     processes = partial(run, actions, context, notes) if in_time is None else in_time.prepare
     initial_displacement = initial_displacement and in_time is None

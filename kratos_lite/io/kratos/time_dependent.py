@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +18,7 @@ from kratos_lite.errors import InputError
 from kratos_lite.io.case import TimeIntegration
 from kratos_lite.io.kratos.context import RunContext
 from kratos_lite.io.kratos.processes import Action, notes_of, places_of, set_values
-from kratos_lite.io.kratos.variables import LOADING, Variables
+from kratos_lite.io.kratos.variables import LOADING, TEMPERATURE, Variables
 from kratos_lite.io.settings import Settings
 from kratos_lite.model.loads import Load, ScaledLoad, TimeDependentLoad
 from kratos_lite.typing import Ints
@@ -26,12 +26,14 @@ from kratos_lite.typing import Ints
 if TYPE_CHECKING:
     from kratos_lite.analysis.integrators import ModelIntegrator
 
+LoadOf = Callable[[Variables], "Load | None"]
 DYNAMIC = ("Dynamic", "dynamic")
 """Kratos' solver_type of what moves."""
 RAYLEIGH = ("rayleigh_alpha", "rayleigh_beta")
 DYNAMIC_KEYS = ("time_integration_method", "scheme_type", "damp_factor_m", "newmark_beta", *RAYLEIGH)
 GRAVITY = frozenset(f"VOLUME_ACCELERATION_{axis}" for axis in "XYZ")
-SURFACE = frozenset(name for name in LOADING - GRAVITY if not name.startswith("DISPLACEMENT"))
+HEAT = frozenset({TEMPERATURE})
+SURFACE = frozenset(n for n in LOADING - GRAVITY - HEAT if not n.startswith("DISPLACEMENT"))
 UNPRESCRIBED = ("VELOCITY", "ACCELERATION")
 """Variables that cannot be prescribed here."""
 
@@ -62,7 +64,13 @@ class ProcessesInTime:
         for i, action in enumerate(self.actions):
             if action.component.startswith("DISPLACEMENT") and action.factors:
                 self._move(i, action, values)
-        for group, load_of in ((GRAVITY, Variables.gravity), (SURFACE, Variables.condition_loads)):
+        heated = filter(values.temperature, values.expanding)
+        loads: list[tuple[frozenset[str], LoadOf]] = [
+            (GRAVITY, Variables.gravity),
+            (SURFACE, Variables.condition_loads),
+            *((HEAT, partial(Variables.temperature, properties=p)) for p in heated),
+        ]
+        for group, load_of in loads:
             actions = [action for action in self.actions if action.component in group]
             if any(action.mentions("t") or not self._acts_always(action) for action in actions):
                 if group is SURFACE:
@@ -183,7 +191,7 @@ def _load_in_time(
     actions: Sequence[Action],
     times: Sequence[float],
     base: Variables,
-    load_of: Callable[[Variables], Load | None],
+    load_of: LoadOf,
 ) -> Callable[[float], Load | None]:
     """Return the load of some actions as a function of the time; the same object while nothing changes."""
     places = places_of(base.mesh)

@@ -11,12 +11,12 @@ import numpy as np
 from kratos_lite.analysis.model import Model
 from kratos_lite.errors import InputError
 from kratos_lite.io.formats.document import Constraint, Data, Document, Note, Properties
-from kratos_lite.io.kratos.properties import USER_LAW
+from kratos_lite.io.kratos.properties import THERMAL_LAW, USER_LAW
 from kratos_lite.materials import Material
 from kratos_lite.mesh import Block, Mesh, Part, with_rows
 from kratos_lite.model.loads import TimeDependentLoad
 from kratos_lite.model.loads.body import Gravity
-from kratos_lite.model.loads.temperature import Temperature
+from kratos_lite.model.loads.temperature import Temperature, heated
 from kratos_lite.shapes.faces import Point1
 from kratos_lite.solvers.constraints import Constraints
 from kratos_lite.tabular import names_of
@@ -34,7 +34,6 @@ def document_from(model: Model) -> Document:
     unwritten = {
         "a motion of the material": model.motion is not None,
         "a support that moves in time": bool(model.supports.motions),
-        "a temperature": any(isinstance(load, Temperature) for load in model.loads),
         "a load that changes in time": any(isinstance(load, TimeDependentLoad) for load in model.loads),
     }
     for what, is_present in unwritten.items():
@@ -43,7 +42,8 @@ def document_from(model: Model) -> Document:
     mesh, supports, start = model.mesh, model.supports, _initial_displacement(model)
     whole = [g for g in model.loads if isinstance(g, Gravity) and g.where is None and np.ndim(g.force) == 1]
     gravity, others = sum((g.force for g in whole), np.zeros(3)), [x for x in model.loads if x not in whole]
-    numbers, properties = _properties(model, gravity)
+    temperature, references = _temperature(model)
+    numbers, properties = _properties(model, gravity, references)
     blocks = _blocks(model, numbers)
     forces = sum((load.forces(mesh, model.element_groups()) for load in others), np.zeros_like(mesh.points))
     loaded, number = (forces != 0).any(axis=1, keepdims=True), next(iter(properties), 0)
@@ -52,6 +52,9 @@ def document_from(model: Model) -> Document:
     written = mesh.replace(blocks=blocks, conditions=conditions, parts=_parts(mesh))
     data = _nodal_data(mesh, "DISPLACEMENT", supports.fixed, supports.values, fixed=True) + start
     data += _nodal_data(mesh, "POINT_LOAD", np.repeat(loaded, 3, axis=1), forces)
+    if len(hot := np.flatnonzero(np.isfinite(temperature))):
+        free = np.zeros(len(hot), dtype=bool)
+        data.append(Data("TEMPERATURE", mesh.node_ids[hot], free, temperature[hot]))
     constraints = constraints_of(mesh, supports.constraints)
     document = Document(written, properties, nodal_data=data, constraints=constraints)
     if mesh.conditions:
@@ -77,8 +80,30 @@ def _blocks(model: Model, numbers: Ints) -> list[Block]:
     return blocks
 
 
-def _properties(model: Model, gravity: Array) -> tuple[Ints, dict[int, Properties]]:
-    """Return the property id of each element, one per material and prestress, and the Properties."""
+def _temperature(model: Model) -> tuple[Array, Array]:
+    """Return the temperatures (n,) of nodes and (m,) without strain of elements; ∞ where nothing expands."""
+    mesh = model.mesh
+    loads = [load for load in model.loads if isinstance(load, Temperature)]
+    nodes, references = np.full(mesh.n_nodes, np.inf), np.full(mesh.n_elements, np.inf)
+    groups = [group for group in model.element_groups() if loads and group.material.expansion.any()]
+    for group in groups:
+        references[group.rows] = loads[0].reference
+    for load in reversed(loads):
+        own = mesh.elements(load.where)
+        references[own] = np.where(np.isfinite(references[own]), load.reference, np.inf)
+    values = [
+        (group.nodes, (0.0 if group.heating is None else group.heating) + references[group.rows, None])
+        for group in heated(mesh, groups, [(1.0, load) for load in loads])
+    ]
+    for at, T in values:
+        nodes[at] = T
+    if not all(np.allclose(nodes[at], T, rtol=1e-9) for at, T in values):
+        raise InputError("temperatures that differ on two sides of a node cannot be written to a file")
+    return nodes, references
+
+
+def _properties(model: Model, gravity: Array, references: Array) -> tuple[Ints, dict[int, Properties]]:
+    """Return the property id of each element, one per material and state at rest, and the Properties."""
     numbers = np.zeros(model.mesh.n_elements, dtype=np.int64)
     properties: dict[int, Properties] = {}
     known: list[tuple[Material, list[float]]] = []
@@ -86,24 +111,29 @@ def _properties(model: Model, gravity: Array) -> tuple[Ints, dict[int, Propertie
         if group.rule is not group.element.rule:
             raise InputError("a model with replaced quadrature rules cannot be written to a file of a model")
         prestress = np.zeros((len(group.rows), 6)) if group.prestress is None else group.prestress
-        different, which = np.unique(prestress, axis=0, return_inverse=True)
-        for i, stress in enumerate(different):
-            kind = (group.material, stress.tolist())
+        at_rest = np.column_stack([prestress, references[group.rows]])
+        different, which = np.unique(at_rest, axis=0, return_inverse=True)
+        for i, state in enumerate(different):
+            kind = (group.material, state.tolist())
             known += [] if kind in known else [kind]
             number = known.index(kind) + 1
             numbers[group.rows[which.ravel() == i]] = number
-            properties[number] = Properties(number, _values(group.material, gravity, stress))
+            properties[number] = Properties(number, _values(group.material, gravity, state))
     return numbers, properties
 
 
-def _values(material: Material, gravity: Array, prestress: Array) -> dict[str, Any]:
-    name = type(material).__name__
+def _values(material: Material, gravity: Array, at_rest: Array) -> dict[str, Any]:
+    name, prestress, reference = type(material).__name__, at_rest[:6], at_rest[6]
     if name not in KRATOS_LAW:
         raise InputError(f"material {name} has no name in Kratos; model files hold {', '.join(KRATOS_LAW)}")
     constants = names_of(type(material))
     stated = {material.variables[c]: float(getattr(material, c)) for c in constants}
     values: dict[str, Any] = {name: v for name, v in stated.items() if v or "THERMAL" not in name}
     values["CONSTITUTIVE_LAW"] = KRATOS_LAW[name]
+    if np.isfinite(reference):
+        if name != "Isotropic3D":
+            raise InputError(f"a temperature of {name} cannot be written; Kratos has {THERMAL_LAW} alone")
+        values |= {"CONSTITUTIVE_LAW": THERMAL_LAW, "REFERENCE_TEMPERATURE": float(reference)}
     if values["CONSTITUTIVE_LAW"] == USER_LAW:
         values["ELASTICITY_TENSOR"] = material.C
     if gravity.any():

@@ -9,10 +9,10 @@ import numpy as np
 from kratos_lite.analysis.model import Model
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.elements.formulations import is_unnamed
-from kratos_lite.errors import Problems, naming, nearest
+from kratos_lite.errors import InputError, Problems, naming, nearest
 from kratos_lite.io.formats.document import Constraint, Data, Document, Note
-from kratos_lite.io.kratos.properties import USED, apply_properties
-from kratos_lite.io.kratos.variables import LOADING, SPLIT, VECTORS, Variables, components
+from kratos_lite.io.kratos.properties import NO_EXPANSION, USED, apply_properties, expanding
+from kratos_lite.io.kratos.variables import LOADING, SPLIT, TEMPERATURE, VECTORS, Variables, components
 from kratos_lite.io.names import misspelt
 from kratos_lite.mesh import Mesh, distinct, ids_of, rows_of_ids
 from kratos_lite.solvers.constraints import Constraints
@@ -43,12 +43,13 @@ def model_from(
     for number in sorted(used & document.properties.keys()):
         apply_properties(model, document.properties[number], materials, problems)
     problems.raise_if_any()
-    values = Variables(document.mesh)
+    values = Variables(document.mesh, expanding(document, materials))
     _fill(values, document, model)
     u0 = values.nodal.vector("DISPLACEMENT")
     if processes:
         processes(values)
     with naming(document.mesh.source):
+        _check_temperatures(values, document, model)
         values.apply(model)
         if initial_displacement:
             _activate(model, u0)
@@ -116,6 +117,16 @@ def _fill(values: Variables, document: Document, model: Model) -> None:
     for data in document.element_data:
         _note(model, data, f"ElementalData {data.variable} is not used")
     problems.raise_if_any()
+
+
+def _check_temperatures(values: Variables, document: Document, model: Model) -> None:
+    """Raise InputError for temperatures that strain nothing; note where none is stated."""
+    T = values.nodal.get(TEMPERATURE)
+    if T is not None and T.any() and not values.expanding:
+        data = next(data for data in document.nodal_data if data.variable == TEMPERATURE)
+        raise InputError(str(Note(data.line, NO_EXPANSION, data.source or document.mesh.source)))
+    if T is not None and values.expanding and (cold := int((T == 0).sum())):
+        model.notes.append(f"TEMPERATURE is 0 at {cold} nodes; it is 0, as in Kratos, where none is given")
 
 
 def _activate(model: Model, u0: Array) -> None:

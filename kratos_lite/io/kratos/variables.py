@@ -6,16 +6,19 @@ turns them into supports and loads.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite.analysis.fields import FIELDS
 from kratos_lite.analysis.model import Model
+from kratos_lite.io.formats.document import Properties
+from kratos_lite.io.kratos.properties import reference_temperature
 from kratos_lite.mesh import Mesh, ids_of, with_rows
 from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.loads.surface import SURFACES, ConditionLoads
+from kratos_lite.model.loads.temperature import Temperature
 from kratos_lite.typing import Array, Mask
 
 LOADS = {
@@ -28,7 +31,8 @@ LOADS = {
 PRESSURES = ("POSITIVE_FACE_PRESSURE", "NEGATIVE_FACE_PRESSURE")
 DISPLACEMENT, VELOCITY = (FIELDS[name].kratos for name in ("displacement", "velocity"))
 VECTORS = (DISPLACEMENT, "VOLUME_ACCELERATION", "POINT_LOAD", "LINE_LOAD", "SURFACE_LOAD")
-LOADING = {*(f"{v}_{a}" for v in VECTORS for a in "XYZ"), *PRESSURES}
+TEMPERATURE = "TEMPERATURE"
+LOADING = {*(f"{v}_{a}" for v in VECTORS for a in "XYZ"), *PRESSURES, TEMPERATURE}
 """Components and scalars that a static linear solution uses."""
 SPLIT = (*VECTORS, VELOCITY)
 """Vector variables that are kept by component; velocities are those at the start of a transient."""
@@ -81,8 +85,9 @@ class Fields(dict[str, Array]):
 class Variables:
     """Values of variables on the nodes and conditions of a mesh; later values replace earlier ones."""
 
-    def __init__(self, mesh: Mesh) -> None:
+    def __init__(self, mesh: Mesh, expanding: Sequence[Properties] = ()) -> None:
         self.mesh = mesh
+        self.expanding = expanding  # the properties of elements that a temperature strains
         self.nodal, self.conditional = Fields(mesh.n_nodes), Fields(mesh.n_conditions)
         self.fixed: dict[str, Mask] = {}
 
@@ -93,7 +98,7 @@ class Variables:
 
     def copy(self) -> Variables:
         """Return a copy that can be changed without changing this."""
-        other = Variables(self.mesh)
+        other = Variables(self.mesh, self.expanding)
         other.nodal, other.conditional = self.nodal.copy(), self.conditional.copy()
         other.fixed = {name: fixed.copy() for name, fixed in self.fixed.items()}
         return other
@@ -109,14 +114,22 @@ class Variables:
         g = self.nodal.vector("VOLUME_ACCELERATION")
         return Gravity(g) if g.any() else None
 
+    def temperature(self, properties: Properties) -> Temperature | None:
+        """Return the temperature of elements with these properties, or None; 0 at nodes that state none."""
+        values = self.nodal.get(TEMPERATURE)
+        if values is None:
+            return None
+        return Temperature(values, reference_temperature(properties, self.mesh.source), properties.id)
+
     def apply(self, model: Model) -> None:
         """Add the supports and loads that the values mean to a model, and note those without effect."""
         self._apply_supports(model)
-        for load in (self.gravity(), self.condition_loads()):
+        for load in (self.gravity(), self.condition_loads(), *map(self.temperature, self.expanding)):
             if load is not None:
                 model.add(load)
         self.note_idle(model.notes, follows=model.is_nonlinear)
-        for name in sorted({*self.nodal, *self.conditional} - LOADING):
+        idle = {*self.nodal, *self.conditional} - LOADING | {TEMPERATURE} & self.conditional.keys()
+        for name in sorted(idle):
             if self.nodal.scalar(name).any() or self.conditional.scalar(name).any():
                 model.notes.append(f"{name} is set in the file; a static linear solution does not use it")
 
@@ -127,7 +140,7 @@ class Variables:
             if len(indices):
                 model.fix(indices, axis.lower(), self.nodal.scalar(name)[indices, None], override=True)
         others = [name for name, fixed in sorted(self.fixed.items()) if fixed.any()]
-        if others := [name for name in others if not name.startswith(f"{DISPLACEMENT}_")]:
+        if others := [name for name in others if not name.startswith((f"{DISPLACEMENT}_", TEMPERATURE))]:
             model.notes.append(f"fixed {', '.join(others)} ignored: solids have displacements only")
 
     def condition_loads(self) -> ConditionLoads | None:

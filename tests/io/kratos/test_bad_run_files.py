@@ -78,7 +78,7 @@ BAD = [
     (in_time(on_top("DISPLACEMENT_X", value="t*X")), "may move with x, y, z or with t, not with both"),
     (
         processes(on_top("TEMPERATURE", value=80.0)),
-        "a TEMPERATURE is imposed, which run files do not take",
+        "no element expands by its TEMPERATURE",
     ),
     (changed(domain_size=2), "domain_size must be 3; got 2"),
     (changed(domain_size="3"), "solver_settings.domain_size must be an integer; got '3'"),
