@@ -15,11 +15,12 @@ from kratos_lite.assembly.gauss_point_fields import at_gauss, in_order, totals
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh
 from kratos_lite.typing import Array
-from kratos_lite.validation import choice
+from kratos_lite.validation import choice, short
 
 if TYPE_CHECKING:
     from kratos_lite.assembly.recovery import Recovery
     from kratos_lite.mesh.locate import Located
+    from kratos_lite.model.local_axes import LocalAxes
 
 PLACES = ("gauss", "element", "node", "averaged", "raw")
 
@@ -106,7 +107,7 @@ class ElementFields:
         mesh = self.mesh
         return averages(mesh.points, self.groups, self._strained, mesh.n_elements, stress=stress)
 
-    def strain(self, at: str = "gauss") -> Any:
+    def strain(self, at: str = "gauss", local: LocalAxes | None = None) -> Any:
         """Return strains in Voigt order xx yy zz xy yz zx, with engineering shear.
 
         Parameters
@@ -114,6 +115,7 @@ class ElementFields:
         at : ``"gauss"`` for Gauss points; ``"element"`` for means over the volume; ``"node"`` for recovered
             values, the most accurate at nodes; ``"averaged"`` for values extrapolated to the nodes of each
             element and averaged there; ``"raw"`` for these of each element.
+        local : axes of the components, at nodes and of elements: 11 22 33 12 23 31 in place of xx …
 
         Returns
         -------
@@ -125,14 +127,14 @@ class ElementFields:
         InputError
             There is no such place.
         """
-        return self._field(at, stress=False)
+        return self.field("strain", at, local)
 
-    def stress(self, at: str = "gauss") -> Any:
+    def stress(self, at: str = "gauss", local: LocalAxes | None = None) -> Any:
         """Return stresses in Voigt order xx yy zz xy yz zx.
 
         Parameters
         ----------
-        at : as for `strain`.
+        at, local : as for `strain`.
 
         Returns
         -------
@@ -147,7 +149,7 @@ class ElementFields:
         >>> bar.solve().stress("element")[:, 2].round(9).tolist()
         [5.0]
         """
-        return self._field(at, stress=True)
+        return self.field("stress", at, local)
 
     @cached_property
     def _nodal_stress(self) -> Array:
@@ -196,7 +198,7 @@ class ElementFields:
                 stress[region.nodes] = values
         return stress
 
-    def field(self, name: str, at: str = "gauss") -> Any:
+    def field(self, name: str, at: str = "gauss", local: LocalAxes | None = None) -> Any:
         """Return a field by its name in the table of fields.
 
         Parameters
@@ -205,6 +207,7 @@ class ElementFields:
         at : as for `strain`, where the field has values there.  In an element a density is the mean over its
             volume, an invariant is that of the mean stress.  Internal variables of laws have their own names,
             such as ``"plastic_strain"``; at nodes they are means of what is extrapolated from Gauss points.
+        local : axes of the components of vectors and tensors, at nodes and of elements; x y z if not given.
 
         Returns
         -------
@@ -225,7 +228,28 @@ class ElementFields:
         [2.0]
         """
         fields = known(self.groups)
-        field = fields[choice(name, "a field", fields)]
+        field = fields[choice(name, "a field", fields)].along(local)
+        if local is not None and field.kind not in ("scalar", "principal", "vector", "tensor"):
+            raise InputError(f"the field {name} has no components along local axes")
+        values = self._values(name, field, at)
+        return values if field.local is None else field.turned(values, self._places(at))
+
+    def _places(self, at: str) -> Array:
+        """Return the nodes (n, 3) or the centers of the elements (m, 3) in m."""
+        if at not in ("node", "averaged", "element"):
+            raise InputError(
+                f"components along local axes are of nodes and elements, at='node', 'averaged' or 'element'; "
+                f"got {short(at)}; axes.stresses(values, points) takes those at other points"
+            )
+        if at != "element":
+            return self.mesh.points
+        centers = np.zeros((self.mesh.n_elements, 3))
+        for group in self.groups:
+            centers[group.rows] = self.mesh.points[group.nodes].mean(axis=1)
+        return centers
+
+    def _values(self, name: str, field: Field, at: str) -> Any:
+        """Return the values of a field along x y z."""
         if name in ("strain", "stress") or field.of:
             tensor = self._field(at, stress=(field.of or name) == "stress")
             of = field.function if field.of else np.asarray

@@ -23,7 +23,9 @@ from kratos_lite.elements import KinematicLinear
 from kratos_lite.errors import KratosLiteError
 from kratos_lite.mesh import Mesh
 from kratos_lite.mesh.vtk import mesh_fields
+from kratos_lite.model.local_axes import LocalAxes
 from kratos_lite.typing import Array, Numbers
+from kratos_lite.validation import instance
 
 AXES = ("x", "y", "z")
 COMPONENTS = tuple(name.lower() for name in voigt.NAMES)
@@ -57,17 +59,35 @@ class Field:
     listed: bool = True  # whether files and tables hold it
     log: bool = False  # whether pictures show it on a logarithmic scale
     sampled: bool = False  # known at Gauss points alone: elsewhere extrapolated from there, at nodes averaged
+    local: LocalAxes | None = None  # the axes of its parts, if not x y z
     needs: str = ""  # files hold it only of ``linear`` laws and strains, or where one of them is ``finite``
 
     @property
     def parts(self) -> tuple[str, ...]:
         """Names of its parts; a kind that is a number has that many."""
-        return PARTS[self.kind] if self.kind in PARTS else tuple(str(i + 1) for i in range(int(self.kind)))
+        parts = PARTS[self.kind] if self.kind in PARTS else tuple(str(i + 1) for i in range(int(self.kind)))
+        letters = str.maketrans("xyz", self.local.letters if self.local else "xyz")
+        return tuple(part.translate(letters) for part in parts)
 
     @property
     def nodal_place(self) -> str:
         """Where pictures show it: at nodes if it is known there."""
         return "node" if "node" in self.where else "element"
+
+    def along(self, local: LocalAxes | None) -> Field:
+        """Return the field with its parts along local axes, if it has parts along axes."""
+        if local is None or self.kind not in ("vector", "tensor"):
+            return self
+        return replace(self, local=instance(local, "local", LocalAxes, "kl.Cylindrical()"))
+
+    def turned(self, values: Array, points: Array) -> Array:
+        """Return values (..., parts) of the axes x y z at points (..., 3) along the axes of the field."""
+        if self.local is None:
+            return values
+        if self.kind == "vector":
+            return self.local.vectors(values, points)
+        shear = 1.0 if self.unit else voigt.HALF_SHEAR  # strains have engineering shear
+        return self.local.stresses(values * shear, points) / shear
 
     def at(self, values: Any) -> Array:
         """Return the field (..., parts) from the values at a place."""
@@ -158,8 +178,8 @@ class Fields(Protocol):
     u: Array
     reactions: Array
 
-    def field(self, name: str, at: str) -> Any:
-        """Return a field at a place."""
+    def field(self, name: str, at: str, local: LocalAxes | None = None) -> Any:
+        """Return a field at a place, along local axes if these are not x y z."""
 
     def at(self, points: Array) -> Any:
         """Return displacements and stresses at points."""
@@ -223,11 +243,11 @@ def fields(result: Fields) -> tuple[dict[str, Numbers], dict[str, Numbers]]:
     return points, cells
 
 
-def nodal_columns(result: Fields) -> dict[str, Numbers]:
-    """Return ids, places and the fields of the nodes."""
+def nodal_columns(result: Fields, local: LocalAxes | None = None) -> dict[str, Numbers]:
+    """Return ids, places and the fields of the nodes, along local axes if these are not x y z."""
     columns = {"node": result.mesh.node_ids, **PLACE.columns(result.mesh.points)}
     for name, field in listed("node", result.groups).items():
-        columns |= field.columns(result.field(name, "node"))
+        columns |= field.along(local).columns(result.field(name, "node", local))
     return columns
 
 

@@ -15,6 +15,7 @@ from kratos_lite.analysis.subjects import options_of, panels_of, series_of
 from kratos_lite.bodies import Body
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.errors import InputError
+from kratos_lite.model.local_axes import LocalAxes
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import ArrayLike
 from kratos_lite.validation import number, short, whole_number
@@ -43,6 +44,7 @@ def plot(
     title: str | None = None,
     titles: Sequence[str] | None = None,
     unit: str | None = None,
+    local: LocalAxes | None = None,
     points: ArrayLike | None = None,
     shown: int | None = None,
     size: tuple[float, float] | None = None,
@@ -75,6 +77,7 @@ def plot(
         what lies between it and the viewer is taken away.
     title, titles : above the picture; above each of several.
     unit : of an array of values, at the color bar; fields have theirs.
+    local : axes of the parts of fields: ``srr``, ``stt``, ``ur``, … of `Cylindrical`; x y z if not given.
     points : (g, d) reference coordinates to mark in an element, in place of its Gauss points.
     shown : how many positions along a path are drawn at most (6): the first, the last, and those that differ
         most from each other, such as turning points; the later the stronger.

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from kratos_lite.analysis.point_values import LineValues, PointValues
     from kratos_lite.analysis.quantities import Quantity
     from kratos_lite.mesh.locate import Located
+    from kratos_lite.model.local_axes import LocalAxes
 
 
 MEASURES = {"accumulated_plastic_strain": "plastic strain", "damage": "damage"}
@@ -294,15 +295,27 @@ class Result(ElementFields, Tabular):
 
     # ---- for other programs ----------------------------------------------------------------------
 
-    def columns(self) -> dict[str, Numbers]:
+    def columns(self, local: LocalAxes | None = None) -> dict[str, Numbers]:
         """Return ids, places, displacements, reactions and recovered stresses of the nodes.
 
         They are (n,) by headers with units; ``kl.write("nodes.csv", result)`` writes them.
-        """
-        return nodal_columns(self)
 
-    def to_dataframe(self) -> Any:
+        Parameters
+        ----------
+        local : axes of the components, such as ``stress rr [Pa]`` of `Cylindrical`; x y z if not given.
+
+        Returns
+        -------
+        dict of str to (n,) array
+        """
+        return nodal_columns(self, local)
+
+    def to_dataframe(self, local: LocalAxes | None = None) -> Any:
         """Return the columns as a data frame of pandas, one row for each node.
+
+        Parameters
+        ----------
+        local : as for `columns`.
 
         Returns
         -------
@@ -313,7 +326,7 @@ class Result(ElementFields, Tabular):
         KratosLiteError
             pandas is not installed.
         """
-        return data_frame(self.columns())
+        return data_frame(self.columns(local))
 
     def to_pyvista(self) -> Any:
         """Return the mesh with all fields of nodes and elements as a grid of PyVista.

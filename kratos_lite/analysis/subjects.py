@@ -13,6 +13,7 @@ from kratos_lite.analysis.peak import peak
 from kratos_lite.analysis.state import ModelInTime, State
 from kratos_lite.errors import InputError, nearest
 from kratos_lite.mesh import Mesh
+from kratos_lite.model.local_axes import LocalAxes
 from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array, Numbers
 from kratos_lite.validation import finite, number, short
@@ -130,13 +131,16 @@ def _values(result: Fields | None, mesh: Mesh, u: Array | None, given: dict[str,
     values, unit = given["values"], given["unit"]
     if isinstance(values, str) or (values is None and result is not None):
         name = DEFAULT if values is None else values
-        if u is not None and name in MOTIONS:
-            shape = u
-            named = named_values(MOTIONS[name], lambda _: shape)
+        local = given.get("local")
+        motion = FIELDS["displacement"].along(local)
+        motions = names_of_parts({"displacement": motion})
+        if u is not None and name in motions:
+            shape = motion.turned(u, mesh.points)
+            named = named_values(motions[name], lambda _: shape)
         elif result is None:
             raise InputError(f"a mesh or a model has no field {name!r}; solve it, or give an array")
         else:
-            named = nodal_values(result, name)
+            named = nodal_values(result, name, local)
         if unit not in (None, named.unit):
             raise InputError(
                 f"unit: the field {name!r} is shown in {named.unit or 'no unit'}, with a prefix; for another "
@@ -246,16 +250,12 @@ def names_of_parts(fields: Mapping[str, Field]) -> dict[str, Part]:
     return names
 
 
-MOTIONS = names_of_parts({"displacement": FIELDS["displacement"]})
-"""What needs nothing but displacements."""
-
-
-def nodal_values(result: Fields, name: str) -> Values:
+def nodal_values(result: Fields, name: str, local: LocalAxes | None = None) -> Values:
     """Return the values of nodes, or else of elements, by the name of a part; InputError for another."""
-    names = names_of_parts(known(result.groups))
+    names = names_of_parts({key: field.along(local) for key, field in known(result.groups).items()})
     if name not in names:
         raise InputError(f"unknown field {name!r}; there are {', '.join(names)}.{nearest(name, names, 1)}")
-    return named_values(names[name], lambda key: result.field(key, names[name][1].nodal_place))
+    return named_values(names[name], lambda key: result.field(key, names[name][1].nodal_place, local))
 
 
 def named_values(shown: Part, values: Callable[[str], Array]) -> Values:

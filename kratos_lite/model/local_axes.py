@@ -51,6 +51,21 @@ class LocalAxes(ABC):
         values, R = self._both(values, 3, points)
         return (R @ values[..., None])[..., 0]
 
+    def globally(self, values: ArrayLike, points: ArrayLike) -> Array:
+        """Return along x y z vectors that are given by their components along the axes.
+
+        Parameters
+        ----------
+        values : (..., 3) along the axes, such as a traction.
+        points : (..., 3) m, where they are.
+
+        Returns
+        -------
+        (..., 3)
+        """
+        values, R = self._both(values, 3, points)
+        return np.asarray((values[..., None, :] @ R)[..., 0, :])
+
     def stresses(self, values: ArrayLike, points: ArrayLike) -> Array:
         """Return the components of stresses along the axes 1, 2, 3: 11, 22, 33, 12, 23, 31.
 
@@ -77,8 +92,8 @@ class LocalAxes(ABC):
         return values, R
 
     def __repr__(self) -> str:
-        values = ", ".join(f"{name}={tuple(map(float, value))}" for name, value in vars(self).items())
-        return f"{type(self).__name__}({values})"
+        values = (f"{name}=({', '.join(f'{x:g}' for x in value)})" for name, value in vars(self).items())
+        return f"{type(self).__name__}({', '.join(values)})"
 
 
 class Cartesian(LocalAxes):

@@ -22,6 +22,12 @@ DISPLACEMENTS = ("DISPLACEMENT_X", "DISPLACEMENT_Y", "DISPLACEMENT_Z")
 
 PRESENT = ("SmallDisplacementElement", "TotalLagrangianElement", "UpdatedLagrangianElement", "Element3D")
 """Elements of Kratos today; they take the DISPLACEMENT of free nodes for a guess."""
+OF_ELEMENTS = {
+    **dict.fromkeys(("LOCAL_AXIS_1", "LOCAL_AXIS_2"), "of orthotropic elements is not supported: their "
+                    "material has the axes x y z; turn the mesh, or leave it out"),
+    "REFERENCE_TEMPERATURE": "is not supported; give it in Properties",
+}  # fmt: skip
+"""Data of elements that change a solution in Kratos."""
 
 
 def model_from(
@@ -114,7 +120,10 @@ def _fill(values: Variables, document: Document, model: Model) -> None:
                 fields.put(data.variable, indices[known], data.values[known])
             if data.fixed.any():
                 values.fix(data.variable, indices[known & data.fixed])
+    turned = any("YOUNG_MODULUS_X" in block.values for block in document.properties.values())
     for data in document.element_data:
+        if text := OF_ELEMENTS.get(data.variable if turned else data.variable.replace("LOCAL_AXIS", "")):
+            problems.add(f"{data.source or mesh.source}:{data.line}: ElementalData {data.variable} {text}")
         _note(model, data, f"ElementalData {data.variable} is not used")
     problems.raise_if_any()
 

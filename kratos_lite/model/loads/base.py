@@ -14,9 +14,10 @@ import numpy as np
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh
+from kratos_lite.model.local_axes import LocalAxes
 from kratos_lite.time_series import Factor, TimeSeries, function_of
 from kratos_lite.typing import Array, ArrayLike, Rows
-from kratos_lite.validation import finite, short, takes
+from kratos_lite.validation import finite, instance, short, takes
 
 if TYPE_CHECKING:
     from kratos_lite.mesh.refined_mesh import RefinedMesh
@@ -32,6 +33,18 @@ DEEPEST = 8
 
 class Load(ABC):
     """Something that pushes a structure.  A load of your own needs `forces` alone."""
+
+    local: LocalAxes | None = None
+    """Axes of its vectors, if these are not x y z."""
+
+    def _along(self, local: LocalAxes | None) -> None:
+        """Take the axes of its vectors."""
+        if local is None:
+            return
+        self.local = instance(local, "local", LocalAxes, "kl.Cylindrical()")
+        for name, value in vars(self).items():
+            if np.ndim(value) == 2:
+                raise InputError(f"a {name} along local axes is (3,) or a function; got shape {value.shape}")
 
     def __repr__(self) -> str:
         values = {name: value for name, value in vars(self).items() if not name.startswith("_")}
@@ -302,6 +315,14 @@ def at_places(function: OfPlace, what: str, width: tuple[int, ...]) -> Callable[
     return checked
 
 
+def placed(value: Any, local: LocalAxes | None, what: str) -> Any:
+    """Return vectors along x y z as they are, those of places or along local axes as a function of places."""
+    if local is None and not callable(value):
+        return value
+    function = at_places(value if callable(value) else lambda X: value, what, (3,))
+    return function if local is None else lambda X: local.globally(function(X), X)
+
+
 # ---- what is equal, as a cell of a notebook makes it that is run twice ------------------------------------
 
 
@@ -317,7 +338,7 @@ def key_of(value: Any, depth: int = 0) -> Hashable:
     if isinstance(value, FunctionType) and depth <= DEEPEST:
         closed = [cell.cell_contents for cell in value.__closure__ or ()]
         return value.__code__, key_of(value.__defaults__, deeper), key_of(closed, deeper)
-    if isinstance(value, (Load, TimeSeries)):
+    if isinstance(value, (Load, TimeSeries, LocalAxes)):
         return type(value), key_of(vars(value), deeper)
     return value if isinstance(value, Hashable) and depth <= DEEPEST else id(value)
 

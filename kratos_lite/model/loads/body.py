@@ -11,7 +11,8 @@ from kratos_lite.assembly import gauss_point_fields
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh, WhereElements
-from kratos_lite.model.loads.base import DistributedLoad, OfPlace, at_places, vectors
+from kratos_lite.model.loads.base import DistributedLoad, OfPlace, placed, vectors
+from kratos_lite.model.local_axes import LocalAxes
 from kratos_lite.typing import Array, ArrayLike
 
 if TYPE_CHECKING:
@@ -26,13 +27,17 @@ class BodyForce(DistributedLoad):
     force : (3,) float, or (n, 3) interpolated from the nodes; N/m³; or a function of places (m, 3) that
         returns either, taken at quadrature points.
     where : elements that carry it: part name, property id or indices; all if not given.
+    local : axes of the force, one vector or a function: `Cylindrical`, …; x y z if not given.
     """
 
     what: ClassVar[tuple[str, str]] = "a body force", "(3,) or (n, 3) in N/m³"
 
-    def __init__(self, force: ArrayLike | OfPlace, where: WhereElements = None) -> None:
+    def __init__(
+        self, force: ArrayLike | OfPlace, where: WhereElements = None, *, local: LocalAxes | None = None
+    ) -> None:
         self.force: Any = force if callable(force) else vectors(force, *self.what, (1, 2))
         self.where = where
+        self._along(local)
 
     factors = 4  # N, and a polynomial of degree p + 2 over straight cells
     nodal = "force", 2
@@ -56,7 +61,7 @@ class BodyForce(DistributedLoad):
         points, total = mesh.points, np.zeros_like(mesh.points)
         carriers = np.zeros(mesh.n_elements, dtype=bool)
         carriers[mesh.elements(self.where)] = True
-        force = at_places(self.force, self.what[0], (3,)) if callable(self.force) else self.force
+        force = placed(self.force, self.local, self.what[0])
         if not callable(force) and force.ndim == 2 and len(force) != len(points):
             name = type(self).__name__
             raise InputError(f"a nodal {name} needs shape ({len(points)}, 3); got {force.shape}")
@@ -82,6 +87,7 @@ class Gravity(BodyForce):
     acceleration : (3,) float, or (n, 3) interpolated from the nodes; m/s²; or a function of places (m, 3)
         that returns either, taken at quadrature points.
     where : elements that carry it: part name, property id or indices; all if not given.
+    local : as of `BodyForce`.
 
     Examples
     --------
@@ -91,8 +97,14 @@ class Gravity(BodyForce):
 
     what = "gravity", "(3,) or (n, 3) in m/s²"
 
-    def __init__(self, acceleration: ArrayLike | OfPlace, where: WhereElements = None) -> None:
-        super().__init__(acceleration, where)
+    def __init__(
+        self,
+        acceleration: ArrayLike | OfPlace,
+        where: WhereElements = None,
+        *,
+        local: LocalAxes | None = None,
+    ) -> None:
+        super().__init__(acceleration, where, local=local)
 
     def _scale(self, group: ElementGroup) -> float:
         """Return the density."""

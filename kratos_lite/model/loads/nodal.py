@@ -12,6 +12,7 @@ from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.mesh import Mesh, Where
 from kratos_lite.mesh.selection import ONE_PLACE, nodes_at, point_of
 from kratos_lite.model.loads.base import Load, vectors
+from kratos_lite.model.local_axes import LocalAxes
 from kratos_lite.typing import Array, ArrayLike, Ints
 from kratos_lite.validation import flag, short
 
@@ -28,6 +29,7 @@ class PointLoad(Load):
         of the element around it, by its shape functions N.
     force : (3,) float, N: in all on a point, on each of several nodes.
     each : a part of several nodes is refused otherwise: `Resultant` spreads a force over its faces.
+    local : axes of the force, at the point or at each node; x y z if not given.
 
     Examples
     --------
@@ -36,10 +38,13 @@ class PointLoad(Load):
     [0, -2, 0, -2, 0, -2, 0, -2]
     """
 
-    def __init__(self, where: Where, force: ArrayLike, each: bool = False) -> None:
+    def __init__(
+        self, where: Where, force: ArrayLike, each: bool = False, *, local: LocalAxes | None = None
+    ) -> None:
         self.where, self.each = where, flag(each, "each")
         self.force = vectors(force, "a point load", "(3,) in N")
         self._point = point_of(where)
+        self._along(local)
 
     def check(self, mesh: Mesh) -> None:
         """Check that the point lies in the mesh, or that the nodes exist.
@@ -76,18 +81,22 @@ class PointLoad(Load):
         total = np.zeros_like(mesh.points)
         if self._point is not None:
             nodes, N = _around(mesh, self._point)
-            total[nodes] = N[:, None] * self.force
+            total[nodes] = N[:, None] * self._at(self._point)
             return total
         nodes = mesh.nodes(self.where)
         if mesh.whole and not len(nodes):
             raise ModelError(f"a point load finds no node in {self.where!r}")
-        total[nodes] += self.force
+        total[nodes] += self._at(mesh.points[nodes])
         return total
+
+    def _at(self, points: Array) -> Array:
+        """Return the force along x y z at points (..., 3) in m."""
+        return self.force if self.local is None else self.local.globally(self.force, points)
 
     def refined(self, finer: RefinedMesh) -> Load:
         """Return the load on a finer mesh: on the same nodes or point."""
         same = finer.coarse.nodes(self.where) if self._point is None else self.where
-        return PointLoad(same, self.force, self.each)
+        return PointLoad(same, self.force, self.each, local=self.local)
 
 
 def _around(mesh: Mesh, point: Array) -> tuple[Ints, Array]:

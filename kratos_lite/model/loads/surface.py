@@ -22,7 +22,8 @@ from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Block, Mesh, Where, outward_signs, with_rows
 from kratos_lite.mesh.refined_mesh import RefinedMesh
-from kratos_lite.model.loads.base import DistributedLoad, Load, OfPlace, at_places, vectors
+from kratos_lite.model.loads.base import DistributedLoad, Load, OfPlace, at_places, placed, vectors
+from kratos_lite.model.local_axes import LocalAxes
 from kratos_lite.typing import Array, ArrayLike, Rows
 from kratos_lite.validation import finite, flag, number
 
@@ -56,20 +57,25 @@ class Traction(FaceLoad):
     where : part; its conditions if it has any, otherwise the boundary faces among its nodes.
     traction : (3,) float, or (n, 3) interpolated from the nodes of the mesh; Pa; or a function of places
         (m, 3) that returns (m, 3), taken at quadrature points.
+    local : axes of the traction, one vector or a function: `Cylindrical`, …; x y z if not given.
     """
 
     what = "a traction"
     nodal = "traction", 2
 
-    def __init__(self, where: Where, traction: ArrayLike | OfPlace) -> None:
+    def __init__(
+        self, where: Where, traction: ArrayLike | OfPlace, *, local: LocalAxes | None = None
+    ) -> None:
         self.where, self.traction = where, traction
         if not callable(traction):
             self.traction = vectors(traction, "a traction", "(3,) or (n, 3) in Pa", (1, 2))
+        self._along(local)
 
     def on_faces(self, mesh: Mesh, faces: list[Block], factors: int) -> Iterable[Array]:
         """Return ∫ N t dA (m, k, 3) in N of each face."""
+        traction = placed(self.traction, self.local, self.what)
         for block in faces:
-            t = _on(block, self.traction, mesh, self.what, (3,))
+            t = _on(block, traction, mesh, self.what, (3,))
             yield surface_load(block.known_shape, mesh.points[block.nodes], t, factors)
 
 
@@ -80,6 +86,7 @@ class LineLoad(Traction):
     ----------
     where : part with line conditions.
     traction : (3,) float, N/m.
+    local : as of `Traction`.
     """
 
     what, cells = "a line load", ("line",)
@@ -157,6 +164,7 @@ class Resultant(FaceLoad):
     moment : (3,) float, N m.
     about : (3,) float, m; the point on which the force acts and about which the moment is.  The centroid if
         not given.
+    local : axes of force and moment, those at the point on which the force acts; x y z if not given.
 
     Raises
     ------
@@ -180,8 +188,11 @@ class Resultant(FaceLoad):
         force: ArrayLike,
         moment: ArrayLike = (0.0, 0.0, 0.0),
         about: ArrayLike | None = None,
+        *,
+        local: LocalAxes | None = None,
     ) -> None:
         self.where = where
+        self._along(local)
         self.force = vectors(force, "a resultant force", "(3,) in N")
         self.moment = vectors(moment, "a resultant moment", "(3,) in N m")
         self.about = None if about is None else vectors(about, "the point of a resultant", "(3,) in m")
@@ -201,10 +212,13 @@ class Resultant(FaceLoad):
         arms = X - center
         inertia = (dA * (arms**2).sum(axis=1)).sum() * np.eye(3) - (dA * arms.T) @ arms
         arm = np.zeros(3) if self.about is None else self.about - center
-        turn = np.linalg.solve(inertia, self.moment + np.cross(arm, self.force))
+        force, moment = self.force, self.moment
+        if self.local is not None:
+            force, moment = self.local.globally([force, moment], [center + arm] * 2)
+        turn = np.linalg.solve(inertia, moment + np.cross(arm, force))
 
         def traction(x: Array) -> Array:
-            return np.asarray(self.force / dA.sum() + np.cross(turn, x - center))
+            return np.asarray(force / dA.sum() + np.cross(turn, x - center))
 
         return [surface_load(b.known_shape, mesh.points[b.nodes], traction, factors) for b in faces]
 

@@ -75,6 +75,30 @@ def test_a_component_in_properties_loads_like_the_vector(load, text, force):
     np.testing.assert_allclose(total(load(text)), [0, 0, force], atol=1e-9)
 
 
+WOOD = (
+    "YOUNG_MODULUS_X 1e9\nYOUNG_MODULUS_Y 2e9\nYOUNG_MODULUS_Z 3e9\nPOISSON_RATIO_XY 0.1\n"
+    "POISSON_RATIO_YZ 0.1\nPOISSON_RATIO_XZ 0.1\nSHEAR_MODULUS_XY 1e9\n"
+    "SHEAR_MODULUS_YZ 1e9\nSHEAR_MODULUS_XZ 1e9"
+)
+
+
+@pytest.mark.parametrize(
+    ("properties", "variable", "value", "words"),
+    [
+        (WOOD, "LOCAL_AXIS_1", "[3] (0,1,0)", "cube.mdpa:38: ElementalData LOCAL_AXIS_1 of orthotropic"),
+        ("", "REFERENCE_TEMPERATURE", "20", "cube.mdpa:30: ElementalData REFERENCE_TEMPERATURE is not supp"),
+    ],
+)
+def test_data_of_elements_that_change_a_solution_in_kratos_are_refused(
+    load, properties, variable, value, words
+):
+    data = f"Begin ElementalData {variable}\n1 {value}\nEnd ElementalData"
+    with pytest.raises(kl.InputError, match=words):
+        load(properties, data)
+    if variable == "LOCAL_AXIS_1":
+        assert any("LOCAL_AXIS_1 is not used" in note for note in load("", data).notes)
+
+
 def test_a_component_that_contradicts_its_vector_is_refused(load):
     with pytest.raises(
         kl.InputError, match=r"cube\.mdpa:7: Properties 1: GRAVITY_Z is 1, but GRAVITY has -9\.81 there"
