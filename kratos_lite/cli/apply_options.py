@@ -48,7 +48,7 @@ def case_of(options: Namespace, part: int | None = None) -> Case:
     case.time = _time(options, case.time)
     if case.is_of_model and case.time is not None:
         case.time = case.time.starting_from(case.model.supports, case.model.initial_displacement)
-    if options.modes is not None:
+    if given(options, "modes", "buckling"):
         _take_modes(case, options)
     for name, path in given(options, "json", "picture", "state").items():
         setattr(case.outputs, name, path)
@@ -73,7 +73,7 @@ def refuse_serial_options(options: Namespace) -> None:
     from kratos_lite.distributed.petsc import parsed, petsc
 
     why = "does not go with --backend petsc, which solves statics; leave one out"
-    refuse(options, ("modes", "time", *only("time"), "rotation", "translation"), why)
+    refuse(options, ("modes", "buckling", "time", *only("time"), "rotation", "translation"), why)
     refuse(options, ("error",), "is for one process; leave it out, or --backend petsc")
     if Path(options.input).suffix.lower() == ".py":
         raise InputError(f"{options.input}: scripts are for one process; leave --backend petsc out")
@@ -82,12 +82,13 @@ def refuse_serial_options(options: Namespace) -> None:
 
 
 def _take_modes(case: Case, options: Namespace) -> None:
-    """Ask a case for natural frequencies, whatever its file says of time and outputs."""
-    if options.time is not None:
-        raise InputError("--modes and --time: give one of them")
+    """Ask a case for natural frequencies or buckling, whatever its file says of time and outputs."""
+    (name, count), *others = given(options, "modes", "buckling", "time").items()
+    if others:
+        raise InputError(f"--{name} and --{others[0][0]}: give one of them")
     refuse(options, ("json", "state"), "does not hold modes; -o OUT.pvd or OUT.html does")
     refuse(options, ("error",), "is for statics; modes are those of the mesh as it is")
-    case.modes, case.time, case.outputs = options.modes, None, Outputs()
+    case.modes, case.buckling, case.time, case.outputs = count, name == "buckling", None, Outputs()
 
 
 def _time(options: Namespace, of_file: TimeIntegration | None) -> TimeIntegration | None:

@@ -10,6 +10,7 @@ from kratos_lite.errors import InputError, KratosLiteError
 BACKEND = "petsc: statics, by PETSc over all processes that mpirun or srun has started (own, on one)"
 BOUNDARIES = "condition on the cut faces of the moving frame (absorbing)"
 ERROR = "relative error of the energy norm below 1, such as 1%% or 0.01: statics, the mesh made finer"
+BUCKLING = "find the N lowest factors of the loads at which the model buckles; files as for --modes"
 FORMULATION = (
     "instead of that of the names of elements: standard, enhanced, b_bar, reduced, "
     "total_lagrangian, f_bar or non_locking"
@@ -127,6 +128,7 @@ GROUPS = {
     ),
     "solver": (
         Option("--modes", "N", MODES, only="models"),
+        Option("--buckling", "N", BUCKLING, only="models"),
         *_all(
             Option("--solver", "auto|dense|direct|amg", "auto chooses by size"),
             Option("--error", "FRACTION", ERROR),

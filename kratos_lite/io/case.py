@@ -184,6 +184,7 @@ class Case:
     subject : the model, whose `notes` tell what was not used; or the body, which may hold many.
     time : how it moves through time, or None where it rests.
     modes : number of requested natural frequencies, or 0.
+    buckling : whether the modes are shapes of buckling, with factors of the loads.
     solver, tolerance, error, backend, petsc : of a model at rest, as for `Model.solve`.
     outputs : files to write.
     expected : comparisons of the end of a model with expected values, each of which returns a line, or a
@@ -194,6 +195,7 @@ class Case:
     subject: Model | Body
     time: TimeIntegration | None = None
     modes: int = 0
+    buckling: bool = False
     solver: str = "auto"
     tolerance: float = 1e-10
     error: float | None = None

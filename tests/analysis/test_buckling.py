@@ -151,6 +151,76 @@ def test_heated_column():
     assert factor * STEEL["E"] * 1e-4 * H**2 == pytest.approx(4 * EULER, rel=2e-2)
 
 
+def arc(angle, t, cells):
+    """Return an arc of a ring of radius 1 m with a square section, and the nodes of both cuts."""
+    box = kl.box((1, 1, t), (1, cells, 1), "KinematicLinear3D20N")
+    r, a = 1 + t * (box.points[:, 0] - 0.5), angle * box.points[:, 1]
+    points = np.stack([r * np.cos(a), r * np.sin(a), box.points[:, 2]], axis=1)
+    return kl.Mesh(points, box.blocks), [np.flatnonzero(box.points[:, 1] == end) for end in (0, 1)]
+
+
+AROUND = kl.Cylindrical()
+
+
+def test_ring_under_pressure_that_keeps_its_direction():
+    """p = n² E I / R³, n = 2, 4 by symmetry: 4 E I / R³.  Source: Bodner, J. Aeronaut. Sci. 25 (1958) 358.
+
+    Pressure that follows has 3 (Lévy 1884), towards the center 4.5.  It acts on the center line here, as a
+    force of the volume.
+    """
+    t, (mesh, _) = 0.05, arc(np.pi / 2, 0.05, 16)
+    model = kl.Model(mesh, STRAIGHT)
+    for axis in "xyz":
+        model.fix(f"{axis}-", axis)
+    model.add(kl.BodyForce((-1.0, 0.0, 0.0), local=AROUND))
+    factors = model.buckling(2)[0] * t / (STEEL["E"] * t**3 / 12)
+    np.testing.assert_allclose(factors, [4, 16], rtol=6e-3)
+
+
+def test_spinning_ring():
+    """The hoop stress ρ Ω² R² raises ω² of n = 2 by n² Ω² across the plane, 9/5 Ω² in it.
+
+    K_g is N v'² of the turn v' of the center line: that of w = cos n θ is n w, in the plane (n² - 1) / n,
+    and the mass there 1 + 1 / n²; without stress ω² = E I n² (n² - 1)² / (n² + 1) ρ A R⁴ (Hoppe 1871).
+    """
+    t, (mesh, (plane, node)) = 0.05, arc(np.pi / 4, 0.05, 8)
+    ring, model = kl.Model(mesh, kl.Isotropic3D(**STEEL)), kl.Model(mesh, kl.Isotropic3D(**STEEL))
+    for cut in (plane, node):
+        ring.fix(cut, "t", local=AROUND)
+    ring.fix((1 + t / 2, 0.0, 0.0), "z")
+    model.fix(plane, "t", local=AROUND)
+    model.fix(node, "rz", local=AROUND)
+    across, inside = model.modes(2)[0]
+    hoppe = np.sqrt(STEEL["E"] * t**2 / 12 / STEEL["density"] * 36 / 5)
+    assert inside == pytest.approx(hoppe, rel=3e-3)
+    rate = across / 2
+    ring.add(kl.Gravity(lambda X: rate**2 * X * [1, 1, 0]))
+    spun, shapes = model.modes(2, preload=ring.solve())
+    assert np.abs(shapes[0, :, 2]).max() < 1e-2 * np.abs(shapes[0]).max()
+    assert (spun[0] ** 2 - inside**2) / rate**2 == pytest.approx(9 / 5, rel=2e-3)
+    assert (spun[1] ** 2 - across**2) / rate**2 == pytest.approx(4, rel=5e-3)
+
+
+def test_spinning_bar():
+    """A blade flaps across its plane of rotation at ω² = ω0² + B Ω², B by Rayleigh's quotient.
+
+    With the shape φ of the blade at rest, B = ∫ (L² - x²) φ'² dx / 2 ∫ φ² dx = 1.193 is an upper bound, the
+    string's 1 a lower one.  Source: Southwell & Gough, ARC R&M 766 (1921).
+    """
+    h, root, x = 0.02, 1.8751040687, np.linspace(0, 1, 2001)
+    ratio = (np.cos(root) + np.cosh(root)) / (np.sin(root) + np.sinh(root))
+    phi = np.cosh(root * x) - np.cos(root * x) - ratio * (np.sinh(root * x) - np.sin(root * x))
+    rise = np.trapezoid((1 - x**2) * np.gradient(phi, x) ** 2) / (2 * np.trapezoid(phi**2))
+    model = kl.Model(kl.box((1, h, h), (12, 1, 1), "KinematicLinear3D20N"), STRAIGHT)
+    model.fix("x-")
+    model.fix(np.arange(model.mesh.n_nodes), "y")
+    still = model.modes(1)[0][0]
+    for rate, least, most in ((0.1, rise - 0.002, rise + 0.002), (3.0, 1.0, rise - 0.05)):
+        spins = kl.Gravity(lambda X, rate=rate * still: np.outer(X[:, 0], [rate**2, 0, 0]))
+        found = model.modes(1, preload=spins)[0][0]
+        assert least < (found**2 - still**2) / (rate * still) ** 2 < most
+
+
 def stretched(strain):
     """Return a thin bar between two clamps that stretch it."""
     size = (0.02, 0.02, 2.0)

@@ -232,6 +232,9 @@ def test_ctrl_c_keeps_the_series_and_the_state(folder):
         (("--time", "1:3", "--rayleigh", "-1,0"), ("--rayleigh: expected ALPHA,BETA",)),
         (("--time", "1:3", "--restart", "no.npz"), ("no.npz: there is no such file",)),
         (("--time", "1:3", "--modes", "2"), ("--modes and --time: give one of them",)),
+        (("--time", "1:3", "--buckling", "2"), ("--buckling and --time: give one of them",)),
+        (("--modes", "1", "--buckling", "2"), ("--modes and --buckling: give one of them",)),
+        (("--buckling", "2", "--error", "1%"), ("--error is for statics",)),
         (("--modes", "2", "--error", "1%"), ("--error is for statics",)),
         (("--time", "1:3", "--solver", "amg"), ("--solver is for statics",)),
         (("--time", "1:3", "--json", "a.csv"), ("a.csv: the ending must be .json",)),
@@ -277,6 +280,33 @@ def test_modes_are_written_as_a_series_and_a_picture(run, folder):
         expected = shape / np.linalg.norm(shape, axis=1).max()
         sign = np.sign((data * expected).sum())  # an eigenvector has none
         assert np.abs(data - sign * expected).max() < 1e-6
+
+
+def test_shapes_of_buckling_are_told_and_written_as_modes_are(run, folder):
+    model = tower()
+    model.add(kl.Traction("z+", (0, 0, -1e3)))
+    factors, _ = model.buckling(2)
+    words = (
+        "--traction",
+        "z+:0,0,-1e3",
+        "--buckling",
+        "2",
+        "-o",
+        "a.pvd",
+        "-o",
+        "a.html",
+        "--picture",
+        "a.png",
+    )
+    told = run("solve", "tower.mdpa", *WORDS, *words)
+    assert (told.code, told.err) == (0, "")
+    assert [float(line.split()[1]) for line in told.out.splitlines()[1:3]] == pytest.approx(factors, rel=1e-7)
+    assert (folder / "a.png").read_bytes()[:4] == b"\x89PNG"
+    assert (folder / "a_00002.vtu").exists()
+    assert (folder / "a.html").exists()
+    assert run("check", "tower.mdpa", *WORDS, "--traction", "z+:0,0,-1e3", "--buckling", "2").code == 0
+    with pytest.raises(kl.InputError, match="needs the number of its modes"):
+        kl.run(kl.Case(model, buckling=True))
 
 
 @pytest.mark.parametrize(

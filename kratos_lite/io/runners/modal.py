@@ -1,4 +1,4 @@
-"""Natural frequencies of models."""
+"""Natural frequencies of models, and factors of their loads at which they buckle."""
 
 from __future__ import annotations
 
@@ -19,12 +19,14 @@ DRAWN = 6
 
 
 def check(case: Case) -> list[str]:
-    """Return the warnings of the model, checked as the search for its frequencies does."""
+    """Return the warnings of the model, checked as the search for its modes does."""
+    if case.buckling:
+        return EquationsOfMotion(case.model, free=False, massless=True).warnings
     return EquationsOfMotion(case.model, steady=case.model.motion is not None).warnings
 
 
 def run(case: Case, progress: Progress | None = None) -> Outcome:
-    """Find the lowest natural frequencies and write their modes; with a motion the eigenvalues λ.
+    """Find the lowest natural frequencies, or factors, and write their modes; with a motion eigenvalues λ.
 
     Frequency is Im λ, of conjugate pairs once, and growth Re λ, which is not positive where motion is stable.
     """
@@ -32,7 +34,11 @@ def run(case: Case, progress: Progress | None = None) -> Outcome:
     head = f"{'mode':>4}  {'frequency Hz':>14}  {'rad/s':>14}"
     values: Any
     shapes: Any
-    if model.motion is None:
+    if case.buckling:
+        head = f"{'mode':>4}  {'factor':>14}"
+        values, shapes = model.buckling(count, progress=progress)
+        rows = [f"{i:>4}  {factor:>14.8g}" for i, factor in enumerate(values.tolist(), 1)]
+    elif model.motion is None:
         values, shapes = model.modes(count, progress=progress)
         rows = [f"{i:>4}  {w / (2 * pi):>14.8g}  {w:>14.8g}" for i, w in enumerate(values.tolist(), 1)]
     else:
@@ -52,7 +58,7 @@ def _write(case: Case, values: Any, shapes: Any) -> None:
     """Write the modes and their picture, which shows the first ones side by side."""
     outputs, mesh = case.outputs, case.model.mesh
     for path in outputs.results:
-        write_modes(path, mesh, values, shapes, mode=outputs.mode or "binary")
+        write_modes(path, mesh, values, shapes, mode=outputs.mode or "binary", buckling=case.buckling)
     if outputs.picture is not None:
-        names = names_of_modes(values[:DRAWN].tolist())
+        names = names_of_modes(values[:DRAWN].tolist(), case.buckling)
         write_picture(outputs.picture, case.model, modes=shapes[:DRAWN], titles=names)

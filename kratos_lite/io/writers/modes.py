@@ -57,6 +57,7 @@ def write_modes(
     """
     path = path_of(path)
     check_modes(path)
+    flag(buckling, "buckling")
     instance(mesh, "the mesh of modes", Mesh, "model.mesh")
     forms = _numbers(shapes, "shapes of modes", ("k", mesh.n_nodes, 3))
     numbers = _numbers(values, "values of modes, one for each shape,", (len(forms),))
@@ -67,9 +68,7 @@ def write_modes(
         return
     from kratos_lite.io.writers.page.write import write_modes_page  # rarely needed
 
-    factors = [f"{i}: factor {value:.5g}" for i, value in enumerate(numbers.tolist(), 1)]
-    names = factors if flag(buckling, "buckling") else names_of_modes(numbers.tolist())
-    write_modes_page(path, mesh, names, forms)
+    write_modes_page(path, mesh, names_of_modes(numbers.tolist(), buckling), forms)
 
 
 def _numbers(value: ArrayLike, what: str, shape: tuple[int | str, ...]) -> Array | Complexes:
@@ -96,13 +95,16 @@ def _write_frames(path: Path, mesh: Mesh, shapes: Array | Complexes, mode: str) 
     write_pvd(path, frames)
 
 
-def names_of_modes(values: Sequence[complex]) -> list[str]:
-    """Return the numbers of modes with their frequencies.
+def names_of_modes(values: Sequence[complex], buckling: bool = False) -> list[str]:
+    """Return the numbers of modes with their frequencies, or factors.
 
     >>> names_of_modes([2 * pi, 4 * pi])
     ['1: 1 Hz', '2: 2 Hz']
     """
-    return [f"{i}: {_name(value)}" for i, value in enumerate(values, 1)]
+    return [
+        f"{i}: factor {value:.5g}" if buckling else f"{i}: {_name(value)}"
+        for i, value in enumerate(values, 1)
+    ]
 
 
 def _name(value: complex) -> str:
