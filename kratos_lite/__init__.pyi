@@ -32,6 +32,7 @@ from kratos_lite.analysis.quantities import ReactionOf as ReactionOf
 from kratos_lite.analysis.quantities import StressAt as StressAt
 from kratos_lite.analysis.quasi_static import QuasiStaticAnalysis as QuasiStaticAnalysis
 from kratos_lite.analysis.result import Result as Result
+from kratos_lite.analysis.section import Section as Section
 from kratos_lite.analysis.state import State as State
 from kratos_lite.analysis.stepping import integrate as integrate
 from kratos_lite.analysis.transient import TransientAnalysis as TransientAnalysis

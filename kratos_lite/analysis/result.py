@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from kratos_lite.analysis.error_estimate import ErrorEstimate, QuantityError
     from kratos_lite.analysis.point_values import LineValues, PointValues
     from kratos_lite.analysis.quantities import Quantity
+    from kratos_lite.analysis.section import Section
     from kratos_lite.mesh.locate import Located
     from kratos_lite.model.local_axes import LocalAxes
 
@@ -192,6 +193,47 @@ class Result(ElementFields, Tabular):
         if (ends[0] == ends[1]).all():
             raise InputError(f"a line needs two ends; both are {ends[0].tolist()}")
         return LineValues(self, ends, whole_number(n, "n", least=2), flag(recovered, "recovered"))
+
+    def section(self, where: Any, *, recovered: bool = True) -> Section:
+        """Return a cut by a plane or around a part: force, moment, area, centroid and the stress on it.
+
+        Force and moment are sums of internal nodal forces, whose virtual work with a rigid motion of what
+        lies beyond the cut vanishes in elements that are not cut: Σ f and Σ (x - c) × f, c the centroid.
+        They balance the loads and reactions beyond the cut, in a transient those of inertia and damping too.
+
+        Source: Bathe, Finite Element Procedures (1996), section 4.2.1, element nodal point forces.
+
+        Parameters
+        ----------
+        where : a plane, ``("x", 0.5)`` or a normal (3,) and an offset in m, beyond which n·X is larger; or
+            elements by part name, property id, mask or indices, which lie beyond a cut around them.
+        recovered : the stress is that recovered at nodes, as for `at`; otherwise C B u.
+
+        Returns
+        -------
+        Section
+
+        Raises
+        ------
+        InputError
+            The plane is none.
+        MeshError
+            It misses the body, there are no such elements or no others beside them, or this process has only
+            a part of the mesh.
+
+        Examples
+        --------
+        >>> import kratos_lite as kl
+        >>> beam = kl.Model(kl.box((4, 1, 1), (8, 2, 2)), kl.Isotropic3D(E=1e6, nu=0.3))
+        >>> beam.fix("x-")
+        >>> beam.add(kl.Traction("x+", (0, 0, 5.0)))
+        >>> cut = beam.solve().section(("x", 1.3))
+        >>> print(f"{cut.force[2]:.6f} N, {cut.moment[1]:.6f} N m, {cut.area:.6f} m²")  # My = -F (L - x)
+        5.000000 N, -13.500000 N m, 1.000000 m²
+        """
+        from kratos_lite.analysis.section import section  # a quick start for results
+
+        return section(self, where, flag(recovered, "recovered"))
 
     def _located(self, points: ArrayLike | Located) -> Located:
         """Return where points lie in the mesh; raise MeshError if one lies outside."""

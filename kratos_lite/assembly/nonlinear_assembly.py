@@ -160,8 +160,8 @@ class ElementRange:
         self.place = assembly.place
         extra = assembly._dilatations[number]
         self.dilatation = None if extra is None else np.ascontiguousarray(extra[elements])
-        self.f_bar = self.group.element.formulation == "f_bar"
-        self.kernels = None if self.f_bar else compiled("constitutive", self.group.element)
+        f_bar = self.group.element.formulation == "f_bar"
+        self.kernels = None if f_bar else compiled("constitutive", self.group.element)
 
     def add(self, forces: Array, state: PointStates, dt: float) -> PointStates:
         """Add internal forces (n, 3) and stiffness; return the new states."""
@@ -179,26 +179,13 @@ class ElementRange:
             return PointStates(stress, variables)
         for chunk in group.chunks():
             element, q = group.at(self.points, chunk), self.u[group.nodes[chunk]]
-            nodal, K = self._system(element, q, stress[chunk], None if self.data is None else D[chunk])
+            nodal, K = element_system(
+                element, group, q, stress[chunk], None if self.data is None else D[chunk]
+            )
             add_nodal(forces, group.nodes[chunk], nodal)
             if K is not None:
                 self._scatter(chunk, K)
         return PointStates(stress, variables)
-
-    def _system(
-        self, element: KinematicLinear, q: Array, s: Array, D: Array | None
-    ) -> tuple[Array, Array | None]:
-        """Return forces (m, k, 3) and, of a tangent, matrices (m, 3, k, 3, k) of some elements."""
-        if self.f_bar:
-            return lagrange.f_bar(element, q, s, D)
-        if element.finite:
-            F = np.eye(3) + lagrange.displacement_gradient(element, q)
-            at = lagrange.Deformation(F, s, F, 1.0, 1.0)
-            K = None if D is None else lagrange.stiffness_by_axis(element, D, at)
-            return lagrange.internal_force(element, at), K
-        C, B = self.group.material.C, element._operator(self.group.material.C)
-        K = None if D is None else tables.by_axis(tables.summed(B, D @ B, element.dV))
-        return element.internal_force(s, C), K
 
     def _scatter(self, chunk: slice, K: Array) -> None:
         """Add the matrices (m, 3, k, 3, k) of some elements."""
@@ -304,6 +291,33 @@ class ElementRange:
                 K = tables.summed(B, DB, dV) - np.swapaxes(L, -1, -2) @ np.linalg.solve(A, L)
                 self._scatter(chunk, tables.by_axis(K))
         return _joined(parts)
+
+
+def element_system(
+    element: KinematicLinear, group: ElementGroup, q: Array, s: Array, D: Array | None = None
+) -> tuple[Array, Array | None]:
+    """Return forces (m, k, 3) of stresses and, of a tangent, matrices (m, 3, k, 3, k) of some elements."""
+    if element.formulation == "f_bar":
+        return lagrange.f_bar(element, q, s, D)
+    if element.finite:
+        F = np.eye(3) + lagrange.displacement_gradient(element, q)
+        at = lagrange.Deformation(F, s, F, 1.0, 1.0)
+        K = None if D is None else lagrange.stiffness_by_axis(element, D, at)
+        return lagrange.internal_force(element, at), K
+    C, B = group.material.C, element._operator(group.material.C)
+    K = None if D is None else tables.by_axis(tables.summed(B, D @ B, element.dV))
+    return element.internal_force(s, C), K
+
+
+def internal_forces(points: Array, groups: Sequence[ElementGroup], u: Array) -> Array:
+    """Return ∫ B^T σ dV (n, 3) in N of the stresses that groups show at displacements u (n, 3)."""
+    total = internal_load(points, [g for g in groups if g.is_linear], u)
+    total += finite_strain.internal_load(points, [g for g in groups if not g.is_linear and not g.states], u)
+    for group in groups:
+        for chunk in group.chunks() if group.states else ():
+            element, q, s = group.at(points, chunk), u[group.nodes[chunk]], group.states.stress[chunk]  # type: ignore[union-attr]
+            add_nodal(total, group.nodes[chunk], element_system(element, group, q, s)[0])
+    return total
 
 
 def _joined(parts: Sequence[PointStates]) -> PointStates:

@@ -52,6 +52,7 @@ def case_of(options: Namespace, part: int | None = None) -> Case:
         _take_modes(case, options)
     for name, path in given(options, "json", "picture", "state").items():
         setattr(case.outputs, name, path)
+    case.outputs.sections = options.section
     case.outputs.results, case.outputs.mode = options.output or case.outputs.results, options.vtu
     return case
 

@@ -26,6 +26,7 @@ OUTPUT = (
 PICTURE = "picture of the deformed model, of its modes, or of a body along its path; .gif, .mp4: film"
 RESTART = "go on from a state that --state wrote; files hold the rest alone, so give them new names"
 STRESS_FREE = "do not take the DISPLACEMENT of free nodes in the file for the state without stress"
+SECTION = "force, moment and area of a cut: by a plane such as x=0.5, or around the elements of a part"
 VTU = "how .vtu files store their numbers: quickest, smallest, or to be read by eye (binary)"
 
 
@@ -75,6 +76,7 @@ GROUPS = {
         Option(
             "--state", "OUT.npz", "last state in time, for --restart; written after Ctrl-C too", only="time"
         ),
+        Option("--section", "CUT", SECTION, many=True, only="models"),
         Option("--vtu", "binary|compressed|ascii", VTU),
     ),
     "model (adds to what the file says; PART is a part of the mesh or a side x- x+ y- y+ z- z+)": (

@@ -122,6 +122,16 @@ def temperature(text: str) -> list[float]:
     return [number(value), number(reference or "0")]
 
 
+def section(text: str) -> str | tuple[str, float]:
+    """Return the plane of ``x=0.5``, or a part.
+
+    >>> section("y=-0.5"), section("hub")
+    (('y', -0.5), 'hub')
+    """
+    axis, equals, offset = text.partition("=")
+    return (axis, number(offset)) if equals else text
+
+
 def integrator(text: str) -> ModelIntegrator:
     """Return the integrator of ``NAME[:NUMBERS]``.
 
@@ -182,6 +192,7 @@ FORMS: dict[str, Callable[[str], Any]] = {
     "AXIS:RATE[:ACCELERATION]": rates,
     "STEP:STEPS[:EVERY]": steps,
     "NAME[:NUMBERS]": integrator,
+    "CUT": section,
     "ALPHA,BETA": rayleigh,
 }
 

@@ -118,6 +118,7 @@ class Outputs:
     picture : of the end of a model, or of the path of a body; a film with the ending .gif or .mp4.
     state : the last state, from which another run goes on.
     mode : how .vtu files store their numbers: ``binary`` if not given, ``compressed`` or ``ascii``.
+    sections : planes and parts, as for `Result.section`, that summary and json of a model at its end have.
     """
 
     results: list[str] = field(default_factory=list)
@@ -125,6 +126,7 @@ class Outputs:
     picture: str | None = None
     state: str | None = None
     mode: str | None = None
+    sections: list[Any] = field(default_factory=list)
 
     def paths(self) -> list[str]:
         """Return all files.

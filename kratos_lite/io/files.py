@@ -125,10 +125,10 @@ def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
     Parameters
     ----------
     path : a result goes to .vtu, .vtk, .json, .html, a page for the browser, or, values of nodes alone, .csv;
-        to .pvtu and .vtu pieces of a result of many processes; values at points to .csv; a
+        to .pvtu and .vtu pieces of a result of many processes; values at points and sections to .csv; a
         state to .npz, from which `read_state` reads; a model or a mesh to .mdpa, an .elem set, .vtu or a
         format of meshio.
-    thing : a `Result`, what its `at` or `along` returns, a `State`, `Model` or `Mesh`.
+    thing : a `Result`, what its `at`, `along` or `section` returns, a `State`, `Model` or `Mesh`.
     mode : of the .vtu file of a result: ``binary`` (if not given), ``compressed`` or ``ascii``.
 
     Returns
@@ -146,6 +146,7 @@ def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
     from kratos_lite.analysis.model import Model
     from kratos_lite.analysis.point_values import PointValues
     from kratos_lite.analysis.result import Result
+    from kratos_lite.analysis.section import Section
     from kratos_lite.analysis.state import State
     from kratos_lite.io.formats.document import Document
     from kratos_lite.io.writers.results import write_result
@@ -159,7 +160,7 @@ def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
         return []
     if mode is not None:
         raise InputError(f"{path}: only .vtu files of results have a mode; leave the mode out")
-    if isinstance(thing, PointValues):
+    if isinstance(thing, (PointValues, Section)):
         write_table(path, thing.columns())
         return []
     if isinstance(thing, State):

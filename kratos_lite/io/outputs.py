@@ -13,7 +13,7 @@ from kratos_lite.io.case import Case, Outputs
 from kratos_lite.io.formats import ELEM_SET, ending
 from kratos_lite.io.writers.endings import check_ending, check_modes, check_result, check_series
 from kratos_lite.io.writers.pictures import check_picture, write_picture
-from kratos_lite.io.writers.results import write_result
+from kratos_lite.io.writers.results import write_json, write_result
 
 
 def check_outputs(case: Case) -> None:
@@ -40,6 +40,13 @@ def check_outputs(case: Case) -> None:
             check_ending(single, wanted)
     if outputs.picture is not None:
         check_picture(outputs.picture)
+    if outputs.sections:
+        from kratos_lite.analysis.section import cut_of  # a quick start without
+
+        if case.modes or not case.is_of_model:
+            raise InputError("a section is that of a result of a model; leave it out")
+        for where in outputs.sections:
+            cut_of(case.model.mesh, where)
     if not case.is_of_model and outputs.json is not None:
         raise InputError(f"{outputs.json}: a body has no summary in .json; write .csv or .npz")
 
@@ -48,7 +55,7 @@ def write_at_end(outputs: Outputs, result: Result, *, in_time: bool) -> None:
     """Write what the end of a model gives, all or nothing: its summary and, at rest, results and picture."""
     with all_or_none():
         if outputs.json is not None:
-            write_result(outputs.json, result)
+            write_json(outputs.json, result, outputs.sections)
         if in_time:
             return
         for path in outputs.results:

@@ -104,10 +104,10 @@ def _of_cut(
 ) -> tuple[Array, Array, Array, Array]:
     """Return corners, light, value and edges of the section through the cells of a block."""
     per_cell = values is not None and len(values) == mesh.n_elements != mesh.n_nodes
-    nodal = np.zeros(mesh.n_nodes) if values is None or per_cell else values
-    cells, P, value, E = cut_cells(block, plane.distance(mesh.points), x, nodal)
-    if per_cell and values is not None:
-        value = values[start + cells]
+    nodal = np.column_stack([x, np.zeros(mesh.n_nodes) if values is None or per_cell else values])
+    cells, corners, edges = cut_cells(block, plane.distance(mesh.points), nodal)
+    P, E = corners[..., :3], edges[..., :3]
+    value = values[start + cells] if per_cell and values is not None else corners[..., 3].mean(axis=1)
     normal = _normals(P)
     normal *= np.where(normal @ rows[2] < 0, -1.0, 1.0)[:, None]
     return P, _light(normal), value, E

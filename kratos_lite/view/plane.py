@@ -63,27 +63,25 @@ class Plane:
             )
 
 
-def plane_of(clip: Any, towards: Array) -> Plane | None:
+def plane_of(clip: Any, towards: Array, what: str = "clip") -> Plane:
     """Return the plane of ("x", 0.5) or (normal, offset) that opens the body to a viewer in a direction."""
-    if clip is None:
-        return None
     if isinstance(clip, (str, float, int)) or not hasattr(clip, "__len__") or len(clip) != 2:
         raise InputError(
-            "clip is a plane, such as ('x', 0.5) or ((1, 1, 0), 0.5), a normal and an offset in m; "
+            f"{what} is a plane, such as ('x', 0.5) or ((1, 1, 0), 0.5), a normal and an offset in m; "
             f"got {short(clip)}"
         )
     axis, offset = clip
     if isinstance(axis, str):
         if axis not in ("x", "y", "z"):
-            raise InputError(f"clip: an axis is x, y or z; got {axis!r}")
+            raise InputError(f"{what}: an axis is x, y or z; got {axis!r}")
         normal = np.eye(3)["xyz".index(axis)]
     else:
-        normal = finite(axis, "the normal of clip", (3,))
+        normal = finite(axis, f"the normal of {what}", (3,))
     length = float(np.linalg.norm(normal))
     if length == 0:
-        raise InputError("the normal of clip must not be zero")
+        raise InputError(f"the normal of {what} must not be zero")
     sign = -1.0 if normal @ towards < -1e-9 * length else 1.0
-    return Plane(normal / length, number(offset, "the offset of clip", unit="m") / length, sign)
+    return Plane(normal / length, number(offset, f"the offset of {what}", unit="m") / length, sign)
 
 
 # ---- parts of simplices ----------------------------------------------------------------------------
@@ -148,11 +146,14 @@ def _lattice(n: int) -> tuple[Array, Ints, Ints]:
     return points, tetrahedra, faces[side]
 
 
-def cut_cells(block: Block, distance: Array, x: Array, values: Array) -> tuple[Ints, Array, Array, Array]:
-    """Return the section through the cells of a block where the distance of its nodes is 0.
+def cut_cells(
+    block: Block, distance: Array, nodal: Array, parts: int | None = None
+) -> tuple[Ints, Array, Array]:
+    """Return the section through the cells of a block where the distance (n,) of its nodes is 0.
 
-    These are the cell (p,), corners (p, 4, 3) m and value (p,) of each polygon, and the edges (k, 2, 3) m of
-    the cells; the nodes have a distance (n,) from the plane in the undeformed body, places (n, 3) and values.
+    These are the cell (p,) of each polygon, nodal values (n, c) and reference coordinates at its corners
+    (p, 4, c + 3), and these values along the edges (k, 2, c + 3) of the cells, each of which is cut into
+    `parts` cubed.
     """
     assert block.shape is not None
     shape, d = block.shape, distance[block.nodes]
@@ -160,12 +161,13 @@ def cut_cells(block: Block, distance: Array, x: Array, values: Array) -> tuple[I
     reach = 0.25 * np.ptp(d, axis=1) if len(shape.nodes) > shape.corners else 0.0
     crossed = np.flatnonzero((d.min(axis=1) - reach <= 0) & (d.max(axis=1) + reach > 0))
     nodes = block.nodes[crossed]
-    points, tetrahedra, sides = _lattice(int(np.clip(np.sqrt(POLYGONS / max(len(crossed), 1)), 1, FINEST)))
+    n = parts or int(np.clip(np.sqrt(POLYGONS / max(len(crossed), 1)), 1, FINEST))
+    points, tetrahedra, sides = _lattice(n)
     xi = Hexahedron8.N(points) @ shape.nodes[list(COLLAPSED[shape.cell])]
     N = shape.N(xi)
     d = d[crossed] @ N.T
-    field = np.concatenate([np.einsum("pa,mad->mpd", N, x[nodes]), (values[nodes] @ N.T)[..., None]], axis=-1)
+    field = np.einsum("pa,mac->mpc", N, nodal[nodes])
+    field = np.concatenate([field, np.broadcast_to(xi, (*field.shape[:2], 3))], axis=-1)
     cells, corners = _parts(d, field, tetrahedra, CUT_TETRAHEDRA)
-    _, edges = _parts(d, field[..., :3], sides, CUT_TRIANGLES)
-    edges = edges[np.abs(edges[:, 0] - edges[:, 1]).max(axis=1, initial=0.0) > 0]
-    return crossed[cells], corners[..., :3], corners[..., 3].mean(axis=1), edges
+    _, edges = _parts(d, field, sides, CUT_TRIANGLES)
+    return crossed[cells], corners, edges[np.abs(edges[:, 0] - edges[:, 1]).max(axis=1, initial=0.0) > 0]

@@ -80,7 +80,7 @@ def scene_of(subjects: Sequence[Subject], options: Options) -> Scene:
             raise InputError("there is nothing to draw: the mesh has no element of a known shape")
     points = np.concatenate([subject.mesh.points for subject in subjects])
     rows = rows_of(options.view, points)
-    plane = plane_of(options.clip, rows[2])
+    plane = None if options.clip is None else plane_of(options.clip, rows[2])
     scale = factor_of(subjects, options.scale)
     scene = Scene(
         subjects,

@@ -224,11 +224,15 @@ def test_a_section_has_the_area_and_the_values_of_the_body(element):
     distance = (mesh.points - [0.5, 1.0, 0.0]) @ normal
     found = 0.0
     for block in mesh.blocks:
-        _, corners, values, edges = cut_cells(block, distance, mesh.points, mesh.points[:, 2])
+        cells, found_at, edges = cut_cells(block, distance, np.column_stack([mesh.points, mesh.points[:, 2]]))
+        corners, values, xi = found_at[..., :3], found_at[..., 3], found_at[..., 4:]
+        edges = edges[..., :3]
         found += area(corners)
         assert np.abs((corners - [0.5, 1.0, 0.0]) @ normal).max() < 1e-12
         assert np.abs((edges - [0.5, 1.0, 0.0]) @ normal).max() < 1e-12
-        assert np.abs(values - corners[:, :, 2].mean(axis=1)).max() < 1e-12
+        assert np.abs(values - corners[:, :, 2]).max() < 1e-12
+        places = np.einsum("pca,pad->pcd", block.known_shape.N(xi), mesh.points[block.nodes[cells]])
+        assert np.abs(places - corners).max() < 1e-12
     assert abs(found - 3 * np.sqrt(1 + 0.25)) < 1e-12  # a rectangle from y = 0.75 to 1.25
 
 

@@ -47,6 +47,8 @@ class Outcome:
             A label and a value each.
         """
         rows = self.rows or (self.result.table() if self.result else [])
+        for where in self.case.outputs.sections if self.result else ():
+            rows = [*rows, *self.result.section(where).table()]  # type: ignore[union-attr]
         shown = [(name, text) for name, text in rows if verbose or name != "skipped"]
         return [*self.lines, *(f"{name:<{WIDTH}}{text}" for name, text in shown)]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,7 @@ from kratos_lite.io.writers.table import write_table
 
 if TYPE_CHECKING:
     from kratos_lite.analysis.result import Result
+    from kratos_lite.analysis.section import Section
 
 
 def write_result(path: str | Path, result: Result, mode: str | None = None) -> None:
@@ -97,13 +99,15 @@ def _estimate(result: Result) -> dict[str, Any]:
     return {"estimated_error": {name: getattr(error, name) for name in names}}
 
 
-def write_json(path: str | Path, result: Result) -> None:
-    """Write the table, and displacements and reactions (m, N) by node id."""
+def write_json(path: str | Path, result: Result, sections: Sequence[Any] = ()) -> None:
+    """Write the table, displacements and reactions (m, N) by node id, and sections by planes and parts."""
     import json
 
     from kratos_lite import __version__
 
     content = {"kratos_lite": __version__, "units": "SI", **summary(result), **_by_node(result)}
+    if sections:
+        content["sections"] = [_section(result.section(where)) for where in sections]
     try:
         text = json.dumps(content, ensure_ascii=False, allow_nan=False)
     except ValueError:
@@ -112,6 +116,12 @@ def write_json(path: str | Path, result: Result) -> None:
             "look for loads, supports or constants in wrong units"
         ) from None
     write_whole(path, text.encode())
+
+
+def _section(section: Section) -> dict[str, Any]:
+    names = ("normal", "centroid", "force", "moment", "stress_force", "stress_moment")
+    vectors = {name: getattr(section, name).tolist() for name in names}
+    return {"where": section.where, "area": section.area, **vectors}
 
 
 def _by_node(result: Result) -> dict[str, Any]:

@@ -1,0 +1,242 @@
+"""Section: the force and moment that pass through a cut of a body, and the stress on it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from kratos_lite import voigt
+from kratos_lite.analysis.element_fields import ElementFields
+from kratos_lite.analysis.fields import FIELDS, PLACE
+from kratos_lite.analysis.report import vector
+from kratos_lite.assembly.nonlinear_assembly import internal_forces
+from kratos_lite.elements.surface import area_vectors, face_rule
+from kratos_lite.elements.tables import tabulate
+from kratos_lite.errors import MeshError
+from kratos_lite.mesh import Mesh, with_rows
+from kratos_lite.mesh.locate import Located
+from kratos_lite.mesh.topology import faces_of
+from kratos_lite.quadrature import rule_for
+from kratos_lite.shapes.faces import FACE_SHAPES, Triangle3
+from kratos_lite.tabular import Tabular
+from kratos_lite.typing import Array, ArrayLike, Ints, Mask, Numbers
+from kratos_lite.validation import finite
+from kratos_lite.view.plane import Plane, cut_cells, plane_of
+
+ON_PLANE = 1e-9
+"""Distance of nodes on a plane, as fraction of the size of the mesh."""
+DEGREE = 4
+"""Of the rule on triangles of a cut: stresses of quadratic elements times arms."""
+Pieces: TypeAlias = "Iterator[tuple[int, Ints, Array, Array, Array]]"
+"""Block, cells (p,), places (p, g, 3), reference coordinates (p, g, 3) and normal × area (p, g, 3)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Section(Tabular):
+    """A cut of a body with what passes through it; it prints as a table.
+
+    Force and moment are those of the internal nodal forces beyond the cut, so that they are in equilibrium
+    with the loads and reactions there to rounding; nodes on the cut count half.  A distributed load counts
+    by its nodal forces, so that of elements which the cut divides is known by the length of an element: let
+    it run along faces of elements where that matters.  How far the integral of the stress is from the force
+    shows how well the mesh resolves the stress.
+
+    Attributes
+    ----------
+    where : the cut, in words.
+    normal : (3,) unit vector, into what lies beyond the cut; the mean one of a part, 0 where that is closed.
+    area : of the undeformed cut in m².
+    centroid : (3,) m, of the cut; deformed where displacements are large, as all places and arms are.
+    force : (3,) N, of what lies beyond the cut on the rest.
+    moment : (3,) N m, likewise, about the centroid.
+    points : (q, 3) m, quadrature points of the cut.
+    weights : (q,) m², their areas.
+    stress : (q, 6) Pa, there.
+    traction : (q, 3) Pa, force for each undeformed area there, σ n.
+    """
+
+    where: str
+    normal: Array
+    area: float
+    centroid: Array
+    force: Array
+    moment: Array
+    points: Array
+    weights: Array
+    stress: Array
+    traction: Array
+
+    def moment_about(self, point: ArrayLike) -> Array:
+        """Return the moment about another point.
+
+        Parameters
+        ----------
+        point : (3,) m.
+
+        Returns
+        -------
+        (3,) N m
+        """
+        arm = self.centroid - finite(point, "the point of a moment", (3,))
+        return self.moment + np.cross(arm, self.force)
+
+    @property
+    def stress_force(self) -> Array:
+        """The integral ∫ σ n dA of the stress (3,) in N, for comparison with the force."""
+        return self.weights @ self.traction
+
+    @property
+    def stress_moment(self) -> Array:
+        """The moment ∫ x × σ n dA of the stress about the centroid (3,) in N m, likewise."""
+        return self.weights @ np.cross(self.points - self.centroid, self.traction)
+
+    def columns(self) -> dict[str, Numbers]:
+        """Return places, areas and stresses of the quadrature points, with units in the headers.
+
+        Returns
+        -------
+        dict of str to (q,) array
+            ``kl.write("cut.csv", section)`` writes them.
+        """
+        area = {"area [m2]": self.weights}
+        return {**PLACE.columns(self.points), **area, **FIELDS["stress"].columns(self.stress)}
+
+    def table(self) -> list[tuple[str, str]]:
+        """Return the rows of the summary, labels and values."""
+        rows = [("section", f"{self.where}, area {self.area:.6g} m², centroid {vector(self.centroid)} m")]
+        for name, unit, arm, along, across in (
+            ("force", "N", 1.0, "normal", "shear"),
+            ("moment", "N m", self.area**0.5, "torsion", "bending"),
+        ):
+            values, size = getattr(self, name), arm * float(np.linalg.norm(self.force))
+            text, n = f"{vector(values, size)} {unit}", float(values @ self.normal)
+            if self.normal.any():
+                parts = np.array([n, np.linalg.norm(values - n * self.normal)])
+                n, t = np.where(np.abs(parts) < 1e-12 * max(size, *np.abs(values)), 0.0, parts)
+                text += f" ({along} {n:.6g}, {across} {t:.6g})"
+            stress = vector(getattr(self, f"stress_{name}"), size)
+            rows += [(f"section {name}", text), (f"{name} of stress", f"{stress} {unit}")]
+        return rows
+
+
+def section(fields: ElementFields, where: Any, recovered: bool = True) -> Section:
+    """Return a cut of a result by a plane or around a part; see `Result.section`."""
+    mesh, u = fields.mesh, fields._strained
+    name, weights, pieces = cut_of(mesh, where)
+    located, area = _located(mesh, pieces, name)
+    values = fields.at(located, recovered=recovered)  # type: ignore[attr-defined]
+    x, points, sigma = mesh.points, located.points, voigt.tensor(values.stress)
+    if any(group.element.finite for group in fields.groups):
+        x, points = x + u, points + located.interpolate(u)
+        sigma = values.deformation_gradient @ voigt.tensor(values.pk2_stress)
+    dA, total = np.linalg.norm(area, axis=1), area.sum(axis=0)
+    whole, net = float(dA.sum()), float(np.linalg.norm(total))
+    centroid = dA @ points / whole
+    forces = internal_forces(mesh.points, fields.groups, u)
+    forces = forces if mesh.hanging is None else mesh.hanging.gather(forces)
+    return Section(
+        name,
+        total / net if net > ON_PLANE * whole else 0 * total,
+        whole,
+        centroid,
+        weights @ forces,
+        weights @ np.cross(x - centroid, forces),
+        points,
+        dA,
+        values.stress,
+        np.einsum("qij,qj->qi", sigma, area / dA[:, None]),
+    )
+
+
+def cut_of(mesh: Mesh, where: Any) -> tuple[str, Array, Pieces]:
+    """Return a cut in words, by how much nodes lie beyond it (n,), and its pieces; raise for none."""
+    if not mesh.whole:
+        raise MeshError("a section needs the whole mesh on one process; solve it from one file")
+    if (
+        isinstance(where, (tuple, list))
+        and len(where) == 2
+        and isinstance(where[0], (str, tuple, list, np.ndarray))
+    ):
+        return _by_plane(mesh, plane_of(where, np.zeros(3), "a section"))
+    return _around(mesh, where)
+
+
+def _by_plane(mesh: Mesh, plane: Plane) -> tuple[str, Array, Pieces]:
+    """Return the cut by a plane: nodes beyond it count 1, nodes on it half, unless it bounds the body."""
+    n, offset = plane.normal, plane.offset
+    d = mesh.points @ n - offset
+    d[np.abs(d) <= ON_PLANE * np.linalg.norm(np.ptp(mesh.extent, axis=0))] = 0.0
+    used = d[mesh.used_nodes()]
+    low, high = float(used.min()), float(used.max())
+    axis = "xyz"[int(n.argmax())] if n.max() == 1 else f"({', '.join(f'{c:.4g}' for c in n)})·X"
+    name = f"{axis} = {offset:g} m"
+    if low > 0 or high < 0:
+        raise MeshError(
+            f"the section {name} misses the body, which spans {offset + low:g} … {offset + high:g} m there"
+        )
+    weights = np.heaviside(d, 0.0 if low == 0 else 1.0 if high == 0 else 0.5)
+    return name, weights, _polygons(mesh, -d if high == 0 else d, n)
+
+
+def _polygons(mesh: Mesh, d: Array, n: Array) -> Pieces:
+    """Yield the section where the distance (n,) of nodes is 0, in triangles."""
+    rule = rule_for("triangle", DEGREE)
+    for number, block in enumerate(mesh.blocks):
+        if len(block):
+            straight = len(block.known_shape.nodes) == block.known_shape.corners
+            cells, corners, _ = cut_cells(block, d, mesh.points, 1 if straight else None)
+            P = corners[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 6)
+            area = np.linalg.norm(np.cross(P[:, 1, :3] - P[:, 0, :3], P[:, 2, :3] - P[:, 0, :3]), axis=1)
+            at = tabulate(Triangle3, rule)[0] @ P
+            dA = area[:, None, None] * rule.weights[:, None] * n
+            yield number, np.repeat(cells, 2), at[..., :3], at[..., 3:], dA
+
+
+def _around(mesh: Mesh, where: Any) -> tuple[str, Array, Pieces]:
+    """Return the cut around a part: its nodes count 1, those that others share half."""
+    name = f"around {where!r}" if isinstance(where, (str, int)) else "around some elements"
+    inside = np.zeros(mesh.n_elements, dtype=bool)
+    inside[mesh.elements(where)] = True
+    own, others = np.zeros((2, mesh.n_nodes), dtype=bool)
+    for block, at in with_rows(mesh.blocks):
+        own[block.nodes[inside[at]]] = True
+        others[block.nodes[~inside[at]]] = True
+    return name, own - 0.5 * (own & others), _faces(mesh, inside)
+
+
+def _faces(mesh: Mesh, inside: Mask) -> Pieces:
+    """Yield the faces between elements inside and others, of the smaller ones where nodes hang."""
+    faces, start = mesh.all_faces, 0
+    between = inside[faces.element[faces.one]] != inside[faces.element[faces.other]]
+    cut = np.isin(np.arange(len(faces.element)), faces.other[between])
+    for number, (block, rows) in enumerate(with_rows(mesh.blocks)):
+        for columns in map(list, faces_of(block)):
+            cells = np.flatnonzero(cut[start : start + len(block)])
+            start += len(block)
+            shape = FACE_SHAPES[len(columns)]
+            N, X = tabulate(shape, face_rule(shape))[0], mesh.points[block.nodes[cells][:, columns]]
+            xi = np.broadcast_to(N @ block.known_shape.nodes[columns], (len(cells), len(N), 3))
+            into = np.where(inside[rows][cells], -1.0, 1.0)[:, None, None]
+            yield number, cells, N @ X, xi, into * area_vectors(shape, X)
+
+
+def _located(mesh: Mesh, pieces: Pieces, name: str) -> tuple[Located, Array]:
+    """Return the points (q,) of a cut in their elements, and normal × area (q, 3) of each."""
+    starts = np.array([at.start for _, at in with_rows(mesh.blocks)])
+    flat = [
+        (
+            np.full(x[..., 0].size, number),
+            np.repeat(cells, x.shape[1]),
+            *(a.reshape(-1, 3) for a in (x, xi, dA)),
+        )
+        for number, cells, x, xi, dA in pieces
+    ]
+    block, cell, points, xi, area = (np.concatenate(part) for part in zip(*flat, strict=True))
+    kept = area.any(axis=1)
+    if not kept.any():
+        raise MeshError(f"the section {name} cuts no element and meets no face between two elements")
+    located = Located(mesh, points, starts[block] + cell, block, cell, xi)
+    return located[kept], area[kept]
