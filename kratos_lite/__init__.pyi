@@ -3,6 +3,8 @@
 from kratos_lite import ale as ale
 from kratos_lite.analysis.comparison import Comparison as Comparison
 from kratos_lite.analysis.comparison import compare as compare
+from kratos_lite.analysis.convergence import ConvergenceStudy as ConvergenceStudy
+from kratos_lite.analysis.convergence import converge as converge
 from kratos_lite.analysis.derived_quantities import material_acceleration as material_acceleration
 from kratos_lite.analysis.derived_quantities import material_derivative as material_derivative
 from kratos_lite.analysis.derived_quantities import material_velocity as material_velocity

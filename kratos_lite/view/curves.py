@@ -25,6 +25,19 @@ def line_figure(
     return figure
 
 
+def study_figure(
+    x: Array, values: Array, ends: tuple[float, float, float], unit: str, of: str, size: tuple[float, float]
+) -> Any:
+    """Return a figure of values (k,) against unknowns (k,), of their limit and the ends of its band."""
+    figure, axes = new_plot(size, "", unit)
+    axes.plot(x, values, "o-", color=BLUE, lw=1.8, ms=5, label="values")
+    axes.axhline(ends[0], color=RED, lw=1.2, ls=(0, (4, 3)), label="extrapolated", zorder=1)
+    axes.axhspan(*ends[1:], color=RED, alpha=0.1, lw=0, zorder=0)
+    axes.set_xscale("log")
+    label(axes, "unknowns", of, "")
+    return figure
+
+
 def convergence_figure(
     unknowns: Array, errors: Array, goal: float | None, of: str, title: str, size: tuple[float, float]
 ) -> Any:
