@@ -118,6 +118,7 @@ from kratos_lite.mesh import Mesh as Mesh
 from kratos_lite.mesh import Part as Part
 from kratos_lite.mesh.generators import annulus as annulus
 from kratos_lite.mesh.generators import box as box
+from kratos_lite.mesh.join import join as join
 from kratos_lite.model.loads import TimeDependentLoad as TimeDependentLoad
 from kratos_lite.model.loads.body import BodyForce as BodyForce
 from kratos_lite.model.loads.body import Gravity as Gravity

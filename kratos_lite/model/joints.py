@@ -9,7 +9,7 @@ import numpy as np
 from kratos_lite.mesh import NO_ROWS, Mesh, equal_sets, with_rows
 from kratos_lite.mesh.centers import keys_of
 from kratos_lite.mesh.topology import corners, faces_of
-from kratos_lite.solvers.constraints import Constraints
+from kratos_lite.model.supports import Supports
 from kratos_lite.typing import Array, Ints
 
 NORMAL = np.array([0.5257311, 0.6180340, 0.5844215])
@@ -58,21 +58,25 @@ def _halved_squares(mesh: Mesh) -> Ints:
     return np.concatenate(elements)
 
 
-def check_coincident(mesh: Mesh, constraints: Constraints) -> Iterator[str]:
+def check_coincident(mesh: Mesh, supports: Supports) -> Iterator[str]:
     """Warn of different nodes at the same place (within 1e-8 of the mean spacing) that nothing ties."""
     used = np.flatnonzero(mesh.used_nodes())
     if len(used) < 2:
         return
     X = mesh.points[used]
     size = max(float(np.ptp(x)) for x in X.T)  # by columns, which is faster
-    pairs = mesh.node_ids[used[_at_one_place(X, 1e-8 * size / len(used) ** (1 / 3))]]
+    pairs = np.sort(used[_at_one_place(X, 1e-8 * size / len(used) ** (1 / 3))], axis=1)
+    inside = np.zeros(mesh.n_nodes, dtype=bool)
+    inside[np.concatenate([NO_ROWS, *(nodes for tie in supports.ties for nodes in tie.nodes_of)])] = True
+    pairs = pairs[~inside[pairs].all(axis=1)]
     if len(pairs):
-        ends = constraints.dependents[constraints.owner] // 3, constraints.independents // 3
-        tied = set(map(frozenset, mesh.node_ids[np.unique(np.stack(ends, axis=1), axis=0)].tolist()))
-        apart = [f"{min(pair)} and {max(pair)}" for pair in pairs.tolist() if frozenset(pair) not in tied]
+        every, key = supports.constraints, np.array([mesh.n_nodes, 1])
+        ends = np.stack([every.dependents[every.owner], every.independents], axis=1) // 3
+        apart = mesh.node_ids[pairs[~np.isin(pairs @ key, np.sort(ends, axis=1) @ key)]].tolist()
         if apart:
-            shown = ", ".join(apart[:3]) + (" …" if len(apart) > 3 else "")
-            yield f"{len(apart)} pairs of nodes coincide ({shown}); they are not joined"
+            shown = ", ".join(f"{min(pair)} and {max(pair)}" for pair in apart[:3])
+            more = " …" if len(apart) > 3 else ""
+            yield f"{len(apart)} pairs of nodes coincide ({shown}{more}); they are not joined"
 
 
 def _at_one_place(X: Array, tolerance: float) -> Ints:

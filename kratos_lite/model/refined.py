@@ -39,6 +39,8 @@ def refined(structure: S, finer: RefinedMesh) -> S:
     for condition in structure.supports.conditions:
         new.supports.add(_refined_condition(condition, finer))
     _carry_constraints(structure, new, finer)
+    for tie in structure.supports.ties:
+        new.supports.add_tie(tie.refined(finer))
     new.loads = [load.refined(finer) for load in structure.loads]
     for name, load in structure.named_loads.items():
         new._named[name] = new.loads[next(i for i, one in enumerate(structure.loads) if one is load)]

@@ -29,6 +29,7 @@ from kratos_lite.model.local_axes import Cartesian, LocalAxes, normal_of_plane
 from kratos_lite.model.locking import check_locking
 from kratos_lite.model.spurious_modes import check_rules, check_spurious_modes
 from kratos_lite.model.supports import DirichletCondition, Supports, axis_numbers
+from kratos_lite.model.ties import Tie
 from kratos_lite.quadrature import Rule
 from kratos_lite.solvers.constraints import rigid_modes
 from kratos_lite.tabular import Tabular
@@ -467,6 +468,43 @@ class Structure(Tabular):
         """
         self.supports.constrain(dependents, independents, weights, constant)
 
+    def tie(self, a: Where, b: Where, *, tolerance: float | None = None) -> None:
+        """Tie two parts of the surface, whose nodes need not match: in the mean over faces both move alike.
+
+        The nodes of the finer part depend on those of the other, or those of the part that the other covers.
+        Constant stress passes through plane faces to rounding, and rigid motions leave no force where faces
+        are curved or apart.  Supports and other constraints of dependent nodes stay.
+
+        Parameters
+        ----------
+        a, b : parts, as for `fix`, with faces and without common nodes.
+        tolerance : m, distance up to which faces are tied; 0.2 of the radius of the larger face if not given.
+
+        Raises
+        ------
+        ModelError
+            A part has no faces, nodes are in both or hang, or neither part covers the other.
+        MeshError
+            There is no such part or node.
+
+        Notes
+        -----
+        Mortar method with dual multipliers: Puso, Int. J. Numer. Meth. Eng. 59 (2004) 315-336; Popp,
+        Wohlmuth, Gee & Wall, SIAM J. Sci. Comput. 34 (2012) B421-B446.
+
+        Examples
+        --------
+        >>> import kratos_lite as kl
+        >>> lower, upper = kl.box((1, 1, 1), (2, 2, 2)), kl.box((1, 1, 1), (3, 3, 3), origin=(0, 0, 1))
+        >>> model = kl.Model(kl.join({"lower": lower, "upper": upper}), kl.Isotropic3D(E=1e9, nu=0.3))
+        >>> model.tie("lower.z+", "upper.z-")
+        >>> model.fix("z-")
+        >>> model.add(kl.Traction("z+", (0, 0, 1e6)))
+        >>> round(float(model.solve().reaction("z-")[:, 2].sum()))
+        -1000000
+        """
+        self.supports.add_tie(Tie(self.mesh, a, b, tolerance))
+
     def rigid_modes(self) -> Array:
         """Return the rigid-body modes (3n, 6): translations in x, y and z, rotations about x, y and z."""
         return rigid_modes(self.mesh.points)
@@ -643,6 +681,7 @@ class Structure(Tabular):
         rows += [("material", f"none for {without} elements")] if without else []
         rows.append(("fixed", f"{self.supports.fixed.sum()} components"))
         rows += [("support", str(condition)) for condition in self.supports.named.values()]
+        rows += [("tie", str(tie)) for tie in self.supports.ties]
         if len(self.supports.constraints):
             rows.append(("constraints", str(len(self.supports.constraints))))
         names = {id(load): f"{name}: " for name, load in self.named_loads.items()}
@@ -664,7 +703,7 @@ def _element_name(group: ElementGroup) -> str:
 CHECKS: tuple[Callable[[Structure, Sequence[ElementGroup]], Iterable[str]], ...] = (
     lambda model, groups: check_rules(model.mesh, groups),
     lambda model, groups: check_joints(model.mesh),
-    lambda model, groups: check_coincident(model.mesh, model.supports.constraints),
+    lambda model, groups: check_coincident(model.mesh, model.supports),
     lambda model, groups: checks.check_scales(model.mesh, groups),
     lambda model, groups: check_locking(model.mesh, groups),
     lambda model, groups: check_spurious_modes(model.mesh, groups, model.supports),

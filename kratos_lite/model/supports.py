@@ -12,6 +12,7 @@ from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh, Where
 from kratos_lite.model.loads.base import key_of
 from kratos_lite.model.local_axes import LocalAxes
+from kratos_lite.model.ties import PartTie
 from kratos_lite.solvers.constraints import ConstraintMap, Constraints, constraint_map, eliminate
 from kratos_lite.time_series import function_of
 from kratos_lite.typing import Array, ArrayLike, Ints, Mask
@@ -73,6 +74,7 @@ class Supports:
     fixed : (n, 3) bool, read-only, which degrees of freedom are prescribed.
     values : (n, 3) float, read-only, their displacements in m, at the time 0 where they move.
     conditions : the Dirichlet conditions that these came from, in order.
+    ties : of parts, in order.
     hanging : the constraints of hanging nodes, the first of all.
     version : counts the changes of what is prescribed, but for values and functions of time.
     value_version : counts all changes.
@@ -93,12 +95,14 @@ class Supports:
         if mesh.hanging is not None:
             self._hangs[mesh.hanging.nodes] = True
         self.conditions: list[DirichletCondition] = []
+        self.ties: list[PartTie] = []
+        self._every: tuple[int, Constraints] = (-1, Constraints.none())
         self.version = self.value_version = 0
         self._dependents: tuple[int, Constraints] = (-1, Constraints.none())
 
     def __str__(self) -> str:
         tied = [f"{len(self.constraints)} constraints"] if len(self.constraints) else []
-        return "\n".join([*map(str, self.conditions), *tied]) or "none"
+        return "\n".join([*map(str, self.conditions), *map(str, self.ties), *tied]) or "none"
 
     def name(self, dof: int) -> str:
         """Return the readable name of a degree of freedom, 3·node + axis."""
@@ -225,7 +229,8 @@ class Supports:
         first = np.zeros(len(nodes), dtype=int)
         if k < 3:
             size = np.abs(A[:, 0]) * free if k == 1 else np.abs(np.cross(A[:, 0], A[:, 1])) / free
-            first = size.argmax(axis=1) + (k == 2)
+            size = size.round(9)  # nodes of a plane take the same axis
+            first = 2 - size[:, ::-1].argmax(axis=1) if k == 1 else size.argmax(axis=1) + 1
         order = (first[:, None] + np.arange(3)) % 3  # k that follow, then those from which they do
         A, u = np.take_along_axis(A, order[:, None], axis=2), np.take_along_axis(u, order, axis=1)
         W = -np.linalg.solve(A[:, :, :k], A[:, :, k:])
@@ -276,13 +281,22 @@ class Supports:
 
     @property
     def constraints(self) -> Constraints:
-        """The multi-point constraints: of hanging nodes, those added, and those of supports in local axes."""
-        return self._constraints + self._inclined if len(self._inclined) else self._constraints
+        """The multi-point constraints: of hanging nodes, those added, of local axes, and of ties of parts."""
+        if not self.ties:
+            return self._constraints + self._inclined if len(self._inclined) else self._constraints
+        if self._every[0] != self.value_version:
+            every = self._constraints + self._inclined
+            for tie in self.ties:
+                known = self.fixed.copy()
+                known.flat[every.dependents] = True
+                every += tie.constraints(known, self.values)
+            self._every = self.value_version, every
+        return self._every[1]
 
     @constraints.setter
     def constraints(self, constraints: Constraints) -> None:
         self._constraints = Constraints.none()
-        self._inclined, self._inclined_rows = Constraints.none(), []
+        self._inclined, self._inclined_rows, self.ties = Constraints.none(), [], []
         self.add_constraints(constraints)
 
     @property
@@ -294,6 +308,13 @@ class Supports:
         """Add constraints."""
         self._constraints += constraints
         self.version += 1
+        self.value_version += 1
+
+    def add_tie(self, tie: PartTie) -> None:
+        """Add a tie, or replace the one between the same parts."""
+        old = [other for other in self.ties if other.place == tie.place]
+        self.ties = [tie if other in old else other for other in self.ties] + [tie] * (not old)
+        self.version += not old or old[0].equations != tie.equations
         self.value_version += 1
 
     def dependents(self) -> Constraints:

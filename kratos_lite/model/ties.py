@@ -1,0 +1,183 @@
+"""Ties of parts: constraints that are made anew when supports or the mesh change."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Hashable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kratos_lite.errors import ModelError
+from kratos_lite.mesh import Block, Mesh, Where
+from kratos_lite.model.mortar import NEAR, Cells, Mortar, mortar
+from kratos_lite.solvers.constraints import Constraints
+from kratos_lite.typing import Array, Csr, Ints, Mask
+from kratos_lite.validation import number
+
+if TYPE_CHECKING:
+    from kratos_lite.mesh.refined_mesh import RefinedMesh
+
+COVERED = 0.5
+"""Least fraction of each dependent face that the other part must cover."""
+HOPS = 3
+"""Cells from a dependent node that is known to one that is free, at most."""
+WHOLE = 1 - 1e-6
+
+
+class PartTie(ABC):
+    """What ties part b to part a; one with the same `place` takes its place.
+
+    Attributes
+    ----------
+    place : type and nodes.
+    equations : what K depends on, beside `place`; the constants of constraints do not belong to it.
+    """
+
+    place: Hashable
+    equations: Hashable = None
+
+    def __init__(self, mesh: Mesh, a: Where, b: Where) -> None:
+        self.mesh, self.a, self.b = mesh, a, b
+        self.nodes_of = [mesh.nodes(where) for where in (a, b)]
+        self.place = type(self), *(nodes.tobytes() for nodes in self.nodes_of)
+
+    @abstractmethod
+    def constraints(self, known: Mask, values: Array) -> Constraints:
+        """Return the constraints of degrees of freedom that are not `known` (n, 3): fixed, or dependent."""
+
+    @abstractmethod
+    def refined(self, finer: RefinedMesh) -> PartTie:
+        """Return the tie on a finer mesh."""
+
+    def __str__(self) -> str:
+        return f"{name_of(self.a, self.nodes_of[0])} to {name_of(self.b, self.nodes_of[1])}"
+
+
+def name_of(where: Where, nodes: Ints) -> str:
+    """Return a part by its name, or how many nodes it has."""
+    return where if isinstance(where, str) else f"{len(nodes)} nodes"
+
+
+class Tie(PartTie):
+    """Faces that share no nodes move alike, in the mean by mortar integrals."""
+
+    def __init__(self, mesh: Mesh, a: Where, b: Where, tolerance: float | None = None) -> None:
+        super().__init__(mesh, a, b)
+        self.tolerance = None if tolerance is None else number(tolerance, "the tolerance of a tie", least=0.0)
+        self.integrals = _checked(self)
+        self.W = _without_gaps(self.integrals, mesh.points)
+
+    def __str__(self) -> str:
+        return f"{super().__str__()}: {len(self.integrals.nodes)} nodes depend on the others"
+
+    def refined(self, finer: RefinedMesh) -> Tie:
+        """Return the tie on a finer mesh."""
+        return Tie(finer.mesh, finer.where(self.a), finer.where(self.b), self.tolerance)
+
+    def constraints(self, known: Mask, values: Array) -> Constraints:
+        """Return them; multipliers of what is known go to neighbors, so that they still add up to 1.
+
+        With R these sums it is R D (S u_a - W u) = 0, S the inverse of T, in which all that is free besides
+        S u_a of its own nodes goes to the right side.
+        """
+        from scipy.sparse import csr_array, diags_array, kron
+
+        x, one, size = self.integrals, np.eye(3), self.mesh.points.size
+        dofs = (3 * x.nodes[:, None] + np.arange(3)).ravel()
+        free, held = (np.flatnonzero(mask) for mask in (~known.flat[dofs], known.flat[dofs]))
+        T, S, near = (csr_array(kron(A, one)) for A in (x.T, x.inverse, x.neighbors))
+        step = taken = near[:, held]
+        for _ in range(HOPS):
+            step = near @ step @ diags_array(1.0 * (taken[free].sum(axis=0) == 0))
+            taken = taken + step
+        taken = taken[free]
+        taken = csr_array(taken @ diags_array(1 / np.maximum(taken.sum(axis=0), 1.0)))
+        own = csr_array((np.ones(len(free)), (np.arange(len(free)), free)), shape=(len(free), len(dofs)))
+        gives = csr_array((np.ones(len(held)), (np.arange(len(held)), held)), shape=(len(held), len(dofs)))
+        D = np.repeat(x.D, 3)
+        R = csr_array((own + taken @ gives) @ diags_array(D))
+        rest = R @ S - diags_array(D[free]) @ own @ S @ own.T @ own
+        on_all = csr_array((np.ones(len(dofs)), (np.arange(len(dofs)), dofs)), shape=(len(dofs), size))
+        rows = T[free][:, free] @ diags_array(1 / D[free]) @ (R @ self.W - rest @ on_all)
+        return _constraints(dofs[free], csr_array(rows))
+
+
+def _constraints(dependents: Ints, rows: Any) -> Constraints:
+    """Return u[dependents] = rows u."""
+    rows.data[np.abs(rows.data) < 1e-14] = 0.0
+    rows.eliminate_zeros()
+    rows.sort_indices()
+    start, others = rows.indptr.astype(np.int64), rows.indices.astype(np.int64)
+    zeros = np.zeros(len(dependents))
+    return Constraints(dependents, start, others, rows.data, zeros, zeros.astype(bool))
+
+
+def _checked(tie: Tie) -> Mortar:
+    """Return the integrals over the finer part, or the other if only that is covered; ModelError if none."""
+    mesh, names = tie.mesh, str(PartTie.__str__(tie))
+    faces = [_faces(mesh, where, nodes) for where, nodes in zip((tie.a, tie.b), tie.nodes_of, strict=True)]
+    used = [np.unique(np.concatenate([block.nodes.ravel() for block in some])) for some in faces]
+    both = np.intersect1d(used[0], used[1])
+    if len(both):
+        raise ModelError(
+            f"cannot tie {names}: both have node {mesh.node_ids[both[0]]}, and {len(both) - 1} more; a tie "
+            "joins faces with nodes of their own, give one part for each side"
+        )
+    if mesh.hanging is not None and np.isin(mesh.hanging.nodes, np.concatenate(used)).any():
+        raise ModelError(f"cannot tie {names}: nodes hang there; tie them on a mesh without, and no error=")
+    radius = [np.mean([Cells(block, mesh.points).radius.mean() for block in some]) for some in faces]
+    order = [0, 1] if radius[0] <= radius[1] else [1, 0]
+    found: list[Mortar] = []
+    for one in order:
+        found.append(mortar(mesh.points, faces[one], faces[1 - one], tie.tolerance))
+        if found[-1].covered >= WHOLE:
+            return found[-1]
+    best = max(found, key=lambda x: x.covered)
+    if best.covered >= COVERED:
+        return best
+    gap = min(x.gap for x in found)
+    limit = f"{NEAR:g} of the size of a face" if tie.tolerance is None else f"{tie.tolerance:g} m"
+    why = f": some are {gap:.3g} m apart, farther than {limit}" * bool(np.isfinite(gap))
+    raise ModelError(
+        f"cannot tie {names}: neither covers the other{why}; tie parts of which one lies on the other, or "
+        "give the distance that is to be closed, as in tolerance=1e-3"
+    )
+
+
+def _faces(mesh: Mesh, where: Where, nodes: Ints) -> list[Block]:
+    """Return the faces of a part; ModelError if there are none."""
+    faces = [block for block in mesh.faces(where) if block.shape and block.shape.nodes.shape[1] == 2]
+    if not faces:
+        raise ModelError(f"cannot tie {name_of(where, nodes)}: no face has all its nodes there")
+    return faces
+
+
+def _without_gaps(x: Mortar, points: Array) -> Csr:
+    """Return W (3d, 3n): where surfaces are apart, a rotation of the nodes of b, by least squares, adds.
+
+    Then rigid motions of both leave no force behind.
+    """
+    from scipy.sparse import bsr_array, csr_array
+
+    W, X = x.W, points - points.mean(axis=0)
+    count = np.maximum(np.diff(W.indptr), 1)
+    owner = np.repeat(np.arange(len(count)), np.diff(W.indptr))
+    blocks = W.data[:, None, None] * np.eye(3)
+    gap = x.inverse @ X[x.nodes] - W @ X
+    if np.abs(gap).max() > 1e-9 * np.abs(X).max():
+        center = np.zeros_like(gap)
+        np.add.at(center, owner, X[W.indices] / count[owner, None])
+        r = _cross(X[W.indices] - center[owner])
+        A = np.zeros((len(count), 3, 3))
+        np.add.at(A, owner, np.swapaxes(r, 1, 2) @ r)
+        blocks = blocks - (_cross(gap) @ np.linalg.inv(A))[owner] @ r
+    shape = 3 * W.shape[0], 3 * W.shape[1]
+    full = csr_array(bsr_array((blocks, W.indices, W.indptr), shape=shape).tocsr())
+    full.eliminate_zeros()
+    return full
+
+
+def _cross(v: Array) -> Array:
+    """Return the matrices (m, 3, 3) of v × (m, 3)."""
+    return np.cross(np.eye(3), v[:, None])

@@ -1,0 +1,220 @@
+"""Ties of faces that do not match: constant stress, rigid motions and supports pass through them."""
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite import voigt
+from kratos_lite.solvers.constraints import rigid_modes
+
+STEEL = kl.Isotropic3D(E=200e9, nu=0.3, density=7800.0)
+GRADIENT = np.array([[1.0, 0.2, 0.3], [0.1, -0.5, 0.4], [0.2, 0.3, 0.7]]) * 1e-3
+STRESS = STEEL.C @ voigt.symmetric_gradient(GRADIENT)
+PAIRS = ["8N 8N", "4N 4N", "4N 8N", "20N 20N", "27N 27N", "10N 10N", "20N 10N", "10N 8N", "8N 27N", "15N 20N"]
+
+
+def field(X):
+    return X @ GRADIENT.T
+
+
+def blocks(pair, one=(1, 2, 3), other=(2, 3, 2)):
+    """Return two unit cubes side by side along x, each with nodes of its own."""
+    a, b = (f"KinematicLinear3D{nodes}" for nodes in pair.split())
+    return kl.join({"a": kl.box(cells=one, element=a), "b": kl.box(cells=other, element=b, origin=(1, 0, 0))})
+
+
+def tied(mesh):
+    model = kl.Model(mesh, STEEL, formulation="standard")
+    model.tie("a.x+", "b.x-")
+    return model
+
+
+def pulled(mesh):
+    """Return a tied model under tractions of constant stress."""
+    model, T = tied(mesh), STRESS[[[0, 3, 5], [3, 1, 4], [5, 4, 2]]]
+    for axis, letter in enumerate("xyz"):
+        model.add(kl.Traction(f"{letter}-", -T[axis]))
+        model.add(kl.Traction(f"{letter}+", T[axis]))
+    return model
+
+
+def stress_error(result):
+    every = result.stress()
+    every = [every] if isinstance(every, np.ndarray) else every
+    return max(np.abs(stress - STRESS).max() for stress in every) / np.abs(STRESS).max()
+
+
+@pytest.mark.parametrize("pair", PAIRS)
+def test_constant_stress_passes(pair):
+    assert stress_error(pulled(blocks(pair)).solve()) < 1e-10
+
+
+@pytest.mark.parametrize("pair", ["8N 8N", "20N 10N", "4N 4N"])
+def test_constant_stress_passes_where_supports_hold_nodes_of_both_sides(pair):
+    model = pulled(blocks(pair))
+    model.fix("z-", field=field)
+    model.fix("y+", field=field)
+    model.fix(lambda X: (X[:, 2] == 1) & (X[:, 1] > 0.3), "xy", field=lambda X: field(X)[:, :2])
+    assert stress_error(model.solve()) < 1e-10
+
+
+def skewed(mesh):
+    """Return a mesh whose cells are no parallelograms, with straight edges."""
+    X, (block,) = mesh.points.copy(), mesh.blocks
+    bent = np.sin(np.pi * X[:, 1]) * np.sin(np.pi * X[:, 2])
+    X[:, 1:] += np.outer(bent, (0.08, -0.06))
+    c, N = block.shape.corners, block.shape.linear().N(block.shape.nodes)
+    X[block.nodes] = N @ X[block.nodes[:, :c]]
+    return mesh.replace(points=X)
+
+
+@pytest.mark.parametrize("pair", ["8N 8N", "20N 27N"])
+def test_constant_stress_passes_through_skewed_faces(pair):
+    one, other = (f"KinematicLinear3D{nodes}" for nodes in pair.split())
+    a, b = kl.box(cells=(1, 3, 2), element=one), kl.box(cells=(1, 2, 3), element=other, origin=(1, 0, 0))
+    assert stress_error(pulled(kl.join({"a": skewed(a), "b": skewed(b)})).solve()) < 1e-10
+
+
+def test_equal_meshes_are_tied_node_by_node():
+    mesh = blocks("20N 20N", (1, 2, 2), (1, 2, 2))
+    every = tied(mesh).supports.constraints
+    assert len(every) == len(every.independents) == 3 * 21
+    assert np.abs(every.weights - 1).max() < 1e-12
+    pairs = mesh.points[every.dependents // 3] - mesh.points[every.independents // 3]
+    assert np.abs(pairs).max() < 1e-14
+
+
+def test_the_covered_part_depends_on_the_other():
+    """A small block on a large face: whichever comes first, its nodes depend."""
+    plate = kl.box((1, 1, 0.1), (7, 7, 1))
+    stud = kl.box((0.3, 0.3, 0.5), (1, 1, 1), origin=(0.31, 0.22, 0.1))
+    mesh = kl.join({"plate": plate, "stud": stud})
+    for parts in (("plate.z+", "stud.z-"), ("stud.z-", "plate.z+")):
+        model = kl.Model(mesh, STEEL)
+        model.tie(*parts)
+        assert set(model.supports.constraints.dependents // 3) == set(mesh.nodes("stud.z-"))
+        model.fix("z-")
+        model.add(kl.Traction("stud.z+", (1e5, 0, 1e5)))
+        reaction = model.solve().reaction("z-").sum(axis=0)
+        assert np.abs(reaction - [-9e3, 0, -9e3]).max() < 1e-5
+
+
+def rings(inner, outer, gap=0.0):
+    """Return two rings, one in the other, of so many cells around."""
+    a = kl.annulus(0.5, 1.0, 0.3, cells=(1, inner, 1))
+    b = kl.annulus(1.0 + gap, 2.0, 0.3, cells=(2, outer, 2))
+    return kl.join({"a": a, "b": b})
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.02])
+def test_rigid_motions_pass_where_faces_are_curved_or_apart(gap):
+    model = kl.Model(rings(10, 16, gap), STEEL)
+    model.tie("a.outer", "b.inner", tolerance=0.1)
+    row, dof, weight = model.supports.constraint_rows()
+    left = np.zeros((row.max() + 1, 6))
+    np.add.at(left, row, weight[:, None] * rigid_modes(model.mesh.points)[dof])
+    assert np.abs(left).max() < 1e-12
+    assert model.free_motions(model.element_groups()).counts.tolist() == [6]
+
+
+def test_a_thick_cylinder_of_two_unlike_rings():
+    """Lamé: u_r of a cylinder under inner pressure with plane strain, through the tie."""
+    a = kl.annulus(0.5, 1.0, 0.1, cells=(2, 16, 1), element="20N")
+    b = kl.annulus(1.0, 2.0, 0.1, cells=(3, 20, 1), element="20N")
+    model = kl.Model(kl.join({"a": a, "b": b}), STEEL)
+    model.tie("a.outer", "b.inner")
+    model.fix("z-", "z")
+    model.fix("z+", "z")
+    model.add(kl.Pressure("a.inner", 1e8))
+    u = model.solve().displacement("b.outer")
+    p, r, R, nu = 1e8, 0.5, 2.0, STEEL.nu
+    exact = (1 + nu) / STEEL.E * p * r**2 / (R**2 - r**2) * ((1 - 2 * nu) * R + R)
+    radial = np.linalg.norm(u[:, :2], axis=1)
+    assert np.abs(radial / exact - 1).max() < 2e-3
+
+
+def test_three_blocks_that_meet_in_an_edge():
+    """Nodes of the edge depend by one tie; the others pass their multipliers on."""
+    a, c = kl.box((1, 1, 1), (2, 2, 2)), kl.box((2, 1, 1), (3, 3, 3), origin=(0, 0, 1))
+    mesh = kl.join({"a": a, "b": kl.box((1, 1, 1), (3, 4, 3), origin=(1, 0, 0)), "c": c})
+    model = pulled(mesh)
+    model.tie("c.z-", lambda X: (X[:, 2] == 1) & (np.arange(len(X)) < mesh.nodes("c").min()))
+    assert stress_error(model.solve()) < 1e-10
+
+
+def test_rollers_in_local_axes_meet_the_tie():
+    axes = kl.Cartesian((1, 1, 0), (-1, 1, 0))
+    turn = np.array([[1, -1, 0], [1, 1, 0], [0, 0, 2**0.5]]) / 2**0.5
+    mesh = blocks("8N 8N")
+    model = tied(mesh.replace(points=mesh.points @ turn.T))
+    model.fix(np.flatnonzero(mesh.points[:, 2] == 0), "z")
+    model.fix(np.flatnonzero(mesh.points[:, 1] == 0), "y", local=axes)
+    model.fix(np.flatnonzero(mesh.points[:, 0] == 0), "x", local=axes)
+    model.fix(np.flatnonzero(mesh.points[:, 0] == 2), "x", 2e-3, local=axes)
+    stress = axes.stresses(model.solve().stress("node"), model.mesh.points)
+    assert np.abs(stress - [200e6, 0, 0, 0, 0, 0]).max() < 1e-1
+
+
+def test_a_tie_can_be_released_from_supports_and_held_again():
+    """Constraints follow supports that come later, or go."""
+    model = tied(blocks("8N 8N"))
+    before = len(model.supports.constraints)
+    model.fix("z-", name="floor")
+    dependents = model.supports.constraints.dependents
+    assert len(dependents) < before
+    assert not model.supports.fixed.flat[dependents].any()
+    model.release("floor")
+    assert len(model.supports.constraints) == before
+
+
+def test_modes_and_files_know_ties(tmp_path):
+    model = tied(blocks("8N 8N"))
+    model.fix("x-")
+    model.add(kl.Traction("x+", (0, 0, -1e6)))
+    kl.write(tmp_path / "tied.mdpa", model)
+    again = kl.read(tmp_path / "tied.mdpa")
+    assert np.abs(again.modes(3)[0] / model.modes(3)[0] - 1).max() < 1e-9
+
+
+def test_the_summary_names_ties():
+    assert "tie          a.x+ to b.x-: 12 nodes depend on the others" in str(tied(blocks("8N 8N")))
+
+
+def test_nodes_that_hang_on_a_tied_face_are_refused():
+    mesh = kl.join({"a": kl.box(cells=(1, 2, 2)), "b": kl.box(cells=(1, 1, 1), origin=(1, 0, 0))})
+    model = tied(mesh)
+    model.fix("x-")
+    model.add(kl.PointLoad((2.0, 1.0, 1.0), (0, 0, -1e3)))
+    with pytest.raises(kl.ModelError, match="nodes hang there"):
+        model.solve(error=1e-2, most_unknowns=3000)
+
+
+FAR = "neither covers the other: some are 0.5 m apart, farther than"
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "options", "message"),
+    [
+        ("a.x+", "a.x+", {}, "both have node 13, and 11 more"),
+        ("a.x+", "a.y-", {}, "both have node"),
+        ("a.x+", (1.0, 0.0, 0.0), {}, "no face has all its nodes there"),
+        ("a.x-", "b.x+", {}, "neither covers the other; tie parts"),
+        ("a.x+", "b.y-", {}, "neither covers the other"),
+        ("a.x+", "c.x-", {"tolerance": 0.1}, FAR),
+        ("a.x+", "d.x-", {}, "neither covers the other; tie parts"),
+        ("a.x+", "e", {}, "there is no part 'e'"),
+        ("a.x+", "b.x-", {"tolerance": -1.0}, "tolerance of a tie"),
+    ],
+)
+def test_what_cannot_be_tied_is_refused(a, b, options, message):
+    mesh = kl.join(
+        {
+            "a": kl.box(cells=(1, 2, 3)),
+            "b": kl.box(cells=(2, 3, 2), origin=(1, 0, 0)),
+            "c": kl.box(origin=(1.5, 0, 0)),
+            "d": kl.box(cells=(1, 2, 2), origin=(1, 0.6, 0.6)),
+        }
+    )
+    model = kl.Model(mesh, STEEL)
+    with pytest.raises(kl.KratosLiteError, match=message):
+        model.tie(a, b, **options)
