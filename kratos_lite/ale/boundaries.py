@@ -84,23 +84,6 @@ def impedance(material: Material, direction: Array) -> Array:
     return np.asarray((ways * np.sqrt(material.density * squares)) @ ways.T)
 
 
-def periodic_pairs(mesh: Mesh, direction: Array, moving: Mask) -> tuple[Ints, Ints]:
-    """Return moving nodes of the upper cut face and the opposite ones of the lower; ModelError if none."""
-    low, high = cut_nodes(mesh, direction, moving)
-    across = np.eye(3) - np.outer(direction, direction)
-    a, b = mesh.points[low] @ across, mesh.points[high] @ across
-    size = float(np.ptp(mesh.points[moving], axis=0).max())
-    if len(low) == len(high):
-        distance = np.abs(a[:, None, :] - b[None]).max(axis=2)
-        nearest = distance.argmin(axis=0)
-        if len(set(nearest.tolist())) == len(high) and distance.min(axis=0).max() <= FLAT * size:
-            return high, low[nearest]
-    raise ModelError(
-        "periodic boundaries need nodes that lie opposite one another; "
-        f"there are {len(low)} and {len(high)}, not in the same places"
-    )
-
-
 # ---- the part that moves --------------------------------------------------------------------------------
 
 

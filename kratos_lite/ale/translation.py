@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kratos_lite.ale.boundaries import cut_nodes, dashpots, periodic_pairs
+from kratos_lite.ale.boundaries import cut_nodes, dashpots
 from kratos_lite.ale.motion import Motion
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.mesh import Mesh, WhereElements
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
-from kratos_lite.solvers.constraints import Constraints
 from kratos_lite.time_series import Factor
 from kratos_lite.typing import Array, Ints
 from kratos_lite.validation import choice
@@ -92,10 +91,4 @@ class Translation(Motion):
             for nodes in self.open_faces(structure.mesh):
                 structure.fix(nodes)
         elif self.boundaries == "periodic":
-            mesh = structure.mesh
-            dependents, independents = periodic_pairs(mesh, self.direction, self.moving(mesh))
-            dofs = [(3 * nodes[:, None] + np.arange(3)).ravel() for nodes in (dependents, independents)]
-            ones, zeros = np.ones(len(dofs[0])), np.zeros(len(dofs[0]))
-            structure.supports.add_constraints(
-                Constraints.of(dofs[0], dofs[1][:, None], ones, zeros, symmetric=True)
-            )
+            structure.periodic(*self.open_faces(structure.mesh))

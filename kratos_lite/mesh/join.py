@@ -38,7 +38,7 @@ def join(meshes: Mapping[str, Mesh]) -> Mesh:
     >>> import kratos_lite as kl
     >>> mesh = kl.join({"lower": kl.box(), "upper": kl.box(origin=(0, 0, 1))})
     >>> mesh.n_nodes, sorted(mesh.parts)[:3], mesh.nodes("upper.z-").tolist()
-    (16, ['lower', 'lower.x+', 'lower.x-'], [8, 9, 10, 11])
+    (16, ['lower', 'lower.x+', 'lower.x-'], [8, 10, 12, 14])
     """
     if not isinstance(meshes, Mapping) or not meshes:
         raise MeshError("meshes are joined by name, as in kl.join({'lower': mesh, 'upper': other})")

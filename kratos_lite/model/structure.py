@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from kratos_lite import voigt
 from kratos_lite.assembly.element_groups import ElementGroup, element_class, element_groups_of
 from kratos_lite.assembly.sparsity_pattern import PatternCache
 from kratos_lite.elements import ELEMENTS
@@ -27,6 +28,7 @@ from kratos_lite.model.loads import Load, ScaledLoad
 from kratos_lite.model.loads.base import key_of
 from kratos_lite.model.local_axes import Cartesian, LocalAxes, normal_of_plane
 from kratos_lite.model.locking import check_locking
+from kratos_lite.model.matching import Periodic
 from kratos_lite.model.spurious_modes import check_rules, check_spurious_modes
 from kratos_lite.model.supports import DirichletCondition, Supports, axis_numbers
 from kratos_lite.model.ties import Tie
@@ -504,6 +506,45 @@ class Structure(Tabular):
         -1000000
         """
         self.supports.add_tie(Tie(self.mesh, a, b, tolerance))
+
+    def periodic(self, a: Where, b: Where, *, strain: ArrayLike | None = None) -> None:
+        """Make opposite parts periodic, but for the mean strain of the cell: u_b - u_a = E (x_b - x_a).
+
+        A cell may have three pairs of parts with common edges, and supports that hold some of their nodes.
+
+        Parameters
+        ----------
+        a, b : parts, as for `fix`, whose nodes lie opposite one another.
+        strain : of all pairs, one for a cell: (6,), in the order xx yy zz xy yz zx with engineering shear, or
+            (3, 3), the gradient of displacements.  The last one that is given holds; 0 if there is none.
+
+        Raises
+        ------
+        ModelError
+            The nodes do not lie opposite one another.
+        InputError
+            The strain has another shape, or is not finite.
+        MeshError
+            There is no such part or node.
+
+        Examples
+        --------
+        >>> import kratos_lite as kl
+        >>> model = kl.Model(kl.box(), kl.Isotropic3D(E=1e9, nu=0.0))
+        >>> for a, b in (("x-", "x+"), ("y-", "y+"), ("z-", "z+")):
+        ...     model.periodic(a, b, strain=(1e-3, 0, 0, 0, 0, 0))
+        >>> round(float(model.solve().stress()[0, 0, 0]))
+        1000000
+        """
+        old = next((tie for tie in self.supports.ties if isinstance(tie, Periodic)), None)
+        E = np.zeros((3, 3)) if old is None else old.strain
+        if strain is not None:
+            E = finite(strain, "a mean strain")
+            E = E if E.shape != (6,) else voigt.tensor(E * voigt.HALF_SHEAR)
+            E = finite(E, "a mean strain", (3, 3))
+        if old is None or not old.has(a, b):
+            old = Periodic(self.mesh, [*(old.parts if old else []), (a, b)], E)
+        self.supports.add_tie(old.strained(E))
 
     def rigid_modes(self) -> Array:
         """Return the rigid-body modes (3n, 6): translations in x, y and z, rotations about x, y and z."""

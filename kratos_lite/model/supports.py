@@ -289,7 +289,7 @@ class Supports:
             for tie in self.ties:
                 known = self.fixed.copy()
                 known.flat[every.dependents] = True
-                every += tie.constraints(known, self.values)
+                every += tie.constraints(self.fixed, known)
             self._every = self.value_version, every
         return self._every[1]
 
@@ -320,7 +320,9 @@ class Supports:
     def dependents(self) -> Constraints:
         """Return all constraints by free degrees of freedom alone."""
         if self._dependents[0] != self.value_version:
-            self._dependents = self.value_version, self._eliminated(self.values, agree=True)
+            for tie in self.ties:
+                self._check_agreement(*tie.held_twice(self.fixed))
+            self._dependents = self.value_version, self._eliminated(self.values)
         return self._dependents[1]
 
     def constrain(
@@ -360,35 +362,19 @@ class Supports:
             )
         return dofs
 
-    def _eliminated(self, values: Array, agree: bool) -> Constraints:
-        """Return the dependents for prescribed values; those of symmetric ties must agree if requested."""
-        return eliminate(self._ties(agree), self.fixed, values, self.name)
+    def _eliminated(self, values: Array) -> Constraints:
+        """Return the dependents for prescribed values."""
+        return eliminate(self.constraints, self.fixed, values, self.name)
 
-    def _ties(self, agree: bool) -> Constraints:
-        """Return the constraints, symmetric ties with a node that supports hold as independent.
-
-        With `agree`, ModelError where supports move both nodes of a tie, and not alike.
-        """
-        every = self.constraints
-        turned = every.symmetric & self.fixed.flat[every.dependents]
-        if not turned.any():
-            return every
-        partner = every.dependents.copy()
-        partner[every.symmetric] = every.independents[every.start[:-1][every.symmetric]]
-        both = turned & self.fixed.flat[partner]
-        if agree:
-            self._check_agreement(every.dependents[both], partner[both])
-        swap = turned & ~both
-        independents = every.independents.copy()
-        independents[every.start[:-1][swap]] = every.dependents[swap]
-        dependents = np.where(swap, partner, every.dependents)
-        return replace(every, dependents=dependents, independents=independents).take(~both)
-
-    def _check_agreement(self, dependents: Ints, independents: Ints) -> None:
-        """Raise ModelError where supports move tied degrees of freedom, and not alike."""
+    def _check_agreement(self, dependents: Ints, independents: Ints, constants: Array) -> None:
+        """Raise ModelError where supports move tied degrees of freedom, and not by `constants` apart."""
         function, values = self._function.flat, self.values.flat
-        timed = function[dependents] != function[independents]
-        for i in np.flatnonzero(timed | (values[dependents] != values[independents]))[:1]:
+        timed, apart = (
+            function[dependents] != function[independents],
+            values[dependents] - values[independents],
+        )
+        rounding = 1e-9 * max(np.abs(self.values).max(), np.abs(constants).max(initial=0.0))
+        for i in np.flatnonzero(timed | (np.abs(apart - constants) > rounding))[:1]:
             one, other = int(dependents[i]), int(independents[i])
             both = f"{self.name(one)} and {self.name(other)} are tied, but"
             if timed[i]:
@@ -396,8 +382,8 @@ class Supports:
                     f"{both} move differently: give both the same function, or fix only one of them"
                 )
             raise ModelError(
-                f"{both} prescribed as {values[one]:g} m and {values[other]:g} m: give both the same value, "
-                "or fix one only"
+                f"{both} prescribed as {values[one]:g} m and {values[other]:g} m: {constants[i]:g} m must be "
+                "between them, or fix one only"
             )
 
     def check_used(self, used: Mask) -> list[str]:
@@ -417,7 +403,7 @@ class Supports:
         fixed, u = self.fixed, self.values if values is None else values
         dependents = None
         if len(self.constraints):
-            known = self.dependents() if values is None else self._eliminated(values, agree=False)
+            known = self.dependents() if values is None else self._eliminated(values)
             dof_of = np.full(fixed.shape, -1)
             dof_of[nodes] = np.arange(3 * len(nodes)).reshape(-1, 3)
             dependents = known.renumbered(dof_of.ravel())
@@ -450,7 +436,7 @@ def hanging_constraints(mesh: Mesh) -> Constraints:
     """Return the constraints that keep the displacement continuous at the hanging nodes of a mesh."""
     every, h = Constraints.none(), mesh.hanging
     if h is not None:
-        rest = h.weights, np.zeros(len(h)), np.zeros(len(h), dtype=bool)
+        rest = h.weights, np.zeros(len(h))
         for axis in range(3):
             every += Constraints(3 * h.nodes + axis, h.start, 3 * h.independents + axis, *rest)
     return every

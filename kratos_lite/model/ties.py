@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kratos_lite.errors import ModelError
-from kratos_lite.mesh import Block, Mesh, Where
+from kratos_lite.mesh import NO_ROWS, Block, Mesh, Where
 from kratos_lite.model.mortar import NEAR, Cells, Mortar, mortar
 from kratos_lite.solvers.constraints import Constraints
 from kratos_lite.typing import Array, Csr, Ints, Mask
@@ -43,8 +43,12 @@ class PartTie(ABC):
         self.place = type(self), *(nodes.tobytes() for nodes in self.nodes_of)
 
     @abstractmethod
-    def constraints(self, known: Mask, values: Array) -> Constraints:
+    def constraints(self, fixed: Mask, known: Mask) -> Constraints:
         """Return the constraints of degrees of freedom that are not `known` (n, 3): fixed, or dependent."""
+
+    def held_twice(self, fixed: Mask) -> tuple[Ints, Ints, Array]:
+        """Return pairs of degrees of freedom that are fixed, both, and what must be between them in m."""
+        return NO_ROWS, NO_ROWS, np.zeros(0)
 
     @abstractmethod
     def refined(self, finer: RefinedMesh) -> PartTie:
@@ -75,7 +79,7 @@ class Tie(PartTie):
         """Return the tie on a finer mesh."""
         return Tie(finer.mesh, finer.where(self.a), finer.where(self.b), self.tolerance)
 
-    def constraints(self, known: Mask, values: Array) -> Constraints:
+    def constraints(self, fixed: Mask, known: Mask) -> Constraints:
         """Return them; multipliers of what is known go to neighbors, so that they still add up to 1.
 
         With R these sums it is R D (S u_a - W u) = 0, S the inverse of T, in which all that is free besides
@@ -109,8 +113,7 @@ def _constraints(dependents: Ints, rows: Any) -> Constraints:
     rows.eliminate_zeros()
     rows.sort_indices()
     start, others = rows.indptr.astype(np.int64), rows.indices.astype(np.int64)
-    zeros = np.zeros(len(dependents))
-    return Constraints(dependents, start, others, rows.data, zeros, zeros.astype(bool))
+    return Constraints(dependents, start, others, rows.data, np.zeros(len(dependents)))
 
 
 def _checked(tie: Tie) -> Mortar:

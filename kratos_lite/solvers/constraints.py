@@ -29,16 +29,13 @@ class Constraints:
     independents: Ints  # (k,)
     weights: Array  # (k,)
     constants: Array  # (c,) m
-    symmetric: Mask  # (c,), of one to one: where supports hold the dependent, the independent follows
 
     @classmethod
-    def of(
-        cls, dependents: Ints, independents: Ints, weights: Array, constants: Array, symmetric: bool = False
-    ) -> Constraints:
+    def of(cls, dependents: Ints, independents: Ints, weights: Array, constants: Array) -> Constraints:
         """Return constraints (c,) with as many independents (c, k) each."""
         c, k = independents.shape
         start = np.arange(c + 1) * k
-        return cls(dependents, start, independents.ravel(), weights.ravel(), constants, np.full(c, symmetric))
+        return cls(dependents, start, independents.ravel(), weights.ravel(), constants)
 
     @classmethod
     def none(cls) -> Constraints:
@@ -61,7 +58,7 @@ class Constraints:
 
     def __add__(self, other: Constraints) -> Constraints:
         start = np.concatenate([self.start, self.start[-1] + other.start[1:]])
-        names = ("independents", "weights", "constants", "symmetric")
+        names = ("independents", "weights", "constants")
         both = [np.concatenate([getattr(self, name), getattr(other, name)]) for name in names]
         return Constraints(np.concatenate([self.dependents, other.dependents]), start, *both)
 
@@ -75,14 +72,13 @@ class Constraints:
             self.independents[entries],
             self.weights[entries],
             self.constants[keep],
-            self.symmetric[keep],
         )
 
     def renumbered(self, dof_of: Ints) -> Constraints:
         """Return those whose dependents have a new number, by the new numbers of all dofs, or -1."""
         kept = self.take(dof_of[self.dependents] >= 0)
         dofs = dof_of[kept.dependents], kept.start, dof_of[kept.independents]
-        return Constraints(*dofs, kept.weights, kept.constants, kept.symmetric)
+        return Constraints(*dofs, kept.weights, kept.constants)
 
 
 def eliminate(
@@ -116,7 +112,7 @@ def eliminate(
         constants, W, P = constants + P @ constants, W + P @ W, P @ P
     W.sort_indices()
     start, dofs = W.indptr.astype(np.int64), W.indices.astype(np.int64)
-    return Constraints(dependents, start, dofs, W.data, constants, np.zeros(count, dtype=bool))
+    return Constraints(dependents, start, dofs, W.data, constants)
 
 
 def _check(dependents: Ints, fixed: Mask, name: Callable[[int], str]) -> None:

@@ -25,7 +25,6 @@ def rows(*given):
         np.array(dofs, dtype=np.int64),
         np.array(weights, dtype=float),
         np.array([constant for _, _, constant in given], dtype=float),
-        np.zeros(len(given), dtype=bool),
     )
 
 

@@ -212,6 +212,5 @@ def _constrain(model: Model, document: Document) -> None:
         dofs([pair for constraint in known for pair in constraint.independents]),
         np.array([weight for constraint in known for weight in constraint.weights]),
         np.array([constraint.constant for constraint in known]),
-        np.zeros(len(known), dtype=bool),
     )
     model.supports.add_constraints(constraints)

@@ -1,0 +1,111 @@
+"""Ties of nodes that lie opposite one another: periodic cells, and cuts of bolts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kratos_lite.errors import ModelError
+from kratos_lite.mesh import Mesh, Where, components
+from kratos_lite.model.ties import PartTie, name_of
+from kratos_lite.solvers.constraints import Constraints
+from kratos_lite.typing import Array, Ints, Mask
+
+if TYPE_CHECKING:
+    from kratos_lite.mesh.refined_mesh import RefinedMesh
+
+FLAT = 1e-6
+"""Fraction of the size of the mesh by which nodes may be off the places opposite."""
+
+
+def opposite(mesh: Mesh, a: Ints, b: Ints, shift: Array | None = None) -> Ints:
+    """Return the nodes (k,) of a that lie opposite those of b; ModelError if there are none.
+
+    `shift` (3,) in m is the way from a to b, that of their lowest coordinates if not given.
+    """
+    from scipy.spatial import cKDTree
+
+    X, Y = mesh.points[a], mesh.points[b]
+    if len(a) and len(a) == len(b):
+        way = Y.min(axis=0) - X.min(axis=0) if shift is None else shift
+        apart, at = map(np.asarray, cKDTree(X + way).query(Y))
+        if apart.max() <= FLAT * np.ptp(mesh.extent, axis=0).max() and len(np.unique(at)) == len(a):
+            return np.asarray(a[at])
+    raise ModelError(
+        "periodic boundaries and cuts need nodes that lie opposite one another; "
+        f"there are {len(a)} and {len(b)}, not in the same places"
+    )
+
+
+class Periodic(PartTie):
+    """Opposite nodes differ by a mean strain: u_b - u_a = E (x_b - x_a), for all pairs of parts together.
+
+    Nodes of edges and corners are in several pairs: one node of each class stands for all, which is one that
+    supports hold if there is any.
+    """
+
+    def __init__(self, mesh: Mesh, parts: Sequence[tuple[Where, Where]], strain: Array) -> None:
+        self.mesh, self.parts, self.strain = mesh, list(parts), strain
+        nodes = [[mesh.nodes(one) for one in where] for where in parts]
+        self.nodes_of = [one for both in nodes for one in both]
+        self.names = [" and ".join(map(name_of, *both)) for both in zip(parts, nodes, strict=True)]
+        pairs = [np.stack([opposite(mesh, a, b), b], axis=1) for a, b in nodes]
+        self.ways = np.array([np.subtract(*mesh.points[pair[0, ::-1]]) for pair in pairs])
+        every = np.concatenate(pairs)
+        if (every[:, 0] == every[:, 1]).any():
+            raise ModelError("a periodic pair has one part twice; give the two opposite parts")
+        self.label = components(mesh.n_nodes, every)
+        self.members = np.unique(every)
+        self.place, self.equations = Periodic, every.tobytes()
+
+    def __str__(self) -> str:
+        E = ", ".join(f"{value:g}" for value in self.strain.ravel())
+        return f"{', '.join(self.names)} periodic, mean gradient ({E})"
+
+    def has(self, a: Where, b: Where) -> bool:
+        """Return whether two parts are a pair already."""
+        new = [self.mesh.nodes(where) for where in (a, b)]
+        known = zip(self.nodes_of[::2], self.nodes_of[1::2], strict=True)
+        return any(all(map(np.array_equal, pair, new)) for pair in known)
+
+    def strained(self, strain: Array) -> Periodic:
+        """Return the same pairs with another mean strain (3, 3)."""
+        new = copy(self)
+        new.strain = strain
+        return new
+
+    def refined(self, finer: RefinedMesh) -> Periodic:
+        """Return the pairs on a finer mesh; ModelError where its nodes are not opposite one another."""
+        return Periodic(finer.mesh, [(finer.where(a), finer.where(b)) for a, b in self.parts], self.strain)
+
+    def _dependents(self, fixed: Mask, axis: int) -> tuple[Ints, Ints, Array]:
+        """Return members, the node that stands for each, and what is between their displacements."""
+        stands, held = self.label.copy(), self.members[fixed[self.members, axis]]
+        stands[self.label[held[::-1]]] = held[::-1]
+        other = stands[self.label[self.members]]
+        way = self.mesh.points[self.members] - self.mesh.points[other]
+        differs = other != self.members
+        return self.members[differs], other[differs], (way @ self.strain[axis])[differs]
+
+    def constraints(self, fixed: Mask, known: Mask) -> Constraints:
+        """Return what ties members that supports do not hold."""
+        every = Constraints.none()
+        for axis in range(3):
+            nodes, others, constants = self._dependents(fixed, axis)
+            free = ~fixed[nodes, axis]
+            dofs, independents = 3 * nodes[free] + axis, 3 * others[free] + axis
+            every += Constraints.of(dofs, independents[:, None], np.ones(len(dofs)), constants[free])
+        return every
+
+    def held_twice(self, fixed: Mask) -> tuple[Ints, Ints, Array]:
+        """Return members that supports hold, as the node that stands for them."""
+        pairs, between = [], []
+        for axis in range(3):
+            nodes, others, constants = self._dependents(fixed, axis)
+            both = fixed[nodes, axis]
+            pairs.append(3 * np.stack([nodes, others])[:, both] + axis)
+            between.append(constants[both])
+        return *np.concatenate(pairs, axis=1), np.concatenate(between)
