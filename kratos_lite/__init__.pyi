@@ -28,6 +28,7 @@ from kratos_lite.analysis.plot import animate as animate
 from kratos_lite.analysis.plot import plot as plot
 from kratos_lite.analysis.point_values import LineValues as LineValues
 from kratos_lite.analysis.point_values import PointValues as PointValues
+from kratos_lite.analysis.quantities import Compliance as Compliance
 from kratos_lite.analysis.quantities import DisplacementAt as DisplacementAt
 from kratos_lite.analysis.quantities import MeanDisplacement as MeanDisplacement
 from kratos_lite.analysis.quantities import Quantity as Quantity

@@ -177,6 +177,7 @@ class Fields(Protocol):
     groups: list[ElementGroup]
     u: Array
     reactions: Array
+    loads: Array
 
     def field(self, name: str, at: str, local: LocalAxes | None = None) -> Any:
         """Return a field at a place, along local axes if these are not x y z."""

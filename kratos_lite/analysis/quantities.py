@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import ClassVar
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, ClassVar
 
 import numpy as np
 
 from kratos_lite.analysis.fields import COMPONENTS, Fields
 from kratos_lite.assembly.element_groups import ElementGroup, add_nodal
-from kratos_lite.assembly.gauss_point_fields import body_force, volumes
+from kratos_lite.assembly.gauss_point_fields import volumes
+from kratos_lite.assembly.nodal_values import at_located, strain_of
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import ModelError
 from kratos_lite.mesh import Where
+from kratos_lite.model.loads import Load
+from kratos_lite.model.loads.body import BodyForce
 from kratos_lite.model.loads.surface import Traction
+from kratos_lite.model.loads.temperature import heated
 from kratos_lite.model.supports import AXES
 from kratos_lite.typing import Array, ArrayLike
 from kratos_lite.validation import choice, finite
@@ -61,6 +67,34 @@ class Quantity(ABC):
         (n, 3) in the unit of the value per m.
         """
         return np.zeros_like(result.u)
+
+    def derivative(self, result: Fields) -> Array:
+        """Return ∂Q/∂u itself; `load` if the class has nothing else.
+
+        Parameters
+        ----------
+        result : of any analysis.
+
+        Returns
+        -------
+        (n, 3) in the unit of the value per m.
+        """
+        return self.load(result)
+
+    def explicit(self, result: Any, wrt: str, of_loads: Callable[[Array], Array]) -> Array | float:
+        """Return the derivative of Q where the displacements stay; 0 if the class has none.
+
+        Parameters
+        ----------
+        result : of a static analysis.
+        wrt : as of `Result.gradient`.
+        of_loads : takes v (n, 3) in m, and returns that of the work v·f of the loads.
+
+        Returns
+        -------
+        As `Result.gradient` does.
+        """
+        return 0.0
 
     def motion(self, result: Fields) -> Array:
         """Return by how much the adjoint solution displaces supports; 0 if the class does not.
@@ -118,6 +152,8 @@ def _text(value: object) -> str:
 
 class DisplacementAt(Quantity):
     """The displacement of a point along an axis, as ``result.at(point).displacement``.
+
+    In derivatives by coordinates the point moves with its element.
 
     Parameters
     ----------
@@ -202,23 +238,61 @@ class MeanDisplacement(Quantity):
         ModelError
             The part has neither a face on the boundary nor an element.
         """
+        load = self._over_part(result).forces(result.mesh, result.groups)
+        return load / load.sum()
+
+    def explicit(self, result: Any, wrt: str, of_loads: Callable[[Array], Array]) -> Array | float:
+        """Return ∂(∫ u dA / A), of coordinates alone."""
+        if wrt != "coordinates":
+            return 0.0
+        over, known = self._over_part(result), (result.mesh, result.groups)
+        return over.by_coordinates(*known, result.u - self.value(result)) / over.forces(*known).sum()
+
+    def _over_part(self, result: Fields) -> Load:
+        """Return the load of 1 along the axis over the faces of the part, or the volume of its elements."""
         mesh, direction = result.mesh, np.eye(3)[AXES.index(self.axis)]
         if mesh.faces(self.part):
-            load = Traction(self.part, direction).forces(mesh, result.groups)
-            return load / load.sum()
+            return Traction(self.part, direction)
         inside = np.zeros(mesh.n_nodes, dtype=bool)
         inside[mesh.nodes(self.part)] = True
-        load = np.zeros_like(result.u)
-        for group in result.groups:
-            chosen = np.asarray(inside[group.nodes].all(axis=1))
-            if chosen.any():
-                load += body_force(mesh.points, group.take(chosen), direction)
-        if not load.any():
+        rows = [group.rows[inside[group.nodes].all(axis=1)] for group in result.groups]
+        if not any(map(len, rows)):
             raise ModelError(
                 f"{self}: the part has neither a face on the boundary nor an element; a mean needs one, "
                 "DisplacementAt takes a point"
             )
-        return load / load.sum()
+        return BodyForce(direction, where=np.concatenate(rows))
+
+
+class Compliance(Quantity):
+    """The work f·u of the loads on the displacements: twice the strain energy where loads alone act.
+
+    Where the supports are at rest and nothing is stressed without loads, u itself is its adjoint.
+
+    Examples
+    --------
+    >>> import kratos_lite as kl
+    >>> bar = kl.Model(kl.box((1, 1, 1)), kl.Isotropic3D(E=1e6, nu=0.0))
+    >>> bar.fix("z-")
+    >>> bar.add(kl.Traction("z+", (0, 0, 5.0)))
+    >>> result = bar.solve()
+    >>> print(f"{kl.Compliance().value(result):.3e} J, {2 * result.energy():.3e} J")
+    2.500e-05 J, 2.500e-05 J
+    """
+
+    unit = "J"
+
+    def value(self, result: Fields) -> float:
+        """Return f·u in J."""
+        return float((result.loads * result.u).sum())
+
+    def load(self, result: Fields) -> Array:
+        """Return the loads f (n, 3) in N."""
+        return result.loads
+
+    def explicit(self, result: Any, wrt: str, of_loads: Callable[[Array], Array]) -> Array | float:
+        """Return that of the loads."""
+        return of_loads(result.u)
 
 
 class ReactionOf(Quantity):
@@ -267,7 +341,7 @@ class StressAt(Quantity):
     """A component of the stress at a point, as ``result.at(point).stress``.
 
     It is that of the element which holds the point.  Recovered stresses at nodes are closer, as a rule, and
-    the estimate of the error goes by them.
+    the estimate of the error goes by them.  In derivatives by coordinates the point moves with its element.
 
     Parameters
     ----------
@@ -309,6 +383,50 @@ class StressAt(Quantity):
         stress = np.broadcast_to(C[component] / placed.dV.sum(), (*placed.dV.shape, 6))
         add_nodal(load, group.nodes, placed.internal_force(stress, C))
         return load
+
+    def derivative(self, result: Fields) -> Array:
+        """Return the row of C B (n, 3) in Pa/m at the point."""
+        group, X, xi = self._holder(result)
+        k = group.nodes.shape[1]
+        unit = np.eye(3 * k).reshape(3 * k, k, 3)
+        stress = self._stress(group, np.repeat(X, 3 * k, axis=0), xi, unit)
+        load = np.zeros_like(result.u)
+        load[group.nodes[0]] = stress.reshape(k, 3)
+        return load
+
+    def explicit(self, result: Any, wrt: str, of_loads: Callable[[Array], Array]) -> Array | float:
+        """Return ∂(C ε) of the element around the point: of its stiffness, its nodes, or temperatures."""
+        located, c = result.mesh.locate(self.point, required=True), COMPONENTS.index(self.component)
+        group, X, xi = self._holder(result)
+        if wrt == "stiffness":
+            out, elastic = np.zeros(result.mesh.n_elements), replace(group, prestress=None)
+            out[group.rows] = at_located([elastic], located, result._strained)[c]
+            return out
+        if wrt == "coordinates":
+            X, u = X - X.mean(axis=1), result._strained[group.nodes]
+            step = 1e-5 * np.ptp(X, axis=1).min()
+            moves = step * np.eye(X.size).reshape(-1, *X.shape[1:])
+            there, back = (self._stress(group, X + s * moves, xi, u) for s in (1, -1))
+            out = np.zeros_like(result.u)
+            out[group.nodes[0]] = ((there - back) / (2 * step)).reshape(-1, 3)
+            return out
+        if wrt == "loads":
+            cold, rest = [group.without_initial], np.zeros_like(result.u)
+            warm = [heated(result.mesh, cold, load.acting(0.0)) for load in result._acting]
+            return np.array([at_located(groups, located, rest)[c] for groups in warm])
+        return 0.0
+
+    def _holder(self, result: Fields) -> tuple[ElementGroup, Array, Array]:
+        """Return the element that holds the point, its nodes X (1, k, 3) and ξ (3,)."""
+        located = result.mesh.locate(self.point, required=True)
+        group = next(g for g in result.groups if (g.rows == located.rows).any())
+        group = group.take(np.asarray(group.rows == located.rows))
+        return group, result.mesh.points[group.nodes], located.xi
+
+    def _stress(self, group: ElementGroup, X: Array, xi: Array, u: Array) -> Array:
+        """Return the component (p,) of C B u at ξ of elements X (p, k, 3) under u (p, k, 3)."""
+        strain = strain_of(group, X, np.broadcast_to(xi, (len(X), 3)), np.broadcast_to(u, X.shape))
+        return np.asarray(strain @ group.material.C[COMPONENTS.index(self.component)])
 
     def local(self, result: Fields) -> Array:
         """Return the difference of the error at the point, by recovered stresses, from its mean around."""

@@ -35,9 +35,6 @@ from kratos_lite.solvers.linear_solver import Solution
 from kratos_lite.typing import Array, Mask, Progress
 from kratos_lite.validation import finite
 
-ADJOINT_TOLERANCE = 1e-5
-"""Relative residual that is enough for the adjoint: its own error on the mesh is far larger."""
-
 
 class StaticAnalysis:
     """The static analysis of a structure, for many sets of loads; made by `Model.static`.
@@ -206,7 +203,9 @@ class StaticAnalysis:
             "skipped": self._skipped(case.moving),
         }
         fields = u, reactions, case.external
-        return result_of(Result, self, model, case.groups, fields, solution, balance, **report)
+        result = result_of(Result, self, model, case.groups, fields, solution, balance, **report)
+        result._acting = case.loads
+        return result
 
     def release(self) -> None:
         """Release the matrix and what is made of it; another solution makes them anew."""
@@ -214,10 +213,11 @@ class StaticAnalysis:
             self._equations.system.destroy()
         self._equations = None
 
-    def adjoint(self, load: Array, motion: Array) -> Array:
+    def adjoint(self, load: Array, motion: Array, tolerance: float | None = None) -> Array:
         """Return the displacement (n, 3) in m under a load (n, 3) in N alone, supports displaced by a motion.
 
         The motion (n, 3) in m is read where a displacement is prescribed; ModelError where nothing is.
+        The tolerance is that of the analysis if not given.
         """
         self._follow()
         supports, load = self.model.supports, self._state.free.balanced(load)
@@ -229,7 +229,7 @@ class StaticAnalysis:
             return np.zeros_like(load)
         system = self._equations_of(moving).system
         displaced, at_rest = (supports.constraint_map(system.nodes, u).c for u in (moved, 0.0 * moved))
-        return system.solve(load, displaced - at_rest, max(self.tolerance, ADJOINT_TOLERANCE))[0]
+        return system.solve(load, displaced - at_rest, tolerance)[0]
 
     def _initial_roundoff(self, forces: Array) -> float:
         """Return what rounding and the solver leave of the forces (n, 3) of an initial state, in N."""

@@ -6,18 +6,30 @@ are computed by their methods in cache-sized chunks.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from kratos_lite import voigt
-from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, as_double, by_mass_rule, compiled
+from kratos_lite.assembly.element_groups import (
+    ElementGroup,
+    add_nodal,
+    as_double,
+    by_mass_rule,
+    compiled,
+    geometries_of,
+)
 from kratos_lite.elements import KinematicLinear, custom, tables
 from kratos_lite.elements import total_lagrangian as lagrange
+from kratos_lite.elements.exact_rules import CURVED
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.shapes.inverse import determinant
 from kratos_lite.typing import Array, Ints, Mask, Rows
+
+STEP = 2e-5
+"""Of differences by coordinates, beside volume over length²: rounding and curvature are 1e-10 of terms."""
 
 
 def displaced(points: Array, group: ElementGroup, u: Array, stress: bool = True) -> tuple[Any, ...]:
@@ -84,6 +96,24 @@ def body_force_by_function(
     return total
 
 
+def body_work(
+    points: Array, group: ElementGroup, b: Any, v: Array, curved: bool = False
+) -> Iterator[tuple[Ints, Rows, Array, Array]]:
+    """Yield elements (m,), their nodes, v·b dV (m, g) in J and grad N (m, g, 3, k) in 1/m, by exact rules.
+
+    v (n, 3) in m; b (3,), (n, 3), or a function of places, in N/m³.  The rules are also exact for cells
+    whose nodes move, if `curved`.
+    """
+    geometry_of = np.full(len(group), CURVED) if curved else geometries_of(points, group)
+    for mask, rule in group.element.mass_rules(geometry_of, 4 if callable(b) else b.ndim):
+        part, N = replace(group.take(mask), rule=rule), tabulate(group.element.shape, rule)[0]
+        for chunk in part.chunks():
+            nodes, (dV, D) = part.nodes[chunk], part.at(points, chunk)._gauss
+            X = N @ points[nodes]
+            force = b(X.reshape(-1, 3)).reshape(X.shape) if callable(b) else N @ b[nodes] if b.ndim > 1 else b
+            yield part.rows[chunk], nodes, ((N @ v[nodes]) * force).sum(axis=-1) * dV, D
+
+
 # ---- strains and stresses --------------------------------------------------------------------------
 
 
@@ -143,6 +173,33 @@ def internal_load(points: Array, groups: Sequence[ElementGroup], u: Array) -> Ar
             continue
         for chunk in group.chunks():
             add_nodal(total, group.nodes[chunk], _internal_forces(group.at(points, chunk), group, u, chunk))
+    return total
+
+
+def virtual_work(X: Array, group: ElementGroup, u: Array, v: Array) -> Array:
+    """Return v·∫ B^T σ dV (m,) in J of elements X under u with virtual displacements v, all (m, k, 3)."""
+    nodes = np.arange(X[..., 0].size, dtype=np.int32).reshape(X.shape[:2])  # none is shared
+    forces = internal_load(X.reshape(-1, 3), [replace(group, nodes=nodes)], u.reshape(-1, 3))
+    return np.asarray((forces.reshape(X.shape) * v).sum(axis=(1, 2)))
+
+
+def work_by_coordinates(points: Array, group: ElementGroup, u: Array, v: Array) -> Array:
+    """Return the derivative (n, 3) in N of v·∫ B^T σ dV of a group by the nodes, u and v (n, 3) in m.
+
+    By central differences of each element.
+    """
+    total, nodes = np.zeros_like(points), group.nodes
+    X, u, v = (values[nodes] for values in (points, u, v))
+    X = X - X.mean(axis=1, keepdims=True)
+    step = STEP * volumes(points, group).sum(axis=1) / np.square(np.ptp(X, axis=1)).sum(axis=1)
+    change = np.zeros_like(X)
+    for a, i in np.ndindex(X.shape[1:]):
+        there, back = X.copy(), X.copy()
+        there[:, a, i] += step
+        back[:, a, i] -= step
+        difference = virtual_work(there, group, u, v) - virtual_work(back, group, u, v)
+        change[:, a, i] = difference / (there - back)[:, a, i]
+    add_nodal(total, nodes, change)
     return total
 
 

@@ -97,7 +97,7 @@ def at_located(groups: Sequence[ElementGroup], located: Located, u: Array, *, st
         if not group.is_linear:
             value = _extrapolated(group, cells, xi[at], lambda g: at_gauss(points, g, u, stress=stress))
         else:
-            value = _strain(group, points[group.nodes[cells]], xi[at], u[group.nodes[cells]])
+            value = strain_of(group, points[group.nodes[cells]], xi[at], u[group.nodes[cells]])
             if stress:
                 value = value @ group.material.C.T
                 value = value if group.prestress is None else value + group.prestress[cells]
@@ -142,7 +142,7 @@ def _extrapolated(
     return np.einsum("ck,ckj->cj", group.element.N(xi), raw)
 
 
-def _strain(group: ElementGroup, X: Array, xi: Array, u: Array) -> Array:
+def strain_of(group: ElementGroup, X: Array, xi: Array, u: Array) -> Array:
     """Return the strain (k, 6) of elements X (k, n, 3) under u (k, n, 3), each at its own xi (k, 3)."""
     element = group.element
     if element.has_standard_strain():

@@ -89,6 +89,36 @@ class Load(ABC):
         """
         yield from ()
 
+    def by_coordinates(self, mesh: Mesh, groups: Sequence[ElementGroup], v: Array) -> Array:
+        """Return the derivative of the work v·f of the forces by the coordinates of nodes.
+
+        Parameters
+        ----------
+        mesh, groups : as for `forces`.
+        v : (n, 3) m, displacements.
+
+        Returns
+        -------
+        (n, 3) in N.
+
+        Raises
+        ------
+        ModelError
+            The class does not know it.
+        """
+        raise self.without_derivative("its class defines no by_coordinates(mesh, groups, v)")
+
+    def without_derivative(self, why: str) -> ModelError:
+        """Return the error for a load that has no derivative by coordinates."""
+        return ModelError(
+            f"{self!r} has no derivative by coordinates: {why}; take constant or nodal tractions, pressures, "
+            "body forces and forces"
+        )
+
+    def by_density(self, mesh: Mesh, groups: Sequence[ElementGroup], v: Array) -> Array:
+        """Return the derivative (m,) of the work v·f, v (n, 3) in m, by the density of each element."""
+        return np.zeros(mesh.n_elements)
+
     def check(self, mesh: Mesh) -> None:
         """Raise MeshError if `where` of the load names no part or node; `Structure.add` asks for it."""
         where = getattr(self, "where", None)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from kratos_lite.assembly import gauss_point_fields
-from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.assembly.element_groups import ElementGroup, add_nodal
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh, WhereElements
 from kratos_lite.model.loads.base import DistributedLoad, OfPlace, placed, vectors
@@ -58,21 +58,40 @@ class BodyForce(DistributedLoad):
         InputError
             A nodal force has another number of nodes, or a function does not return forces.
         """
-        points, total = mesh.points, np.zeros_like(mesh.points)
-        carriers = np.zeros(mesh.n_elements, dtype=bool)
-        carriers[mesh.elements(self.where)] = True
-        force = placed(self.force, self.local, self.what[0])
-        if not callable(force) and force.ndim == 2 and len(force) != len(points):
-            name = type(self).__name__
-            raise InputError(f"a nodal {name} needs shape ({len(points)}, 3); got {force.shape}")
-        for group in groups:
-            part, scale = group.take(carriers[group.rows]), self._scale(group)
-            if not (len(part) and scale):
+        points, total, force = mesh.points, np.zeros_like(mesh.points), self._checked_force(mesh)
+        for part in self._carriers(mesh, groups):
+            scale = self._scale(part)
+            if not scale:
                 continue
             if callable(force):
                 total += scale * gauss_point_fields.body_force_by_function(points, part, force, factors)
             elif force.any():
                 total += gauss_point_fields.body_force(points, part, scale * force)
+        return total
+
+    def _checked_force(self, mesh: Mesh) -> Any:
+        """Return the force as an array, or a function of places that is checked."""
+        force, n = placed(self.force, self.local, self.what[0]), mesh.n_nodes
+        if not callable(force) and force.ndim == 2 and len(force) != n:
+            raise InputError(f"a nodal {type(self).__name__} needs shape ({n}, 3); got {force.shape}")
+        return force
+
+    def _carriers(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> list[ElementGroup]:
+        """Return the elements that carry the force."""
+        carriers = np.zeros(mesh.n_elements, dtype=bool)
+        carriers[mesh.elements(self.where)] = True
+        parts = [group.take(carriers[group.rows]) for group in groups]
+        return [part for part in parts if len(part)]
+
+    def by_coordinates(self, mesh: Mesh, groups: Sequence[ElementGroup], v: Array) -> Array:
+        """Return ∫ v·b div N dV (n, 3) in N; ModelError of a function of places."""
+        force, total = self._checked_force(mesh), np.zeros_like(mesh.points)
+        if callable(force):
+            raise self.without_derivative("it is a function of places, or along local axes")
+        for part in self._carriers(mesh, groups):
+            works = gauss_point_fields.body_work(mesh.points, part, force, v, curved=True)
+            for _, nodes, work, D in works:
+                add_nodal(total, nodes, self._scale(part) * np.einsum("mg,mgik->mki", work, D))
         return total
 
     def _refined_where(self, finer: RefinedMesh) -> WhereElements:
@@ -109,3 +128,11 @@ class Gravity(BodyForce):
     def _scale(self, group: ElementGroup) -> float:
         """Return the density."""
         return group.material.density
+
+    def by_density(self, mesh: Mesh, groups: Sequence[ElementGroup], v: Array) -> Array:
+        """Return ∫ v·g dV (m,) of each element, in J m³/kg."""
+        out, force = np.zeros(mesh.n_elements), self._checked_force(mesh)
+        for part in self._carriers(mesh, groups):
+            for rows, _, work, _ in gauss_point_fields.body_work(mesh.points, part, force, v):
+                out[rows] = work.sum(axis=1)
+        return out

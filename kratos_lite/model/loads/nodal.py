@@ -93,6 +93,12 @@ class PointLoad(Load):
         """Return the force along x y z at points (..., 3) in m."""
         return self.force if self.local is None else self.local.globally(self.force, points)
 
+    def by_coordinates(self, mesh: Mesh, groups: Sequence[ElementGroup], v: Array) -> Array:
+        """Return 0: the point moves with its element; ModelError of one along local axes."""
+        if self.local is not None:
+            raise self.without_derivative("it is along local axes")
+        return np.zeros_like(v)
+
     def refined(self, finer: RefinedMesh) -> Load:
         """Return the load on a finer mesh: on the same nodes or point."""
         same = finer.coarse.nodes(self.where) if self._point is None else self.where
@@ -136,6 +142,10 @@ class NodalForces(Load):
         if self.values.shape != mesh.points.shape:
             raise InputError(f"nodal forces need shape {mesh.points.shape}; got {self.values.shape}")
         return self.values.copy()
+
+    def by_coordinates(self, mesh: Mesh, groups: Sequence[ElementGroup], v: Array) -> Array:
+        """Return 0."""
+        return np.zeros_like(v)
 
     def refined(self, finer: RefinedMesh) -> Load:
         """Return the load on a finer mesh: on the same nodes."""

@@ -48,6 +48,19 @@ class FaceLoad(DistributedLoad):
             add_nodal(total, block.nodes, forces)
         return total
 
+    def by_coordinates(self, mesh: Mesh, groups: Sequence[ElementGroup], v: Array) -> Array:
+        """Return the derivative (n, 3) in N of v·f by the nodes; ModelError of a function of places."""
+        if callable(getattr(self, self.nodal[0], None)) or self.local is not None:
+            raise self.without_derivative("it is a function of places, or along local axes")
+        total, faces = np.zeros_like(v), _faces(mesh, self.where, self.what, self.cells)
+        for block, tangent in zip(faces, self.tangents(mesh, faces), strict=True):
+            add_nodal(total, block.nodes, np.einsum("mac,macbi->mbi", v[block.nodes], tangent))
+        return total
+
+    def tangents(self, mesh: Mesh, faces: list[Block]) -> Iterable[Array]:
+        """Return the derivatives (m, k, 3, k, 3) in N/m of the forces by the nodes of each face."""
+        raise self.without_derivative("all of its faces share it")
+
 
 class Traction(FaceLoad):
     """Force per area on the faces of a part.
@@ -77,6 +90,12 @@ class Traction(FaceLoad):
         for block in faces:
             t = _on(block, traction, mesh, self.what, (3,))
             yield surface_load(block.known_shape, mesh.points[block.nodes], t, factors)
+
+    def tangents(self, mesh: Mesh, faces: list[Block]) -> Iterable[Array]:
+        """Return the derivatives (m, k, 3, k, 3) in N/m of ∫ N t dA."""
+        for block in faces:
+            X, t = mesh.points[block.nodes], _on(block, self.traction, mesh, self.what, (3,))
+            yield surface_load_tangent(block.known_shape, X, np.broadcast_to(t, X.shape))
 
 
 class LineLoad(Traction):
@@ -141,6 +160,13 @@ class Pressure(FaceLoad):
             if self.normal == "outward":
                 forces *= outward(mesh, block)[:, None, None]
             yield forces
+
+    def tangents(self, mesh: Mesh, faces: list[Block]) -> Iterable[Array]:
+        """Return the derivatives (m, k, 3, k, 3) in N/m of -∫ N p n dA."""
+        for block in faces:
+            X, p = mesh.points[block.nodes], _on(block, self.pressure, mesh, self.what, ())
+            sign = outward(mesh, block)[:, None, None, None, None] if self.normal == "outward" else 1.0
+            yield sign * surface_pressure_tangent(block.known_shape, X, p)
 
     def follow(self, mesh: Mesh, x: Array) -> Iterator[tuple[Rows, Array, Array]]:
         """Yield what deformed faces change, if the pressure follows them."""
@@ -248,16 +274,30 @@ class ConditionLoads(Load):
 
     def follow(self, mesh: Mesh, x: Array) -> Iterator[tuple[Rows, Array, Array]]:
         """Yield what deformed faces and lines change; a force per area keeps its direction."""
+        yield from self._deformed(mesh, x, self.following)
+
+    def by_coordinates(self, mesh: Mesh, groups: Sequence[ElementGroup], v: Array) -> Array:
+        """Return the derivative (n, 3) in N of v·f by the nodes."""
+        total = np.zeros_like(v)
+        for nodes, _, tangent in self._deformed(mesh, mesh.points, ""):
+            add_nodal(total, nodes, np.einsum("mac,macbi->mbi", v[nodes], tangent))
+        return total
+
+    def _deformed(
+        self, mesh: Mesh, x: Array, names: str | tuple[str, ...]
+    ) -> Iterator[tuple[Rows, Array, Array]]:
+        """Yield what `follow` does, of conditions whose names begin so."""
         for block, at in with_rows(mesh.conditions):
-            if not len(block) or not block.name.startswith(self.following) or block.shape is None:
+            shape = block.shape
+            if not len(block) or not block.name.startswith(names) or shape is None or shape.cell == "point":
                 continue
             X, deformed = mesh.points[block.nodes], x[block.nodes]
-            t = self.force[at, None, :] + self.nodal_force[block.shape.cell][block.nodes]
+            t = self.force[at, None, :] + self.nodal_force[shape.cell][block.nodes]
             if t.any():
-                more = surface_load(block.shape, deformed, t) - surface_load(block.shape, X, t)
-                yield block.nodes, more, surface_load_tangent(block.shape, deformed, t)
+                more = surface_load(shape, deformed, t) - surface_load(shape, X, t)
+                yield block.nodes, more, surface_load_tangent(shape, deformed, t)
             pressure = self.pressure[at, None] + self.nodal_pressure[block.nodes]
-            if block.shape.cell in SURFACES and pressure.any():
+            if shape.cell in SURFACES and pressure.any():
                 yield _pressed(block, mesh, x, pressure)
 
     def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:

@@ -96,6 +96,12 @@ class Temperature(Load):
         """Return no forces: a temperature strains, and pushes nothing."""
         return np.zeros_like(mesh.points)
 
+    def by_coordinates(self, mesh: Mesh, groups: Sequence[ElementGroup], v: Array) -> Array:
+        """Return 0, of temperatures of nodes; ModelError of a function of places."""
+        if callable(self.values):
+            raise self.without_derivative("it is a function of places")
+        return np.zeros_like(v)
+
     def warnings(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
         """Return a warning if no element swells."""
         has = np.zeros(mesh.n_elements, dtype=bool)
