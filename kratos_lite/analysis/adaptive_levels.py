@@ -211,7 +211,8 @@ def _variation(result: Result, along: Ints) -> float:
             cells = along[group.rows] == axis
             off = _off_mean(group.rule, axis) @ stress[cells]
             density[cells] = ((off @ np.linalg.inv(group.material.C)) * off).sum(axis=-1)
-        total += float((density * volumes(result.mesh.points, group)).sum())
+        over = 1.0 if group.factors is None else group.factors[:, None]
+        total += float((density / over * volumes(result.mesh.points, group)).sum())
     return total
 
 

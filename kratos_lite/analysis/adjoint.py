@@ -58,7 +58,7 @@ def gradient_of(
     Source: Haftka & Gürdal, Elements of Structural Optimization (1992), section 7.2.
     """
     by = "stiffness" if choice(wrt, "wrt", WRT) == "E" else wrt
-    E = _moduli(result) if wrt == "E" else 1.0
+    E: Array | float = _moduli(result) if wrt == "E" else 1.0
     if by == "coordinates":
         _check_supports(model)
     if by != "stiffness":
@@ -94,7 +94,8 @@ def _of_stresses(result: Any, by: str, z: Array) -> Array | float:
         out = np.zeros(mesh.n_elements)
         for group in groups:
             X, strained, v = (values[group.nodes] for values in (mesh.points, u, z))
-            out[group.rows] = virtual_work(X, replace(group, prestress=None), strained, v)
+            plain = replace(group, prestress=None, factors=None)
+            out[group.rows] = virtual_work(X, plain, strained, v)
         return out
     if by == "coordinates":
         return np.asarray(sum(work_by_coordinates(mesh.points, group, u, z) for group in groups))
@@ -115,7 +116,7 @@ def _is_own_adjoint(result: Any, model: Structure) -> bool:
 
 
 def _moduli(result: Any) -> Array:
-    """Return Young's modulus (m,) in Pa of each element."""
+    """Return Young's modulus (m,) in Pa of each element, over its factor of the stiffness."""
     E = np.ones(result.mesh.n_elements)
     for group in result.groups:
         modulus: Any = getattr(group.material, "E", None)
@@ -124,7 +125,7 @@ def _moduli(result: Any) -> Array:
                 f"{type(group.material).__name__} has no Young's modulus E; take wrt='stiffness', the "
                 "derivative by a factor of the stiffness of each element"
             )
-        E[group.rows] = modulus
+        E[group.rows] = modulus if group.factors is None else modulus / group.factors
     return E
 
 

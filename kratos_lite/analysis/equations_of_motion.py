@@ -60,6 +60,11 @@ class EquationsOfMotion:
         self.groups, self.warnings = model.checked()  # elements on all nodes of the mesh
         if model.motion is not None:
             model.require_linear("a motion of the material")
+            if model.stiffness_factors is not None:
+                raise ModelError(
+                    "factors of the stiffness stay with elements, and a motion carries material through "
+                    "them; take one of both away"
+                )
         if not free:
             self.free_motions.check((), moving=False)
         for group in self.groups:

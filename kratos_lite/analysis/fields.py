@@ -309,7 +309,7 @@ class GaussPoints:
     def elastic(self) -> tuple[Array, Array]:
         """The elastic strain and its stress (m, g, 6) in Pa, without prestress."""
         strain = self.strain - self.group.thermal_strain()
-        return strain, strain @ self.group.material.C.T
+        return strain, self.group.elastic(strain)
 
     @property
     def displacement(self) -> Array:
@@ -329,7 +329,9 @@ QUANTITIES: dict[str, Callable[[GaussPoints], Array]] = {
     "STRESSES": FIELDS["stress"].at,
     "GREEN_LAGRANGE_STRAIN_TENSOR": lambda at: voigt.tensor(at.strain * voigt.HALF_SHEAR),
     "STRAIN": FIELDS["strain"].at,
-    "CONSTITUTIVE_MATRIX": lambda at: np.tile(at.group.material.C, (*at.element.dV.shape, 1, 1)),
+    "CONSTITUTIVE_MATRIX": lambda at: at.group.scaled(
+        np.tile(at.group.material.C, (*at.element.dV.shape, 1, 1))
+    ),
     "JACOBIAN": lambda at: at.element.dV / at.group.rule.weights,
     "JACOBIAN_0": lambda at: at.element.dV / at.group.rule.weights,
     "INTEGRATION_WEIGHT": lambda at: at.element.dV,

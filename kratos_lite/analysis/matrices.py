@@ -116,5 +116,5 @@ def local_system_of(model: Structure, element: int, u: ArrayLike | None = None) 
             load += factor * of.forces(model.mesh, [group])
     nodes, placed, material = group.nodes[0].astype(np.int64), group.at(points), group.material
     dofs = (3 * nodes[:, None] + np.arange(3)).ravel()
-    K = placed.stiffness(material.C)[0]
+    K = group.scaled(placed.stiffness(material.C))[0]
     return LocalSystem(K, load[nodes].ravel(), placed.mass(material.density)[0], dofs)

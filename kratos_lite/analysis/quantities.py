@@ -380,7 +380,7 @@ class StressAt(Quantity):
         load, component = np.zeros_like(result.u), COMPONENTS.index(self.component)
         group = self._around(result)
         placed, C = group.at(result.mesh.points), group.material.C
-        stress = np.broadcast_to(C[component] / placed.dV.sum(), (*placed.dV.shape, 6))
+        stress = group.scaled(np.broadcast_to(C[component] / placed.dV.sum(), (*placed.dV.shape, 6)))
         add_nodal(load, group.nodes, placed.internal_force(stress, C))
         return load
 
@@ -400,7 +400,7 @@ class StressAt(Quantity):
         group, X, xi = self._holder(result)
         if wrt == "stiffness":
             out, elastic = np.zeros(result.mesh.n_elements), replace(group, prestress=None)
-            out[group.rows] = at_located([elastic], located, result._strained)[c]
+            out[group.rows] = at_located([replace(elastic, factors=None)], located, result._strained)[c]
             return out
         if wrt == "coordinates":
             X, u = X - X.mean(axis=1), result._strained[group.nodes]
@@ -426,7 +426,7 @@ class StressAt(Quantity):
     def _stress(self, group: ElementGroup, X: Array, xi: Array, u: Array) -> Array:
         """Return the component (p,) of C B u at ξ of elements X (p, k, 3) under u (p, k, 3)."""
         strain = strain_of(group, X, np.broadcast_to(xi, (len(X), 3)), np.broadcast_to(u, X.shape))
-        return np.asarray(strain @ group.material.C[COMPONENTS.index(self.component)])
+        return np.asarray(group.elastic(strain, [0] * len(X))[:, COMPONENTS.index(self.component)])
 
     def local(self, result: Fields) -> Array:
         """Return the difference of the error at the point, by recovered stresses, from its mean around."""

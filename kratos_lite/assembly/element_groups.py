@@ -78,6 +78,7 @@ class ElementGroup:
     prestress: Array | None = None  # (m, 6) float in Pa, or None
     states: PointStates | None = None  # of a result, where the law is not linear
     heating: Array | None = None  # (m, k) float in K, temperatures of the nodes beyond those without strain
+    factors: Array | None = None  # (m,) float, of the stiffness of each element, or None
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -97,9 +98,9 @@ class ElementGroup:
         """Whether the dilatations of the elements are known.
 
         Those of the library's B-bar elements are their projected ones, those of enhanced elements their
-        means: the modes take up the others.
+        means: the modes take up the others.  Factors of the stiffness are not split into pressures.
         """
-        return not self.element.custom and self.strain_tables() is not None
+        return self.factors is None and not self.element.custom and self.strain_tables() is not None
 
     def tables(self, rule: Rule | None = None) -> tuple[Rows, Array, Array, Array]:
         """Return nodes, N (g, k), dN (g, k, 3) and weights (g,) of a rule, or the own one, for kernels."""
@@ -109,12 +110,29 @@ class ElementGroup:
         return nodes, as_double(N), as_double(dN), as_double(rule.weights)
 
     def kernel_arguments(self) -> tuple[Array, Array | None]:
-        """Return C (6, 6) and the initial stress of elements (m, 6), as kernels take them."""
+        """Return C (6, 6) and the initial stress of elements (m, 6), or (m, 7) with factors of C."""
         C, stress = as_double(self.material.C), self.prestress
         if self.heating is not None and self.is_evenly_heated:
-            thermal = self.heating.mean(axis=1)[:, None] * (C @ self.material.expansion)
+            thermal = self.elastic(self.heating.mean(axis=1)[:, None] * self.material.expansion)
             stress = -thermal if stress is None else stress - thermal
+        if self.factors is not None:
+            stress = np.zeros((len(self), 6)) if stress is None else stress
+            stress = np.column_stack([stress, self.factors])
         return C, None if stress is None else as_double(stress)
+
+    def elastic(self, strain: Array, chunk: Any = slice(None)) -> Array:
+        """Return C ε in Pa of strains (m, …, 6) of a chunk, with the factors of its elements."""
+        stress = strain @ self.material.C.T
+        if self.factors is None:
+            return stress
+        factors = self.factors[chunk]
+        return np.asarray(factors.reshape(factors.shape + (1,) * (stress.ndim - 1)) * stress)
+
+    def scaled(self, matrices: Array, chunk: slice = slice(None)) -> Array:
+        """Return stiffnesses or internal forces (m, …) of a chunk times the factors of its elements."""
+        if self.factors is None:
+            return matrices
+        return np.asarray(self.factors[chunk].reshape((-1,) + (1,) * (matrices.ndim - 1)) * matrices)
 
     def strain_tables(self) -> StrainTables | None:
         """Return what the element adds to the strain of the displacements, as kernels take it."""
@@ -131,8 +149,16 @@ class ElementGroup:
         stress = None if self.prestress is None else self.prestress[chosen]
         states = self.states and self.states.take(chosen)
         heating = None if self.heating is None else self.heating[chosen]
-        nodes, rows = self.nodes[chosen], self.rows[chosen]
-        return replace(self, nodes=nodes, rows=rows, prestress=stress, states=states, heating=heating)
+        factors = None if self.factors is None else self.factors[chosen]
+        return replace(
+            self,
+            nodes=self.nodes[chosen],
+            rows=self.rows[chosen],
+            prestress=stress,
+            states=states,
+            heating=heating,
+            factors=factors,
+        )
 
     def chunks(self, memory: int = CHUNK_BYTES, within: slice | None = None) -> Iterator[slice]:
         """Cut the group, or a slice of it, into slices whose matrices take about `memory` bytes each."""
@@ -166,7 +192,7 @@ class ElementGroup:
         prestress = 0.0 if self.prestress is None else self.prestress[chunk, None, :]
         if self.heating is None:
             return prestress
-        return prestress - self.thermal_strain(chunk) @ self.material.C.T
+        return prestress - self.elastic(self.thermal_strain(chunk), chunk)
 
 
 def by_mass_rule(points: Array, group: ElementGroup, factors: int, flow: bool = False) -> list[ElementGroup]:
@@ -209,6 +235,7 @@ def element_groups_of(
     rules: Mapping[int, Rule | int],
     rule_of: Ints,
     prestress: Array | None,
+    factors: Array | None,
     formulation: str | None,
     unnamed: str,
 ) -> list[ElementGroup]:
@@ -234,7 +261,14 @@ def element_groups_of(
                     f"{mesh.place(block, 0)}: a prestress is not for {type(materials[material]).__name__}, "
                     "whose stress is not linear in the strain; strain the body by supports or loads instead"
                 )
-            groups.append(ElementGroup(element, chosen, materials[material], nodes, rows, stress))
+            scale = None if factors is None or (factors[rows] == 1).all() else factors[rows]
+            group = ElementGroup(element, chosen, materials[material], nodes, rows, stress, factors=scale)
+            if scale is not None and not group.is_linear:
+                raise ModelError(
+                    f"{mesh.place(block, 0)}: factors of the stiffness take linear laws and small strains; "
+                    f"got {type(materials[material]).__name__}, {element.__name__}"
+                )
+            groups.append(group)
     if mesh.whole and not groups:
         raise ModelError("the model has no elements; nothing can be solved")
     return groups

@@ -126,7 +126,7 @@ def at_gauss(points: Array, group: ElementGroup, u: Array, *, stress: bool = Tru
         found = module.stress(*displaced(points, group, u, stress))
         if not stress or group.is_evenly_heated:
             return found
-        return found - group.thermal_strain() @ group.material.C.T
+        return found - group.elastic(group.thermal_strain())
     parts = [value_at(group.at(points, chunk), group, u, chunk, stress) for chunk in group.chunks()]
     return np.concatenate(parts)
 
@@ -160,7 +160,8 @@ def value_at(
     displacements = u[group.nodes[chunk]]
     if not stress:
         return element.strain(displacements, group.material.C)
-    return element.strain(displacements, group.material.C) @ group.material.C.T + group.initial_stress(chunk)
+    elastic = group.elastic(element.strain(displacements, group.material.C), chunk)
+    return elastic + group.initial_stress(chunk)
 
 
 def internal_load(points: Array, groups: Sequence[ElementGroup], u: Array) -> Array:
@@ -208,7 +209,7 @@ def _internal_forces(element: KinematicLinear, group: ElementGroup, u: Array, ch
     C, displacements = group.material.C, u[group.nodes[chunk]]
     if "local_system" not in element.custom:
         return element.internal_force(value_at(element, group, u, chunk), C)
-    forces = custom.system(element, C, displacements)[1]
+    forces = group.scaled(custom.system(element, C, displacements)[1], chunk)
     if group.prestress is None and group.heating is None:
         return forces
     stress = np.broadcast_to(group.initial_stress(chunk), (len(forces), len(group.rule), 6))
@@ -236,10 +237,11 @@ def _totals(points: Array, group: ElementGroup, u: Array, chunk: slice) -> tuple
     element = group.at(points, chunk)
     C, displacements = group.material.C, u[group.nodes[chunk]]
     strain = element.strain(displacements, C)
-    elastic = strain @ C.T
+    elastic = group.elastic(strain, chunk)
     energy = float(((strain * elastic).sum(axis=-1) * element.dV).sum()) / 2
     if "local_system" in element.custom:
-        energy = float((custom.system(element, C, displacements)[1] * displacements).sum()) / 2
+        forces = group.scaled(custom.system(element, C, displacements)[1], chunk)
+        energy = float((forces * displacements).sum()) / 2
     mises = voigt.von_mises(elastic + group.initial_stress(chunk)).max(axis=1)
     return energy, float(mises.max()), chunk.start + int(mises.argmax())
 
@@ -296,7 +298,7 @@ def energy_density(points: Array, group: ElementGroup, u: Array) -> Array:
     law, states = group.material, group.states
     if group.is_linear:
         strain = at_gauss(points, group, u, stress=False) - group.thermal_strain()
-        return np.asarray((strain @ law.C.T * strain).sum(axis=-1) / 2)
+        return np.asarray((group.elastic(strain) * strain).sum(axis=-1) / 2)
     strain, stress = of_law(points, group, u)
     if states is None:
         return law.energy(strain, strain @ law.C.T, {})

@@ -61,7 +61,8 @@ class MatrixFree:
     @staticmethod
     def takes(group: ElementGroup) -> bool:
         """Return whether the kernels know the stiffness of a group, and their product pays."""
-        if compiled("multigrid", group.element) is None or group.strain_tables() is not None:
+        known = compiled("multigrid", group.element) is not None and group.factors is None
+        if not known or group.strain_tables() is not None:
             return False
         shape = group.element.shape
         return len(shape.nodes) > shape.corners or factors(shape, group.rule) is not None

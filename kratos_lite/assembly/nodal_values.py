@@ -99,11 +99,11 @@ def at_located(groups: Sequence[ElementGroup], located: Located, u: Array, *, st
         else:
             value = strain_of(group, points[group.nodes[cells]], xi[at], u[group.nodes[cells]])
             if stress:
-                value = value @ group.material.C.T
+                value = group.elastic(value, cells)
                 value = value if group.prestress is None else value + group.prestress[cells]
                 if group.heating is not None:
                     heating = _extrapolated(group, cells, xi[at], lambda g: g.thermal_strain())
-                    value = value - heating @ group.material.C.T
+                    value = value - group.elastic(heating, cells)
         out[at] = value
     return out.reshape(*located.rows.shape, 6)
 

@@ -240,7 +240,9 @@ class Recovery:
         """Return a group without prestress and with a rule for squared errors, its N and volumes, and C⁻¹."""
         fine = _compared_at(group)
         N, _ = tabulate(fine.element.shape, fine.rule)
-        return fine, N, volumes(self.points, fine), as_double(np.linalg.inv(fine.material.C))
+        inverse = as_double(np.linalg.inv(fine.material.C))
+        volume = volumes(self.points, fine)  # for energies, so that factors of C divide it
+        return fine, N, volume if fine.factors is None else volume / fine.factors[:, None], inverse
 
 
 def recovered_at(recovery: Recovery, located: Located, u: Array, *, stress: bool = True) -> Array:

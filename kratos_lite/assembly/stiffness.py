@@ -34,12 +34,14 @@ def assemble_stiffness(
         if module := compiled("stiffness", group.element):
             nodes, _, dN, weights = group.tables()
             law = group.kernel_arguments()[0], group.strain_tables()
-            module.add_stiffness(points, nodes, dN, weights, *law, pattern.indptr, pattern.indices, data)
+            rows, factors = (pattern.indptr, pattern.indices), group.factors
+            scale = None if factors is None else as_double(factors[:, None])
+            module.add_stiffness(points, nodes, dN, weights, *law, *rows, data, factors=scale)
             counts: Iterable[int] = (len(group),)
         else:
 
             def stiffness(chunk: slice, group: ElementGroup = group) -> Array:
-                return group.at(points, chunk).stiffness_by_axis(group.material.C)
+                return group.scaled(group.at(points, chunk).stiffness_by_axis(group.material.C), chunk)
 
             counts = add_in_parts(data, group, pattern, number, stiffness)
         for count in counts:
@@ -89,6 +91,6 @@ def assemble_dense(points: Array, groups: Sequence[ElementGroup]) -> Array:
             dofs = 3 * group.nodes[chunk].astype(np.int64)[:, None, :] + np.arange(3)[:, None]
             dofs = dofs.reshape(len(dofs), -1)
             places = (dofs[:, :, None] * n + dofs[:, None, :]).ravel()
-            matrices = group.at(points, chunk).stiffness_by_axis(group.material.C)
+            matrices = group.scaled(group.at(points, chunk).stiffness_by_axis(group.material.C), chunk)
             K += np.bincount(places, weights=matrices.ravel(), minlength=n * n)
     return K.reshape(n, n)

@@ -34,6 +34,8 @@ def refined(structure: S, finer: RefinedMesh) -> S:
     _carry_rules(structure, new, finer)
     if structure.initial_displacement is not None:
         new.set_stress_free_state(finer.interpolate(structure.initial_displacement))
+    if structure.stiffness_factors is not None:
+        new.scale_stiffness(structure.stiffness_factors[finer.elements])
     if structure.prestress is not None:
         new.add_prestress(structure.prestress[finer.elements])
     for condition in structure.supports.conditions:

@@ -85,6 +85,7 @@ class Structure(Tabular):
         self._rule_of = np.full(mesh.n_elements, -1)
         self._initial_displacement: Array | None = None
         self._prestress: Array | None = None
+        self._factors: Array | None = None
         self._changes = 0
         self.formulation = formulation
         self.supports = Supports(mesh)
@@ -150,6 +151,50 @@ class Structure(Tabular):
         elements = self.mesh.elements(where)
         self._materials.append(material)
         self._material_of[elements] = len(self._materials) - 1
+        self._changes += 1
+
+    @property
+    def stiffness_factors(self) -> Array | None:
+        """Factors (m,) of the stiffness of elements, read-only, or None; see `scale_stiffness`."""
+        return self._factors
+
+    def scale_stiffness(self, factors: ArrayLike, where: WhereElements = None) -> None:
+        """Multiply the stiffness of each element by a factor of its own: σ = factor · C ε + prestress.
+
+        Density stays.  `Result.gradient` has the derivative by these factors.
+
+        Parameters
+        ----------
+        factors : > 0, one or (m,); they replace earlier ones, 1 for none.
+        where : m elements by part name, property id or indices; all if not given.
+
+        Raises
+        ------
+        InputError
+            A factor is not > 0, or they have another shape.
+        MeshError
+            There is no such part, property or element.
+
+        Examples
+        --------
+        >>> import kratos_lite as kl
+        >>> bar = kl.Model(kl.box((2, 1, 1), (2, 1, 1)), kl.Isotropic3D(E=1e6, nu=0.0))
+        >>> bar.fix("x-")
+        >>> bar.add(kl.Traction("x+", (10.0, 0, 0)))
+        >>> bar.scale_stiffness([1.0, 0.5])
+        >>> bar.solve().displacement("x+")[:, 0].round(9).tolist()
+        [3e-05, 3e-05, 3e-05, 3e-05]
+        """
+        values, elements = finite(factors, "factors of the stiffness"), self.mesh.elements(where)
+        if values.shape not in ((), (len(elements),)) or not (values > 0).all():
+            raise InputError(
+                f"factors of the stiffness are > 0, one or ({len(elements)},); got shape {values.shape} from "
+                f"{values.min(initial=np.inf):g}"
+            )
+        every = np.ones(self.mesh.n_elements) if self._factors is None else self._factors.copy()
+        every[elements] = values
+        every.flags.writeable = False
+        self._factors = None if (every == 1).all() else every
         self._changes += 1
 
     @property
@@ -234,6 +279,7 @@ class Structure(Tabular):
             self._rules,
             self._rule_of,
             self.prestress,
+            self.stiffness_factors,
             self.formulation,
             unnamed,
         )
@@ -720,6 +766,9 @@ class Structure(Tabular):
         rows += [("formulation", text)] if (text := self.chosen()) else []
         rows += [("material", str(material)) for material in self._used_materials()]
         rows += [("material", f"none for {without} elements")] if without else []
+        if self._factors is not None:
+            span = f"{self._factors.min():g} … {self._factors.max():g}"
+            rows.append(("stiffness", f"times {span}, a factor for each element"))
         rows.append(("fixed", f"{self.supports.fixed.sum()} components"))
         rows += [("support", str(condition)) for condition in self.supports.named.values()]
         rows += [("tie", str(tie)) for tie in self.supports.ties]

@@ -108,7 +108,7 @@ struct GivenPoint {
 
 inline int64_t given_size(const Elements& w, int V) {
     const int64_t point = sizeof(GivenPoint<2>) / sizeof(vec<double, 2>);
-    return V * (9 * w.k + 6 + w.g * (6 * w.k + point));
+    return V * (9 * w.k + 7 + w.g * (6 * w.k + point));
 }
 
 // Z[i][j][s] and z[i] with K_ab[i][j] = Σ Z_a[i][j][s] dN_b/dX_s + z_a[i] delta_b[j] over the points.

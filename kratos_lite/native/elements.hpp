@@ -91,13 +91,14 @@ inline void set_law(Elements& w, Numbers C, const MaybeTables& addition) {
     if (addition) w.addition = added(w, *addition);
 }
 
-// Elements with displacements u (n, 3), C (6, 6) and a prestress (m, 6) or None.
+// Elements with displacements u (n, 3), C (6, 6), and None, a prestress (m, 6), or (m, 7) with a factor of C.
 inline Elements strained(Numbers points, Indices nodes, Numbers dN, Numbers weights, Numbers u, Numbers C,
                          MaybeNumbers prestress, const MaybeTables& addition = {}) {
     Elements w = elements(points, nodes, dN, weights);
     add_field(w, u);
     set_law(w, C, addition);
-    w.prestress = optional(prestress, w.last, 6, "prestress must be (m, 6)");
+    w.initial = prestress ? prestress->ndim() == 2 && prestress->shape(1) == 7 ? 7 : 6 : 0;
+    w.prestress = optional(prestress, w.last, w.initial, "prestress must be (m, 6) or (m, 7)");
     return w;
 }
 

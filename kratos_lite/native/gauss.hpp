@@ -60,7 +60,8 @@ struct Elements {
     double damping;           // fraction of the stress increment that is added to the mean stress
     Law law;
     Addition addition;
-    const double* prestress;  // (m, 6) or null
+    const double* prestress;  // (m, 6 or 7) or null; the last is a factor of C
+    int initial;              // columns of the prestress
     const double* to_nodes;   // (k, g) extrapolation, or combination of the nodes `base`
     const int32_t* base;      // (g) nodes of an element, or null
     double near;              // share of the largest coordinate that a node may be away
@@ -72,7 +73,7 @@ struct Elements {
 
     // Vectors of working space: coordinates, displacements, prestress, stresses, nodal values, added strains.
     int64_t vectors() const { return added_from() + (addition.kind ? 36 + 9 * static_cast<int64_t>(g) : 0); }
-    int64_t added_from() const { return 15 * static_cast<int64_t>(k) + 12 + 6 * static_cast<int64_t>(g); }
+    int64_t added_from() const { return 15 * static_cast<int64_t>(k) + 13 + 6 * static_cast<int64_t>(g); }
     const double* dN_at(int q) const { return dN + 3 * static_cast<int64_t>(k) * q; }
 };
 
@@ -94,7 +95,7 @@ KL_INLINE void shift_to_first_node(vec<double, V>* X, int k) {
         for (int i = 0; i < 3; ++i) X[3 * a + i] -= X[i];
 }
 
-// Coordinates, nodal field, increments and prestress of V elements, and the space behind them.
+// Coordinates, nodal field, increments, prestress with a factor of C, and the space behind them.
 template <int V>
 struct Local {
     vec<double, V>*X, *u, *du, *initial, *rest;
@@ -103,15 +104,15 @@ struct Local {
 template <int V>
 KL_INLINE Local<V> gather_all(const Elements& w, int64_t e, double* space) {
     vec<double, V>* X = reinterpret_cast<vec<double, V>*>(space);
-    Local<V> at{X, X + 3 * w.k, X + 6 * w.k, X + 9 * w.k, X + 9 * w.k + 6};
+    Local<V> at{X, X + 3 * w.k, X + 6 * w.k, X + 9 * w.k, X + 9 * w.k + 7};
     gather<V>(w, w.points, e, X);
     shift_to_first_node<V>(X, w.k);
     if (w.field) gather<V>(w, w.field, e, at.u);
     if (w.increment) gather<V>(w, w.increment, e, at.du);
-    for (int c = 0; c < 6; ++c) {
-        at.initial[c] = vec<double, V>{};
-        for (int lane = 0; w.prestress && lane < V; ++lane)
-            at.initial[c][lane] = w.prestress[6 * std::min(e + lane, w.last - 1) + c];
+    for (int c = 0; c < 7; ++c) {
+        at.initial[c] = vec<double, V>{} + (c < 6 ? 0.0 : 1.0);
+        for (int lane = 0; c < w.initial && lane < V; ++lane)
+            at.initial[c][lane] = w.prestress[w.initial * std::min(e + lane, w.last - 1) + c];
     }
     return at;
 }

@@ -159,7 +159,10 @@ KL_INLINE void evaluate(const Elements& w, const Local<V>& at, int q, PointState
     } else if (w.addition.kind == Addition::dilatation)
         deviate<V>(w.addition.share, added<V>(w)[q], s.strain);
     elastic<V>(w.law, s.strain, s.elastic);
-    for (int c = 0; c < 6; ++c) s.stress[c] = s.elastic[c] + at.initial[c];
+    for (int c = 0; c < 6; ++c) {
+        s.elastic[c] *= at.initial[6];
+        s.stress[c] = s.elastic[c] + at.initial[c];
+    }
 }
 
 // Coordinates, displacements and prestress of V elements; what they add to the strain is found.

@@ -105,7 +105,7 @@ KL_DISPATCH(lagrange_totals, lagrange_totals_body, const Elements&)
 // Numbers that one chunk needs: what it gathers, the gradients and deformations, and Z of one node.
 inline int64_t tangent_size(const Elements& w, int V) {
     const int64_t deformation = sizeof(Deformation<2>) / sizeof(vec<double, 2>);
-    return V * (9 * w.k + 6 + w.g * (3 * w.k + deformation + 27));
+    return V * (9 * w.k + 7 + w.g * (3 * w.k + deformation + 27));
 }
 
 // Z[i][j][s] with K_ab[i][j] = Σ Z_a[i][j][s] dN_b/dX_s over the points: the stress that the gradient g

@@ -71,8 +71,9 @@ Moduli moduli(const Law& law, double share) {
 }
 
 int64_t add(Numbers points, Indices nodes, Numbers dN, Numbers weights, Numbers C, const MaybeTables& addition,
-            Indices indptr, Indices indices, Array<double> data, bool affine) {
-    Stiffness w{elements(points, nodes, dN, weights), {}, {}, data.mutable_data()};
+            Indices indptr, Indices indices, Array<double> data, bool affine, MaybeNumbers factors) {
+    Stiffness w{elements(points, nodes, dN, weights), {}, {}, data.mutable_data(), nullptr};
+    w.factors = optional(factors, w.last, 1, "factors must be (m, 1)");
     set_law(w, C, addition);
     w.moduli = moduli(w.law, w.addition.share);
     const Graph graph = pattern(indptr, indices, w.n);
@@ -107,7 +108,7 @@ KL_MODULE(_stiffness, m) {
                           {"n_nodes", "connectivity"});
     define<&add>(m, "add_stiffness", "Add the stiffness of elements to the blocks of a matrix",
                  {"points", "nodes", "dN", "weights", "C", "addition", "indptr", "indices", "data",
-                  {"affine", Py_True}});
+                  {"affine", Py_True}, {"factors", Py_None}});
     define<&add_given>(m, "add_matrices", "Add given element matrices to a matrix",
                        {"nodes", "matrices", "indptr", "indices", "data"});
 }

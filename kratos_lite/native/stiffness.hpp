@@ -30,6 +30,7 @@ struct Stiffness : Elements {
     Moduli moduli;
     std::vector<double> products;  // R (pairs, 9), or none where they do not pay
     double* data;
+    const double* factors;         // (m) of the stiffness of elements, or null
 
     bool affine_pays() const {
         const int pairs = k * (k + 1) / 2;
@@ -144,6 +145,11 @@ struct DilatationAdded {
 };
 
 template <int V>
+KL_INLINE void scale(const vec<double, V>& factor, vec<double, V>* K) {
+    for (int ij = 0; ij < 9; ++ij) K[ij] *= factor;
+}
+
+template <int V>
 KL_INLINE void contract(const Moduli& m, const vec<double, V>* P, vec<double, V>* K) {
     if (m.isotropic) {
         const vec<double, V> trace = m.mu * (P[0] + P[4] + P[8]);
@@ -161,7 +167,8 @@ KL_INLINE void contract(const Moduli& m, const vec<double, V>* P, vec<double, V>
 
 // All pairs from the gradients at the Gauss points.
 template <int V, class Added>
-KL_INLINE void by_points(const Stiffness& w, Chunk chunk, int k, int g, vec<double, V> (*J)[3][3], Added& added) {
+KL_INLINE void by_points(const Stiffness& w, Chunk chunk, int k, int g, vec<double, V> (*J)[3][3],
+                         const vec<double, V>& factor, Added& added) {
     typedef vec<double, V> Vec;
     Vec *D = reinterpret_cast<Vec*>(J + g), *weight = D + 3 * g * k, *row = weight + g;
     for (int q = 0; q < g; ++q) {
@@ -186,6 +193,7 @@ KL_INLINE void by_points(const Stiffness& w, Chunk chunk, int k, int g, vec<doub
             }
             contract<V>(w.moduli, P, K);
             added.add(b, K);
+            if (w.factors) scale<V>(factor, K);
             add_pair<V>(w.data, chunk, k, a, b, true, K);
         }
     }
@@ -193,7 +201,8 @@ KL_INLINE void by_points(const Stiffness& w, Chunk chunk, int k, int g, vec<doub
 
 // All pairs from the products of the reference cell.
 template <int V, class Added>
-KL_INLINE void by_products(const Stiffness& w, Chunk chunk, int k, const vec<double, V> (&J)[3][3], Added& added) {
+KL_INLINE void by_products(const Stiffness& w, Chunk chunk, int k, const vec<double, V> (&J)[3][3],
+                           const vec<double, V>& factor, Added& added) {
     vec<double, V> c[3][3], scaled[3][3], det;
     invert<V>(J, c, det);
     for (int i = 0; i < 3; ++i)
@@ -212,6 +221,7 @@ KL_INLINE void by_products(const Stiffness& w, Chunk chunk, int k, const vec<dou
                     P[3 * i + j] = c[0][i] * T[0][j] + c[1][i] * T[1][j] + c[2][i] * T[2][j];
             contract<V>(w.moduli, P, K);
             added.add(b, K);
+            if (w.factors) scale<V>(factor, K);
             add_pair<V>(w.data, chunk, k, a, b, true, K);
         }
     }
@@ -226,10 +236,13 @@ KL_INLINE bool add_stiffness(const Stiffness& w, Chunk chunk, int k, int g) {
     for (int q = 0; q < g; ++q) reference_gradient<V>(X, w.dN_at(q), k, J[q]);
     const bool affine = !w.products.empty() && constant<V>(k, g, X, &J[0][0][0]);
     Added added(w, X, J, X + w.added_from());
+    vec<double, V> factor{};
+    for (int lane = 0; w.factors && lane < V; ++lane)
+        factor[lane] = w.factors[std::min(chunk.first + lane, w.last - 1)];
     if (affine)
-        by_products<V>(w, chunk, k, J[0], added);
+        by_products<V>(w, chunk, k, J[0], factor, added);
     else
-        by_points<V>(w, chunk, k, g, J, added);
+        by_points<V>(w, chunk, k, g, J, factor, added);
     return affine;
 }
 

@@ -188,9 +188,8 @@ def _linear(part: _Submesh, cell: Ints, number: Rows) -> ElementGroup:
     """Return one linear element of each element of a part, on numbered corners."""
     same = part.element is part.group.element
     rule = part.group.rule if same else part.element.rule
-    return ElementGroup(
-        part.element, rule, part.group.material, number[part.group.nodes[:, cell]], part.group.rows
-    )
+    nodes, factors = number[part.group.nodes[:, cell]], part.group.factors
+    return ElementGroup(part.element, rule, part.group.material, nodes, part.group.rows, factors=factors)
 
 
 def _weights(part: _Submesh) -> Array:
