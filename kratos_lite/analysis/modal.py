@@ -165,7 +165,7 @@ def critical_rate(model: Structure, count: int = 1) -> Array:
     """
     count = whole_number(count, "count")
     instance(model, "a model", Structure, "kl.Model(mesh, material)")
-    e = EquationsOfMotion(model, free=False)
+    e = EquationsOfMotion(model, free=False, solver="auto")
     if e.terms is None:
         raise InputError("a critical rate belongs to a motion; add kratos_lite.ale.Rotation or Translation")
     return critical_rates(e, count)
@@ -174,8 +174,7 @@ def critical_rate(model: Structure, count: int = 1) -> Array:
 def critical_rates(e: EquationsOfMotion, count: int) -> Array:
     """Return the lowest critical rates (count,) of equations whose supports hold all rigid motions."""
     few = 100 if count == 1 else DENSE_MODES  # one by iteration takes a tenth of the time of all
-    solver = replace(e.system.equations, plan=stepped(e.system.facts))
-    largest = _largest(e, _critical_terms(e), solver, count, few)[0]
+    largest = _largest(e, _critical_terms(e), e.system.equations, count, few)[0]
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.sort(np.where(largest > 0, 1 / np.sqrt(np.maximum(largest, 1e-300)), np.inf))
 
@@ -194,7 +193,10 @@ def buckling(
         try:
             inverse, vectors = _largest(e, K_g, e.system.equations, count, DENSE_MODES)
         except SolveError as error:
-            raise SolveError(f"{error}; loads that only pull do not buckle a body") from None
+            text = (
+                f"found no {count} factors > 0: loads that only pull do not buckle a body; if some press, the"
+            )
+            raise SolveError(f"{text} iteration failed: {error}") from None
     if not inverse[-1] > 1e-9 * K_g.norm() / e.system.norm:  # less is rounding: strains of 1e9
         raise ModelError(f"the loads have less than {count} factors > 0; ask for fewer, or reverse the loads")
     shapes = expanded(e, vectors)
@@ -225,8 +227,9 @@ def _largest(
 def _critical_terms(e: EquationsOfMotion) -> BlockMatrix:
     """Return H, less what stiffens."""
     assert e.terms is not None
-    H = BlockMatrix(np.zeros_like(e.K.data), e.K.indices, e.K.indptr)
-    H.add_scalar(e.terms.H - (e.stiffening if e.stiffened else 0.0))
+    pattern, scalar = e.system.pattern, e.terms.H - (e.stiffening if e.stiffened else 0.0)
+    H = BlockMatrix(np.zeros((len(pattern.indices), 3, 3)), pattern.indices, pattern.indptr)
+    H.add_scalar(scalar)
     return H
 
 

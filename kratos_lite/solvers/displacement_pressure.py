@@ -67,13 +67,14 @@ class DisplacementPressure:
 
     def precondition(self, r: Array) -> Array:
         """Return about K⁻¹ r: a rough solution."""
-        return self.solve(r, ROUGH, 0.0, None)[0]
+        return self.solve(r, ROUGH, 0.0)[0]
 
     def solve(
         self, b: Array, tolerance: float, norm: float, each: GoOn | None = None
     ) -> tuple[Array, int, bool]:
         """Return u, iterations and success."""
-        return self._kernel.solve(b, tolerance, norm, MAX_ITERATIONS, DIRECTIONS, REDUCED, each)
+        go_on = each or (lambda residual: True)
+        return self._kernel.solve(b, tolerance, norm, MAX_ITERATIONS, DIRECTIONS, REDUCED, go_on)
 
 
 def _arrays(A: Bsr) -> tuple[Rows, Rows, Array]:

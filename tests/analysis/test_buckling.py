@@ -72,6 +72,21 @@ def test_nearly_incompressible_column_by_iteration():
     assert model.buckling(2)[0] == pytest.approx(EULER / 4, rel=3e-2)  # the clamp holds the section, too
 
 
+def test_with_pressures_beside_displacements_factors_and_critical_rates_are_those_of_lapack(monkeypatch):
+    model = column("EnhancedStrain3D8N", (4, 4, 14), nu=0.49999)
+    wheel = kl.Model(kl.annulus(0.3, 1.0, 0.2, (3, 16, 6), "EnhancedStrain3D8N"), kl.Isotropic3D(**STEEL))
+    wheel.assign(kl.Isotropic3D(**STEEL | {"nu": 0.49999}))
+    wheel.fix("inner")
+    wheel.add(kl.ale.Rotation("z", rate=1.0))
+    monkeypatch.setattr(modal, "DENSE_MODES", 10**5)
+    exact = model.buckling(2)[0], kl.critical_rate(wheel, 2)
+    monkeypatch.setattr(modal, "DENSE_MODES", 10)
+    monkeypatch.setattr("kratos_lite.solvers.plan._is_soon_factorized", lambda facts, plain: False)
+    assert EquationsOfMotion(model, solver="auto").system.plan.method == "displacement-pressure"
+    np.testing.assert_allclose(model.buckling(2)[0], exact[0], rtol=1e-5)
+    np.testing.assert_allclose(kl.critical_rate(wheel, 2), exact[1], rtol=1e-5)
+
+
 def test_of_two_columns_no_factor_is_missed():
     """By iteration, those of two columns are those of each of them."""
     alone, cells = [], (1, 1, 24)
