@@ -266,7 +266,7 @@ for axes in (kl.Cylindrical, kl.Spherical):
 for axes in (kl.Cartesian(VECTOR), kl.Cylindrical(), kl.Spherical()):
     own = type(axes).__name__
     CASES[f"{own}.directions", "points"] = (axes.directions, [POINT])
-    for call, values in ((axes.vectors, [VECTOR]), (axes.stresses, [STRESS])):
+    for call, values in ((axes.vectors, [VECTOR]), (axes.globally, [VECTOR]), (axes.stresses, [STRESS])):
         CASES[f"{own}.{call.__name__}", "values"] = (lambda v, f=call: f(v, [POINT]), values)
         CASES[f"{own}.{call.__name__}", "points"] = (lambda v, f=call, s=values: f(s, v), [POINT])
 CASES["Mesh.replace", "points"] = (lambda v: CUBE.replace(points=v).points, CUBE.points)

@@ -7,6 +7,7 @@ from run_files import CLAMP, box_mdpa, materials, process, run_file, write
 import kratos_lite as kl
 from kratos_lite.errors import InputError, KratosLiteError
 from kratos_lite.io.files import read_case
+from kratos_lite.io.run import prepare
 
 E, NU, ALPHA = 2e9, 0.3, 1e-5
 THERMAL = "ThermalElasticIsotropic3D"
@@ -205,3 +206,19 @@ def test_kratos_has_no_orthotropic_law_with_thermal_strain(tmp_path):
     model.add(kl.Temperature(50.0))
     with pytest.raises(InputError, match="a temperature of Orthotropic3D cannot be written"):
         kl.write(tmp_path / "a.mdpa", model)
+
+
+def test_a_law_that_flows_is_heated_step_by_step(case):
+    """Heated by 200 K and cooled again: what has flowed stays, as with an amplitude in a script."""
+    own = {"YIELD_STRESS": 1e6, "THERMAL_EXPANSION_COEFFICIENT": ALPHA, "REFERENCE_TEMPERATURE": 20.0}
+    own |= {"ISOTROPIC_HARDENING_MODULUS": 1e8}
+    heat = imposed("20 + 200*sin(pi*t)", interval=[0.0, "End"])
+    settings = {"analysis_type": "non_linear", "step": 0.25, "end": 0.9}
+    one = case([heat], law="J2Plasticity3D", properties=own, **settings)
+    *_, last = prepare(one)[1]
+    model = kl.Model(one.model.mesh, kl.J2Plasticity3D(E, NU, 1e6, hardening=1e8, alpha=ALPHA))
+    model.fix("z-", "xyz")
+    model.add(kl.Temperature(220.0, 20.0), amplitude=lambda t: np.sin(np.pi * t))
+    *_, expected = kl.integrate(model.quasi_static(), dt=0.25, steps=4)
+    assert np.abs(expected.u).max() > 1e-5
+    assert np.abs(last.u - expected.u).max() < 1e-6 * np.abs(expected.u).max()
