@@ -121,6 +121,7 @@ from kratos_lite.mesh import Part as Part
 from kratos_lite.mesh.generators import annulus as annulus
 from kratos_lite.mesh.generators import box as box
 from kratos_lite.mesh.join import join as join
+from kratos_lite.mesh.join import split as split
 from kratos_lite.model.loads import TimeDependentLoad as TimeDependentLoad
 from kratos_lite.model.loads.body import BodyForce as BodyForce
 from kratos_lite.model.loads.body import Gravity as Gravity

@@ -10,8 +10,11 @@ import numpy as np
 from kratos_lite.errors import MeshError
 from kratos_lite.mesh.blocks import Block, Part
 from kratos_lite.mesh.mesh import Mesh
+from kratos_lite.mesh.selection import Where
 from kratos_lite.validation import instance
 
+FLAT = 1e-6
+"""Fraction of the size of a cut by which its nodes may be off the plane."""
 COUNTED = ("nodes", "elements", "conditions")
 
 
@@ -63,3 +66,60 @@ def join(meshes: Mapping[str, Mesh]) -> Mesh:
         first = {what: first[what] + counts[what] for what in COUNTED}
     points = np.vstack([mesh.points for mesh in meshes.values()])
     return Mesh(points, blocks["blocks"], conditions=blocks["conditions"], parts=parts)
+
+
+def split(mesh: Mesh, where: Where, names: tuple[str, str] = ("cut-", "cut+")) -> Mesh:
+    """Return a mesh that is cut along a plane of nodes: each side has nodes of its own, at the same places.
+
+    Parameters
+    ----------
+    mesh : whose elements have faces in the plane.
+    where : the nodes of the cut, as for `Mesh.nodes`; all of one component, or of some of its elements.
+    names : of the parts below and above, seen along the normal whose largest component is positive; other
+        parts have the nodes of both.
+
+    Returns
+    -------
+    Mesh
+
+    Raises
+    ------
+    MeshError
+        The nodes are not in one plane, or elements cross it or are on one side alone.
+
+    Examples
+    --------
+    >>> import kratos_lite as kl
+    >>> bolt = kl.split(kl.box(cells=(1, 1, 4)), lambda X: X[:, 2] == 0.5)
+    >>> bolt.n_nodes, bolt.nodes("cut+").tolist()
+    (24, [20, 21, 22, 23])
+    """
+    rows, X = mesh.nodes(where), mesh.points
+    _, sizes, axes = np.linalg.svd(X[rows] - X[rows].mean(axis=0), full_matrices=False)
+    if len(rows) < 3 or sizes[1] <= FLAT * sizes[0] or sizes[2] > FLAT * sizes[0] or mesh.hanging is not None:
+        raise MeshError(f"a cut needs three or more nodes in one plane, and none that hang; got {len(rows)}")
+    normal = axes[2] * np.sign(axes[2, np.abs(axes[2]).argmax()])
+    height, copy = (X - X[rows[0]]) @ normal, np.arange(mesh.n_nodes)
+    inside, copy[rows] = np.isin(copy, rows), mesh.n_nodes + np.arange(len(rows))
+    sides: set[bool] = set()
+    cells: dict[str, list[Block]] = {}
+    for kind in ("blocks", "conditions"):
+        cells[kind] = []
+        for block in getattr(mesh, kind):
+            touches, d = inside[block.nodes].any(axis=1), height[block.nodes]
+            if (touches & (d.min(axis=1) < -FLAT * sizes[0]) & (d.max(axis=1) > FLAT * sizes[0])).any():
+                raise MeshError("elements cross the plane of the cut; it needs faces of elements on it")
+            above = touches & (d.mean(axis=1) > 0)
+            sides |= {*above[touches].tolist()} if kind == "blocks" else set()
+            cells[kind].append(replace(block, nodes=np.where(above[:, None], copy[block.nodes], block.nodes)))
+    if len(sides) < 2:
+        raise MeshError("elements are on one side of the cut alone; a cut goes through a body")
+    both = {
+        name: replace(part, nodes=np.append(part.nodes, copy[part.nodes[inside[part.nodes]]]))
+        for name, part in mesh.parts.items()
+    }
+    parts = {**both, names[0]: Part(rows), names[1]: Part(copy[rows])}
+    ids = np.append(mesh.node_ids, mesh.node_ids.max() + 1 + np.arange(len(rows)))
+    points, source = np.vstack([X, X[rows]]), mesh.source
+    blocks, conditions = cells["blocks"], cells["conditions"]
+    return Mesh(points, blocks, node_ids=ids, conditions=conditions, parts=parts, source=source)

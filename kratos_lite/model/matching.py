@@ -8,11 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.elements.surface import area_vectors
 from kratos_lite.errors import ModelError
 from kratos_lite.mesh import Mesh, Where, components
-from kratos_lite.model.ties import PartTie, name_of
+from kratos_lite.model.loads import Load
+from kratos_lite.model.ties import PartTie, faces_of, name_of
 from kratos_lite.solvers.constraints import Constraints
 from kratos_lite.typing import Array, Ints, Mask
+from kratos_lite.validation import number
 
 if TYPE_CHECKING:
     from kratos_lite.mesh.refined_mesh import RefinedMesh
@@ -109,3 +113,62 @@ class Periodic(PartTie):
             pairs.append(3 * np.stack([nodes, others])[:, both] + axis)
             between.append(constants[both])
         return *np.concatenate(pairs, axis=1), np.concatenate(between)
+
+
+class Cut(PartTie):
+    """Two sides of a cut move alike but for one way along its normal n, u_b - u_a = δ n: free, or -length."""
+
+    def __init__(self, mesh: Mesh, a: Where, b: Where, length: float | None = None) -> None:
+        super().__init__(mesh, a, b)
+        self.length, self.equations = length, length is None
+        below, self.above = self.nodes_of
+        self.below = opposite(mesh, below, self.above, np.zeros(3))
+        areas = [area_vectors(f.known_shape, mesh.points[f.nodes]) for f in faces_of(mesh, a, self.below)]
+        normal = np.sum([area.sum(axis=(0, 1)) for area in areas], axis=0)
+        self.normal = normal / np.linalg.norm(normal)
+        self.axis = int(np.abs(self.normal).argmax())
+        self.carriers = 3 * self.below[0] + self.axis, 3 * self.above[0] + self.axis
+
+    def __str__(self) -> str:
+        how = "free along its normal" if self.length is None else f"{self.length:g} m shorter"
+        return f"cut from {super().__str__()}, {how}"
+
+    def refined(self, finer: RefinedMesh) -> Cut:
+        """Return the cut on a finer mesh."""
+        return Cut(finer.mesh, finer.where(self.a), finer.where(self.b), self.length)
+
+    def constraints(self, fixed: Mask, known: Mask) -> Constraints:
+        """Return them; δ is that of the carriers, two degrees of freedom that stay free if it is."""
+        axes = np.arange(3)
+        one, other = ((3 * nodes[:, None] + axes).ravel() for nodes in (self.above, self.below))
+        turned, n = known.flat[one], np.tile(self.normal, len(self.above))
+        (a, b), stuck = self.carriers, fixed.flat[one] & fixed.flat[other] & (np.abs(n) > FLAT)
+        if (stuck.any() and self.length != 0.0) or (self.length is None and known.flat[[a, b]].any()):
+            raise ModelError(f"supports or constraints hold the {self}, along it; release them")
+        kept, sign = ~(turned & known.flat[other]), np.where(turned, -1.0, 1.0)
+        dependents, others = np.where(turned, [other, one], [one, other])
+        if self.length is not None:
+            constants = (-self.length * sign * n)[kept]
+            return Constraints.of(dependents[kept], others[kept, None], np.ones(kept.sum()), constants)
+        kept &= one != b
+        weight = sign * n / self.normal[self.axis]
+        independents = np.stack([others, np.full_like(others, b), np.full_like(others, a)], axis=1)
+        weights = np.stack([np.ones(len(weight)), weight, -weight], axis=1)[kept]
+        return Constraints.of(dependents[kept], independents[kept], weights, np.zeros(kept.sum()))
+
+
+class BoltForce(Load):
+    """A force in N that pulls the two sides of a cut together."""
+
+    def __init__(self, a: Where, b: Where, force: float) -> None:
+        self.a, self.b, self.force = a, b, number(force, "the force of a bolt", least=-np.inf)
+
+    def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
+        """Return the nodal forces (n, 3) in N: the work of the force, on the carriers of the cut."""
+        cut, total = Cut(mesh, self.a, self.b), np.zeros_like(mesh.points)
+        total.flat[list(cut.carriers)] = np.array([self.force, -self.force]) / cut.normal[cut.axis]
+        return total
+
+    def refined(self, finer: RefinedMesh) -> BoltForce:
+        """Return the same force on a finer mesh."""
+        return BoltForce(finer.where(self.a), finer.where(self.b), self.force)

@@ -28,7 +28,7 @@ from kratos_lite.model.loads import Load, ScaledLoad
 from kratos_lite.model.loads.base import key_of
 from kratos_lite.model.local_axes import Cartesian, LocalAxes, normal_of_plane
 from kratos_lite.model.locking import check_locking
-from kratos_lite.model.matching import Periodic
+from kratos_lite.model.matching import BoltForce, Cut, Periodic
 from kratos_lite.model.spurious_modes import check_rules, check_spurious_modes
 from kratos_lite.model.supports import DirichletCondition, Supports, axis_numbers
 from kratos_lite.model.ties import Tie
@@ -37,7 +37,7 @@ from kratos_lite.solvers.constraints import rigid_modes
 from kratos_lite.tabular import Tabular
 from kratos_lite.time_series import Factor
 from kratos_lite.typing import Array, ArrayLike
-from kratos_lite.validation import finite, function_or_none, instance
+from kratos_lite.validation import finite, function_or_none, instance, number
 
 
 class Attachment(ABC):
@@ -591,6 +591,64 @@ class Structure(Tabular):
         if old is None or not old.has(a, b):
             old = Periodic(self.mesh, [*(old.parts if old else []), (a, b)], E)
         self.supports.add_tie(old.strained(E))
+
+    def pretension(
+        self,
+        a: Where,
+        b: Where,
+        *,
+        force: float | None = None,
+        length: float | None = None,
+        amplitude: Factor | None = None,
+        name: str = "pretension",
+    ) -> None:
+        """Pull the two sides of a cut together, as a nut tightens a bolt: by a force, or by a length.
+
+        Both sides move alike but for one common way along the normal of the cut.  Said again for the same
+        cut, the new one holds: a bolt is tightened by a force, then locked by the length that this takes.
+
+        Parameters
+        ----------
+        a, b : the sides, parts with faces whose nodes lie at the same places, as of ``kl.split``.
+        force : N, tension in the bolt: a load by `name`; in load cases without it the bolt is loose.
+        length : m, by which the bolt becomes shorter.
+        amplitude : of the force, as for `add`.
+        name : of the load.
+
+        Raises
+        ------
+        InputError
+            There is not one of force and length.
+        ModelError
+            A side has no faces, or their nodes do not lie at the same places.
+        MeshError
+            There is no such part or node.
+
+        Examples
+        --------
+        >>> import kratos_lite as kl
+        >>> bolt = kl.split(kl.box(cells=(1, 1, 4)), lambda X: X[:, 2] == 0.5)
+        >>> model = kl.Model(bolt, kl.Isotropic3D(E=1e9, nu=0.0))
+        >>> model.fix("z-")
+        >>> model.fix("z+")
+        >>> model.pretension("cut-", "cut+", force=1e6)
+        >>> result = model.solve()
+        >>> print(f"{result.stress()[0, 0, 2]:.6g} Pa")
+        1e+06 Pa
+        >>> way = (result.displacement("cut-") - result.displacement("cut+"))[0, 2]
+        >>> model.pretension("cut-", "cut+", length=way)
+        >>> print(f"{model.solve().reaction('cut-')[:, 2].sum():.6g} N")
+        1e+06 N
+        """
+        if (force is None) == (length is None):
+            raise InputError("a pretension is a force in N or a length in m; give one of them")
+        length = None if length is None else number(length, "the length of a pretension", least=-np.inf)
+        load = None if force is None else BoltForce(a, b, force)
+        self.supports.add_tie(Cut(self.mesh, a, b, length))
+        if name in self.named_loads:
+            self.remove(name)
+        if load is not None:
+            self.add(load, amplitude=amplitude, name=name)
 
     def rigid_modes(self) -> Array:
         """Return the rigid-body modes (3n, 6): translations in x, y and z, rotations about x, y and z."""

@@ -41,6 +41,12 @@ class PartTie(ABC):
         self.mesh, self.a, self.b = mesh, a, b
         self.nodes_of = [mesh.nodes(where) for where in (a, b)]
         self.place = type(self), *(nodes.tobytes() for nodes in self.nodes_of)
+        both = np.intersect1d(self.nodes_of[0], self.nodes_of[1])
+        if len(both):
+            raise ModelError(
+                f"cannot tie {PartTie.__str__(self)}: both have node {mesh.node_ids[both[0]]}, and "
+                f"{len(both) - 1} more; each side needs nodes and a part of its own"
+            )
 
     @abstractmethod
     def constraints(self, fixed: Mask, known: Mask) -> Constraints:
@@ -119,15 +125,8 @@ def _constraints(dependents: Ints, rows: Any) -> Constraints:
 def _checked(tie: Tie) -> Mortar:
     """Return the integrals over the finer part, or the other if only that is covered; ModelError if none."""
     mesh, names = tie.mesh, str(PartTie.__str__(tie))
-    faces = [_faces(mesh, where, nodes) for where, nodes in zip((tie.a, tie.b), tie.nodes_of, strict=True)]
-    used = [np.unique(np.concatenate([block.nodes.ravel() for block in some])) for some in faces]
-    both = np.intersect1d(used[0], used[1])
-    if len(both):
-        raise ModelError(
-            f"cannot tie {names}: both have node {mesh.node_ids[both[0]]}, and {len(both) - 1} more; a tie "
-            "joins faces with nodes of their own, give one part for each side"
-        )
-    if mesh.hanging is not None and np.isin(mesh.hanging.nodes, np.concatenate(used)).any():
+    faces = [faces_of(mesh, where, nodes) for where, nodes in zip((tie.a, tie.b), tie.nodes_of, strict=True)]
+    if mesh.hanging is not None and np.isin(mesh.hanging.nodes, np.concatenate(tie.nodes_of)).any():
         raise ModelError(f"cannot tie {names}: nodes hang there; tie them on a mesh without, and no error=")
     radius = [np.mean([Cells(block, mesh.points).radius.mean() for block in some]) for some in faces]
     order = [0, 1] if radius[0] <= radius[1] else [1, 0]
@@ -148,7 +147,7 @@ def _checked(tie: Tie) -> Mortar:
     )
 
 
-def _faces(mesh: Mesh, where: Where, nodes: Ints) -> list[Block]:
+def faces_of(mesh: Mesh, where: Where, nodes: Ints) -> list[Block]:
     """Return the faces of a part; ModelError if there are none."""
     faces = [block for block in mesh.faces(where) if block.shape and block.shape.nodes.shape[1] == 2]
     if not faces:

@@ -96,7 +96,8 @@ def eliminate(
 
     _check(dependents, fixed.ravel(), name)
     entries = constraints.weights, constraints.independents, constraints.start
-    W: Any = csr_array(entries, shape=(count, fixed.size))
+    W: Any = csr_array(entries, shape=(count, fixed.size), copy=True)
+    W.eliminate_zeros()
     P: Any = W[:, dependents]
     components = connected_components(P, connection="strong")[1]
     on_circle = (np.bincount(components)[components] > 1) | (P.diagonal() != 0)

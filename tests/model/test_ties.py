@@ -197,7 +197,7 @@ FAR = "neither covers the other: some are 0.5 m apart, farther than"
     [
         ("a.x+", "a.x+", {}, "both have node 13, and 11 more"),
         ("a.x+", "a.y-", {}, "both have node"),
-        ("a.x+", (1.0, 0.0, 0.0), {}, "no face has all its nodes there"),
+        ("b.x-", (0.0, 0.0, 0.0), {}, "no face has all its nodes there"),
         ("a.x-", "b.x+", {}, "neither covers the other; tie parts"),
         ("a.x+", "b.y-", {}, "neither covers the other"),
         ("a.x+", "c.x-", {"tolerance": 0.1}, FAR),
