@@ -147,14 +147,13 @@ class Cut(PartTie):
             raise ModelError(f"supports or constraints hold the {self}, along it; release them")
         kept, sign = ~(turned & known.flat[other]), np.where(turned, -1.0, 1.0)
         dependents, others = np.where(turned, [other, one], [one, other])
-        if self.length is not None:
-            constants = (-self.length * sign * n)[kept]
-            return Constraints.of(dependents[kept], others[kept, None], np.ones(kept.sum()), constants)
-        kept &= one != b
-        weight = sign * n / self.normal[self.axis]
-        independents = np.stack([others, np.full_like(others, b), np.full_like(others, a)], axis=1)
-        weights = np.stack([np.ones(len(weight)), weight, -weight], axis=1)[kept]
-        return Constraints.of(dependents[kept], independents[kept], weights, np.zeros(kept.sum()))
+        moved = kept & (np.abs(n) > FLAT) & (self.length is None)
+        still, also, weight = kept & ~moved, moved & (one != b), sign * n / self.normal[self.axis]
+        constants = -(self.length or 0.0) * (sign * n)[still]
+        every = Constraints.of(dependents[still], others[still, None], np.ones(len(constants)), constants)
+        independents = np.stack([others, np.full_like(others, b), np.full_like(others, a)], axis=1)[also]
+        weights = np.stack([np.ones(len(weight)), weight, -weight], axis=1)[also]
+        return every + Constraints.of(dependents[also], independents, weights, np.zeros(len(weights)))
 
 
 class BoltForce(Load):

@@ -96,8 +96,7 @@ def eliminate(
 
     _check(dependents, fixed.ravel(), name)
     entries = constraints.weights, constraints.independents, constraints.start
-    W: Any = csr_array(entries, shape=(count, fixed.size), copy=True)
-    W.eliminate_zeros()
+    W: Any = csr_array(entries, shape=(count, fixed.size))
     P: Any = W[:, dependents]
     components = connected_components(P, connection="strong")[1]
     on_circle = (np.bincount(components)[components] > 1) | (P.diagonal() != 0)
