@@ -64,6 +64,7 @@ class Comparison(Tabular):
     nodes : (k,) rows of the nodes of the first mesh that are compared.
     outside : number of its nodes outside the mesh of the second, which are not.
     same_mesh : whether both have the same nodes, so that nothing is interpolated.
+    units : set of units of both.
     """
 
     displacement: Difference
@@ -72,6 +73,7 @@ class Comparison(Tabular):
     nodes: Ints
     outside: int
     same_mesh: bool
+    units: str = "SI"
 
     def table(self) -> list[tuple[str, str]]:
         """Return the rows of the summary, labels and values."""
@@ -106,7 +108,7 @@ def compare(first: Result, second: Result) -> Comparison:
     InputError
         One of them is no result.
     MeshError
-        No node of the first lies in the mesh of the second.
+        No node of the first lies in the mesh of the second, or they are in other units.
 
     Examples
     --------
@@ -123,6 +125,10 @@ def compare(first: Result, second: Result) -> Comparison:
     for result, name in ((first, "first"), (second, "second")):
         instance(result, name, Result, "model.solve()")
     mesh, used = first.mesh, first.mesh.used_nodes()
+    if mesh.units != second.mesh.units:
+        raise MeshError(
+            f"one result is in {mesh.units}, the other in {second.mesh.units}; compare like with like"
+        )
     same = mesh is second.mesh or np.array_equal(mesh.points, second.mesh.points)
     if same:
         nodes = np.flatnonzero(used)
@@ -145,6 +151,7 @@ def compare(first: Result, second: Result) -> Comparison:
         nodes,
         int(used.sum()) - len(nodes),
         same,
+        mesh.units,
     )
 
 

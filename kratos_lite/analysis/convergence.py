@@ -22,7 +22,7 @@ from kratos_lite.errors import InputError
 from kratos_lite.mesh.refinement import refine
 from kratos_lite.model.refined import refined
 from kratos_lite.model.structure import Structure
-from kratos_lite.tabular import Tabular
+from kratos_lite.tabular import Tabular, unit_name
 from kratos_lite.typing import Array, ArrayLike
 from kratos_lite.validation import finite, instance, number, short, whole_number
 
@@ -178,7 +178,10 @@ def converge(
             last = refined(last, refine(last.mesh).onto(geometry or {}))
         values[i] = number(measure(solve(last) if solve else last.solve()), "the value of the quantity")
         unknowns[i] = (~last.supports.fixed[last.mesh.used_nodes()]).sum() - len(last.supports.dependents())
-    of, unit = getattr(quantity, "__name__", str(quantity)), getattr(quantity, "unit", "")
+    of, unit = (
+        getattr(quantity, "__name__", str(quantity)),
+        unit_name(getattr(quantity, "unit", ""), last.units),
+    )
     return ConvergenceStudy(of, unit, h, unknowns, values, *limit_of(h, values))
 
 

@@ -16,6 +16,7 @@ from kratos_lite.mesh import Mesh
 from kratos_lite.mesh.facets import facets
 from kratos_lite.model.locking import better_element
 from kratos_lite.model.supports import AXES
+from kratos_lite.tabular import unit_name
 from kratos_lite.typing import Array, Mask
 
 if TYPE_CHECKING:
@@ -40,6 +41,7 @@ class ErrorEstimate:
     method : how it was found: ``"recovery"`` or ``"averaging"`` of stresses, whichever is smaller.
     warnings : why it cannot be trusted; empty where nothing speaks against it.
     safety : factor in all these; without it they are the best guess.
+    units : set of units of the mesh.
     """
 
     absolute: float
@@ -48,9 +50,11 @@ class ErrorEstimate:
     method: str
     warnings: list[str] = field(default_factory=list)
     safety: float = 1.0
+    units: str = "SI"
 
     def __str__(self) -> str:
-        return f"{self.relative:.2%} in the energy norm ({self.absolute:.4e} √J, by {self.method})"
+        unit = unit_name("√J", self.units)
+        return f"{self.relative:.2%} in the energy norm ({self.absolute:.4e} {unit}, by {self.method})"
 
 
 SAFETY = {"recovery": 1.7, "averaging": 1.8}
@@ -84,7 +88,7 @@ def energy_error(
     warnings = _warnings(recovered, is_coarse, groups, mesh) if relative > NEGLIGIBLE else []
     if mesh.n_elements == 1 and energy > 0 and not warnings:
         warnings = ["one element has no neighbors that could show its error"]
-    return ErrorEstimate(absolute, relative, per_element, method, warnings, SAFETY[method])
+    return ErrorEstimate(absolute, relative, per_element, method, warnings, SAFETY[method], mesh.units)
 
 
 def _warnings(recovered: Array, is_coarse: bool, groups: Sequence[ElementGroup], mesh: Mesh) -> list[str]:
@@ -219,7 +223,8 @@ def error_of(
     absolute += SAFETY["recovery"] * (float(np.abs(local).sum()) + quantity.spread(result))
     warnings += _concentrated(np.abs(contributions)) + too_few(result.mesh)
     contributions = contributions + local
-    return QuantityError(value, float(contributions.sum()), absolute, contributions, quantity.unit, warnings)
+    unit = unit_name(quantity.unit, result.mesh.units)
+    return QuantityError(value, float(contributions.sum()), absolute, contributions, unit, warnings)
 
 
 def _concentrated(sizes: Array) -> list[str]:

@@ -24,6 +24,7 @@ from kratos_lite.errors import KratosLiteError
 from kratos_lite.mesh import Mesh
 from kratos_lite.mesh.vtk import mesh_fields
 from kratos_lite.model.local_axes import LocalAxes
+from kratos_lite.tabular import in_units
 from kratos_lite.typing import Array, Numbers
 from kratos_lite.validation import instance
 
@@ -49,7 +50,7 @@ class Field:
 
     name: str  # in headings and legends
     kratos: str  # its variable in Kratos and in files for ParaView, which hold it if there is one
-    unit: str  # in SI
+    unit: str  # in SI; `in_units` says it in others
     kind: str  # a key of `PARTS`
     # ``point`` is any point of the mesh, ``state`` the nodes in a state; others as of `ElementFields.stress`
     where: tuple[str, ...]
@@ -249,7 +250,12 @@ def nodal_columns(result: Fields, local: LocalAxes | None = None) -> dict[str, N
     columns = {"node": result.mesh.node_ids, **PLACE.columns(result.mesh.points)}
     for name, field in listed("node", result.groups).items():
         columns |= field.along(local).columns(result.field(name, "node", local))
-    return columns
+    return labelled(columns, result.mesh.units)
+
+
+def labelled(columns: Mapping[str, Numbers], units: str) -> dict[str, Numbers]:
+    """Return columns whose headers are in a set of units."""
+    return {in_units(name, units): values for name, values in columns.items()}
 
 
 def data_frame(columns: Mapping[str, Numbers]) -> Any:

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.analysis.element_fields import ElementFields
-from kratos_lite.analysis.fields import COMPONENTS, PLACE, Field, data_frame, known, listed
+from kratos_lite.analysis.fields import COMPONENTS, PLACE, Field, data_frame, known, labelled, listed
 from kratos_lite.errors import nearest
 from kratos_lite.mesh.crossings import crossings
 from kratos_lite.mesh.locate import Located
 from kratos_lite.quadrature.gauss import legendre
+from kratos_lite.tabular import unit_name
 from kratos_lite.typing import Array, Numbers
 from kratos_lite.validation import choice
 
@@ -103,7 +104,7 @@ class PointValues:
         columns = PLACE.columns(self.points)
         for field in listed("point", self._fields.groups).values():
             columns |= field.columns(self._at(field))
-        return columns
+        return labelled(columns, self._fields.mesh.units)
 
     def to_dataframe(self) -> Any:
         """Return the columns as a data frame of pandas.
@@ -197,7 +198,7 @@ class LineValues(PointValues):
         dict of str to (n,) array
             ``kl.write("line.csv", values)`` writes them.
         """
-        return {"distance [m]": self.distance, **super().columns()}
+        return labelled({"distance [m]": self.distance, **super().columns()}, self._fields.mesh.units)
 
     def plot(
         self,
@@ -241,7 +242,8 @@ class LineValues(PointValues):
             i = COMPONENTS.index(values[1:])
             curves["membrane and bending"] = self.linear[:, i]
             curves["membrane"] = np.full(len(self.distance), self.membrane[i])
-        figure = line_figure(self.distance, curves, shown.unit, title, checked_size(size) or (6, 4))
+        units = [unit_name(unit, self._fields.mesh.units) for unit in ("m", shown.unit)]
+        figure = line_figure(self.distance, curves, units, title, checked_size(size) or (6, 4))
         if path is not None:
             save(figure, path)
         return figure

@@ -98,6 +98,7 @@ class Report(Tabular):
     history: list[RefinementStep] = field(default_factory=list)  # the meshes, the last one of the result
     steps: list[StepReport] = field(default_factory=list)  # of a quasi-static analysis
     work: float | None = None  # J, of its loads and supports
+    units: str = "SI"  # of all numbers, whose comments say those of SI
 
     def table(self) -> list[tuple[str, str]]:
         """Return the rows of the summary, labels and values."""

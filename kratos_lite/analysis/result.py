@@ -79,9 +79,15 @@ class Result(ElementFields, Tabular):
         for array in (reactions, loads):
             array.setflags(write=False)  # others are made of them later
         self.report = report
+        report.units = mesh.units
         self._analysis = analysis
         self._version = analysis.model.version if analysis else None
         self._acting: Sequence[Load] = ()  # loads of a static analysis
+
+    @property
+    def units(self) -> str:  # type: ignore[override]
+        """Set of units of the mesh, which all numbers are in."""
+        return self.mesh.units
 
     # ---- nodal values --------------------------------------------------------------------------
 

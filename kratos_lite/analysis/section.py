@@ -10,7 +10,7 @@ import numpy as np
 
 from kratos_lite import voigt
 from kratos_lite.analysis.element_fields import ElementFields
-from kratos_lite.analysis.fields import FIELDS, PLACE
+from kratos_lite.analysis.fields import FIELDS, PLACE, labelled
 from kratos_lite.analysis.report import vector
 from kratos_lite.assembly.nonlinear_assembly import internal_forces
 from kratos_lite.elements.surface import area_vectors, face_rule
@@ -56,6 +56,7 @@ class Section(Tabular):
     weights : (q,) m², their areas.
     stress : (q, 6) Pa, there.
     traction : (q, 3) Pa, force for each undeformed area there, σ n.
+    units : set of units of all numbers, which are said here as in SI.
     """
 
     where: str
@@ -68,6 +69,7 @@ class Section(Tabular):
     weights: Array
     stress: Array
     traction: Array
+    units: str = "SI"
 
     def moment_about(self, point: ArrayLike) -> Array:
         """Return the moment about another point.
@@ -101,8 +103,8 @@ class Section(Tabular):
         dict of str to (q,) array
             ``kl.write("cut.csv", section)`` writes them.
         """
-        area = {"area [m2]": self.weights}
-        return {**PLACE.columns(self.points), **area, **FIELDS["stress"].columns(self.stress)}
+        places = {**PLACE.columns(self.points), "area [m2]": self.weights}
+        return labelled({**places, **FIELDS["stress"].columns(self.stress)}, self.units)
 
     def table(self) -> list[tuple[str, str]]:
         """Return the rows of the summary, labels and values."""
@@ -148,6 +150,7 @@ def section(fields: ElementFields, where: Any, recovered: bool = True) -> Sectio
         dA,
         values.stress,
         np.einsum("qij,qj->qi", sigma, area / dA[:, None]),
+        mesh.units,
     )
 
 

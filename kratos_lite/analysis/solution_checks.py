@@ -15,6 +15,7 @@ from kratos_lite.model.checks import young_moduli
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.linear_solver import Solution
 from kratos_lite.solvers.plan import METHODS
+from kratos_lite.tabular import size_in_si
 from kratos_lite.typing import Array, Progress
 from kratos_lite.validation import choice, function_or_none
 
@@ -97,15 +98,17 @@ def check_deformation(model: Structure, groups: Sequence[ElementGroup], u: Array
     elif largest < TINY * size:
         return [
             f"displacements differ by {largest:.3g} m only, {largest / size:.1e} of the size of the body "
-            f"({size:.3g} m); {IN_MM}"
+            f"({size:.3g} m); {IN_MM if model.units == 'SI' else f'are all numbers in {model.units}?'}"
         ]
     if strain > STRAINED:
         found.append(f"strains reach at least {strain:.0%}")
-    if not found or all(young_moduli(group.material)[1] < UNITLESS for group in groups):
+    softest = UNITLESS / size_in_si("Pa", model.units)
+    if not found or all(young_moduli(group.material)[1] < softest for group in groups):
         return []
     meant = prescribed.any() and _diagonal(prescribed) > 0.5 * largest
+    asked = UNITS if model.units == "SI" else f"are all numbers in {model.units}?"
     limits = f"linear theory holds up to about {LARGE:.0%} of the size and strains of {STRAINED:.0%}"
-    return ["; ".join([", ".join(found), *([] if meant else [UNITS]), limits])]
+    return ["; ".join([", ".join(found), *([] if meant else [asked]), limits])]
 
 
 def largest_elongation(mesh: Mesh, u: Array) -> float:

@@ -15,6 +15,7 @@ from kratos_lite.errors import InputError, nearest
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.local_axes import LocalAxes
 from kratos_lite.model.structure import Structure
+from kratos_lite.tabular import unit_name
 from kratos_lite.typing import Array, Numbers
 from kratos_lite.validation import finite, number, short
 from kratos_lite.view.scene import Options, Subject, Values, factor_of
@@ -255,7 +256,8 @@ def nodal_values(result: Fields, name: str, local: LocalAxes | None = None) -> V
     names = names_of_parts({key: field.along(local) for key, field in known(result.groups).items()})
     if name not in names:
         raise InputError(f"unknown field {name!r}; there are {', '.join(names)}.{nearest(name, names, 1)}")
-    return named_values(names[name], lambda key: result.field(key, names[name][1].nodal_place, local))
+    values = named_values(names[name], lambda key: result.field(key, names[name][1].nodal_place, local))
+    return replace(values, unit=unit_name(values.unit, result.mesh.units))
 
 
 def named_values(shown: Part, values: Callable[[str], Array]) -> Values:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.elements.formulations import NON_LOCKING
-from kratos_lite.errors import InputError
+from kratos_lite.errors import InputError, ModelError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.checks import checked_linear_material
@@ -28,6 +28,8 @@ def elements_of(mesh: Mesh, material: Material, unnamed: str = NON_LOCKING) -> l
     for law in material.values() if isinstance(material, Mapping) else [material]:
         checked_linear_material(law)
     structure = Structure(mesh, material)
+    if mesh.units != "SI":
+        raise ModelError(f"bodies in motion are in SI, and this mesh is in {mesh.units}; convert its points")
     structure.check_geometry()
     groups = structure.element_groups(unnamed)
     check_rules(mesh, groups)

@@ -31,6 +31,8 @@ def case_of(options: Namespace, part: int | None = None) -> Case:
 
     `part` is the number of the part file to read, of a mesh in parts.
     """
+    if options.units is not None:
+        refuse(options, ["scale"], "makes a mesh one in m, which --units contradicts; give one of them")
     case = read_case(
         options.input,
         materials=all(where is not None for where, _ in options.material),
@@ -109,7 +111,9 @@ def _time(options: Namespace, of_file: TimeIntegration | None) -> TimeIntegratio
 
 
 def _add_to_model(model: Model, options: Namespace) -> None:
-    """Add the materials, supports, loads and motion of the command line to a model."""
+    """Add the units, materials, supports, loads and motion of the command line to a model."""
+    if options.units is not None:
+        model.mesh.use_units(options.units)
     if options.formulation is not None:
         try:
             model.formulation = options.formulation

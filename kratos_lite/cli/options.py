@@ -27,6 +27,7 @@ PICTURE = "picture of the deformed model, of its modes, or of a body along its p
 RESTART = "go on from a state that --state wrote; files hold the rest alone, so give them new names"
 STRESS_FREE = "do not take the DISPLACEMENT of free nodes in the file for the state without stress"
 SECTION = "force, moment and area of a cut: by a plane such as x=0.5, or around the elements of a part"
+UNITS = "consistent units of all numbers here and in the file, as a label: mm N MPa t, m kN kPa t (SI)"
 VTU = "how .vtu files store their numbers: quickest, smallest, or to be read by eye (binary)"
 
 
@@ -96,6 +97,7 @@ GROUPS = {
         ),
         Option("--formulation", "WORD", FORMULATION, only="models"),
         Option("--scale", "FACTOR", "on the coordinates of a mesh file: a number, or mm, cm, in, ft (1)"),
+        Option("--units", "SET", UNITS),
         Option("--linear", None, "small displacements and linear laws, whatever a run file asks for"),
         Option("--ignore-initial-displacement", None, STRESS_FREE),
     ),

@@ -24,9 +24,9 @@ from kratos_lite.mesh.blocks import (
 )
 from kratos_lite.mesh.selection import Where, WhereElements, find_elements, find_nodes, find_part
 from kratos_lite.mesh.topology import Faces, inverted, mirror
-from kratos_lite.tabular import Tabular
+from kratos_lite.tabular import UNITS, Tabular
 from kratos_lite.typing import Array, ArrayLike, Ints, Mask
-from kratos_lite.validation import finite, instance, read_only, whole_numbers
+from kratos_lite.validation import choice, finite, instance, read_only, whole_numbers
 
 if TYPE_CHECKING:
     from kratos_lite.mesh.hanging import HangingNodes
@@ -50,6 +50,8 @@ class Mesh(Tabular):
     source : name of the file it came from, used in messages.
     hanging : nodes inside edges or faces of larger neighbors, as `refine` finds them.
     whole : False for one part of a larger mesh, where named parts may be empty.
+    units : consistent set of units that its numbers are in, ``SI``, ``mm N MPa t`` or ``m kN kPa t``; see
+        `use_units`.
 
     Raises
     ------
@@ -73,6 +75,7 @@ class Mesh(Tabular):
     source: str
     hanging: HangingNodes | None
     whole: bool
+    units: str
 
     def __init__(
         self,
@@ -85,6 +88,7 @@ class Mesh(Tabular):
         source: str = "",
         hanging: HangingNodes | None = None,
         whole: bool = True,
+        units: str = "SI",
     ) -> None:
         X = finite(points, "points", ("n", 3), error=MeshError)
         n = len(X)
@@ -99,6 +103,7 @@ class Mesh(Tabular):
             source=source,
             hanging=hanging,
             whole=whole,
+            units=choice(units, "units", UNITS, error=MeshError),
         )
         if not self._is_counting:
             ordered = self.node_ids[self._node_order]
@@ -110,7 +115,7 @@ class Mesh(Tabular):
 
     def _arguments(self) -> dict[str, Any]:
         """Return what an equal mesh is made of."""
-        names = ("points", "blocks", "node_ids", "conditions", "source", "hanging", "whole")
+        names = ("points", "blocks", "node_ids", "conditions", "source", "hanging", "whole", "units")
         return {"parts": self._parts, **{name: getattr(self, name) for name in names}}
 
     def __reduce__(self) -> tuple[Any, ...]:  # copies and unpickled meshes are made as all others are
@@ -170,6 +175,26 @@ class Mesh(Tabular):
         changes = dict(points=points, blocks=blocks, conditions=conditions, parts=parts, whole=whole)
         given = {name: value for name, value in changes.items() if value is not None}
         return Mesh(**{**self._arguments(), **given})
+
+    def use_units(self, units: str) -> None:
+        """Say in which units all numbers of the mesh and of its models are; no number changes.
+
+        Tables, headers and pictures show these units, and checks of magnitudes go by them.  Materials, loads
+        and supports are to be given in them: with ``mm N MPa t`` lengths in mm, forces in N, stresses in MPa,
+        densities in t/mm³ (steel: 7.85e-9), accelerations in mm/s² (gravity: 9810), energies are in mJ.
+
+        Parameters
+        ----------
+        units : as for a new mesh.
+
+        Raises
+        ------
+        MeshError
+            There is no such set of units, or other ones than those of SI were said before.
+        """
+        if self.units not in ("SI", choice(units, "units", UNITS, error=MeshError)):
+            raise MeshError(f"the mesh is said to be in {self.units}, on which models rely; make another one")
+        vars(self)["units"] = units
 
     # ---- nodes and elements ----------------------------------------------------------------
 

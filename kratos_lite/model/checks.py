@@ -19,6 +19,7 @@ from kratos_lite.mesh import Block, Mesh
 from kratos_lite.model.loads import Load
 from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.supports import Supports
+from kratos_lite.tabular import size_in_si, unit_name
 from kratos_lite.typing import Array, Mask
 from kratos_lite.validation import instance
 
@@ -137,15 +138,14 @@ def check_scales(mesh: Mesh, groups: Sequence[ElementGroup]) -> Iterator[str]:
     stiff = [float(np.abs(group.material.C).max()) for group in groups]
     if stiff and max(stiff) > 1e10 * min(stiff):
         yield f"stiffnesses differ by a factor of {max(stiff) / min(stiff):.1e}; expect fewer digits"
-    if float((high - low).prod()) > BULKY:
-        metal = (group for group in groups if young_moduli(group.material)[1] > METAL)
-        volume = sum(float(volumes(mesh.points, group).sum()) for group in metal)
-        if volume > BULKY:
-            yield (
-                f"{volume:.3g} m³ are as stiff as metal: are lengths in mm (read with scale=1e-3, or "
-                "--scale mm)?"
-            )
-    yield from check_wave_speeds(group.material for group in groups)
+    bulky, metal = BULKY / size_in_si("m³", mesh.units), METAL / size_in_si("Pa", mesh.units)
+    if float((high - low).prod()) > bulky:
+        stiff_groups = (group for group in groups if young_moduli(group.material)[1] > metal)
+        volume = sum(float(volumes(mesh.points, group).sum()) for group in stiff_groups)
+        if volume > bulky:
+            cure = "are lengths in mm (read with scale=1e-3, --scale mm, or units=)?"
+            yield f"{volume:.3g} m³ are as stiff as metal: {cure}"
+    yield from check_wave_speeds((group.material for group in groups), mesh.units)
 
 
 def check_nodes(mesh: Mesh) -> Iterator[str]:
@@ -156,8 +156,9 @@ def check_nodes(mesh: Mesh) -> Iterator[str]:
         yield f"{len(unused)} nodes belong to no element and carry no equations: {shown}"
 
 
-def check_wave_speeds(materials: Iterable[Material]) -> list[str]:
-    """Warn where the speed of waves sqrt(E/ρ) says that E and ρ can hardly both be in SI units."""
+def check_wave_speeds(materials: Iterable[Material], units: str = "SI") -> list[str]:
+    """Warn where the speed of waves sqrt(E/ρ) says that E and ρ can hardly both be in their units."""
+    slowest, quickest = (speed / size_in_si("m", units) for speed in (SLOWEST, QUICKEST))
     speeds = {
         str(material): float(np.sqrt(young_moduli(material)[1]) / np.sqrt(material.density))
         for material in materials
@@ -165,31 +166,35 @@ def check_wave_speeds(materials: Iterable[Material]) -> list[str]:
     }  # E/ρ may be too large a number
     return [
         f"the speed of waves sqrt(E/density) is {speed:.3g} m/s in {material}; solids have "
-        f"{SLOWEST:g} to {QUICKEST:g} m/s: are E in Pa and the density in kg/m³?"
+        f"{slowest:g} to {quickest:g} m/s: are E in {unit_name('Pa', units)} and the density in "
+        f"{unit_name('kg/m³', units)}?"
         for material, speed in speeds.items()
-        if not SLOWEST <= speed <= QUICKEST
+        if not slowest <= speed <= quickest
     ]
 
 
-def unusual_constants(materials: Iterable[Material]) -> Iterator[str]:
+def unusual_constants(materials: Iterable[Material], units: str = "SI") -> Iterator[str]:
     """Note constants far from those of all engineering materials, so that units may be wrong."""
+    pascal, dense = (size_in_si(unit, units) for unit in ("Pa", "kg/m³"))
+    E_unit, unit = unit_name("Pa", units), unit_name("kg/m³", units)
     for material in materials:
-        (low, high), density = young_moduli(material), material.density
+        low, high, density = *(pascal * E for E in young_moduli(material)), dense * material.density
         soft = high < SOFTEST * (1 - 1e-9)
         if soft or low > STIFFEST:
             yield (
                 f"E of {material} is far {'below' if soft else 'above'} that of any engineering "
-                "material, from 100 (gels) to 1.2e12 Pa (diamond): is it in Pa?"
+                f"material, from {100 / pascal:g} (gels) to {1.2e12 / pascal:g} Pa (diamond): is it in "
+                f"{E_unit}?"
             )
         elif density > HEAVY and high < HARD:
             yield (
-                f"{material} is as heavy as concrete, rock or metal, whose E is 1e10 Pa and more, but soft "
-                "as rubber: is E in Pa (steel: 210e9)?"
+                f"{material} is as heavy as concrete, rock or metal, whose E is {1e10 / pascal:g} Pa and "
+                f"more, but soft as rubber: is E in {E_unit} (steel: {210e9 / pascal:g})?"
             )
         if density > 0 and not LIGHTEST <= density <= HEAVIEST:
             yield (
-                f"the density of {material} is far from that of any engineering material, 1 (aerogel) to "
-                "22,600 kg/m³ (osmium): is it in kg/m³ (steel: 7850)?"
+                f"the density of {material} is far from that of any engineering material, {1 / dense:g} "
+                f"(aerogel) to {22600 / dense:,g} kg/m³ (osmium): is it in {unit} (steel: {7850 / dense:g})?"
             )
 
 
@@ -248,7 +253,11 @@ def check_energy(work: Array, rounding: float = 0.0) -> list[str]:
 def check_loads(
     loads: Sequence[Load], groups: Sequence[ElementGroup], forces: Array, supports: Supports
 ) -> list[str]:
-    """Warn of loads that cannot do anything: gravity without mass, or forces on fixed components alone."""
+    """Warn of loads that do nothing: gravity without mass or in m/s², forces on fixed components alone."""
+    metre = size_in_si("m", supports.mesh.units)
+    weights = [load.force for load in loads if isinstance(load, Gravity) and np.shape(load.force) == (3,)]
+    if metre != 1 and any(9.7 < np.linalg.norm(g) < 9.9 for g in weights):
+        return [f"gravity is 9.81 in m/s²; this model is in {supports.mesh.units}: give {9.81 / metre:g}"]
     if any(isinstance(load, Gravity) for load in loads) and all(g.material.density == 0 for g in groups):
         return ["gravity acts on no mass: every material has density 0; give density in kg/m³"]
     if forces[~supports.fixed].any() or supports.values.any() or supports.constraints.constants.any():

@@ -24,7 +24,7 @@ def refined(structure: S, finer: RefinedMesh) -> S:
             "a model whose material moves through the mesh cannot be carried over to a finer one"
         )
     new = copy(structure)  # a class of a user may have a constructor of its own
-    Structure.__init__(new, finer.mesh)
+    Structure.__init__(new, finer.mesh, units=structure.units)
     try:
         new.formulation = structure.formulation
     except InputError:

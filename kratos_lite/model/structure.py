@@ -63,7 +63,7 @@ class Structure(Tabular):
 
     Parameters
     ----------
-    mesh, material, formulation : as for a `Model`, with the same errors.
+    mesh, material, formulation, units : as for a `Model`, with the same errors.
 
     Attributes
     ----------
@@ -77,8 +77,11 @@ class Structure(Tabular):
         mesh: Mesh,
         material: Material | Mapping[Any, Material] | None = None,
         formulation: str | None = None,
+        units: str | None = None,
     ) -> None:
         self._mesh = instance(mesh, "a mesh", Mesh, "kl.box()")
+        if units is not None:
+            mesh.use_units(units)
         self._materials: list[Material] = []
         self._material_of = np.full(mesh.n_elements, -1)
         self._rules: dict[int, Rule | int] = {}
@@ -106,6 +109,11 @@ class Structure(Tabular):
         return self._changes, self.supports.version
 
     # ---- elements and materials ---------------------------------------------------------------
+
+    @property
+    def units(self) -> str:  # type: ignore[override]
+        """Set of units of the mesh, which all numbers are in."""
+        return self.mesh.units
 
     @property
     def mesh(self) -> Mesh:
@@ -809,7 +817,7 @@ class Structure(Tabular):
 
     def remarks(self) -> list[str]:
         """Return what readers of files noted, and constants of materials that no engineering material has."""
-        return [*self.notes, *dict.fromkeys(checks.unusual_constants(self._used_materials()))]
+        return [*self.notes, *dict.fromkeys(checks.unusual_constants(self._used_materials(), self.units))]
 
     def _used_materials(self) -> list[Material]:
         used = distinct(self._material_of)
@@ -820,7 +828,7 @@ class Structure(Tabular):
     def table(self) -> list[tuple[str, str]]:
         """Return labels and values of a summary."""
         without = int((self._material_of < 0).sum())
-        rows = self.mesh.table()
+        rows = [*self.mesh.table(), *([] if self.units == "SI" else [("units", self.units)])]
         rows += [("formulation", text)] if (text := self.chosen()) else []
         rows += [("material", str(material)) for material in self._used_materials()]
         rows += [("material", f"none for {without} elements")] if without else []

@@ -79,7 +79,7 @@ def new_plot(size: tuple[float, float], *units: str, log: bool = False) -> tuple
     axes = figure.add_subplot(xscale=scale, yscale=scale)
     axes.spines[["top", "right"]].set_visible(False)
     for axis, unit in zip((axes.xaxis, axes.yaxis), units, strict=True):
-        axis.set_major_formatter(EngFormatter(unit) if unit else "{x:g}")
+        axis.set_major_formatter(EngFormatter(unit) if unit in PREFIXED else f"{{x:g}} {unit}".rstrip())
         if log:
             axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
             axis.set_minor_formatter("")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from kratos_lite.typing import Array
@@ -14,10 +14,10 @@ STYLES = (("-", BLUE, 1.8), ((0, (5, 3)), RED, 1.4), ((0, (1, 2)), "0.35", 1.6))
 
 
 def line_figure(
-    x: Array, curves: Mapping[str, Array], unit: str, title: str, size: tuple[float, float]
+    x: Array, curves: Mapping[str, Array], units: Sequence[str], title: str, size: tuple[float, float]
 ) -> Any:
-    """Return a figure of up to three curves (k,) by their labels, against a distance x (k,) in m."""
-    figure, axes = new_plot(size, "m", unit)
+    """Return a figure of up to three curves (k,) by their labels, against a distance x (k,)."""
+    figure, axes = new_plot(size, *units)
     for (name, values), (dashes, color, width) in zip(curves.items(), STYLES, strict=False):
         axes.plot(x, values, ls=dashes, color=color, lw=width, label=name)
     axes.margins(x=0)

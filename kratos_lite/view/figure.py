@@ -86,10 +86,10 @@ def _laid_out(
     # The rulers are those of the first panel of the last line, where they are in nobody's way.
     first = (len(panels) - 1) // columns * columns
     if scene.zoomed or scene.subjects[first].moving:
-        draw_triad(panels[first], scene.rows, scene.window, inch)
+        draw_triad(panels[first], scene.rows, scene.window, inch, units=scene.subjects[first].mesh.units)
     else:
         subject = scene.subjects[first]
-        draw_rulers(panels[first], scene.rows, subject.mesh.points, drawn_points(scene, subject), inch)
+        draw_rulers(panels[first], scene.rows, subject.mesh, drawn_points(scene, subject), inch)
         step[0] = max(step[0], canvas.right_of(panels[first]) + GAP / 2)
     for number, axes in enumerate(panels):
         line, column = divmod(number, columns)

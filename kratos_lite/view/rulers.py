@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from kratos_lite.mesh import Mesh
+from kratos_lite.tabular import UNITS
 from kratos_lite.typing import Array
 from kratos_lite.view.camera import box_corners
 
@@ -16,11 +18,11 @@ SHORTEST = 0.15
 """Share of its length that an axis must have in the picture for a ruler."""
 
 
-def draw_rulers(axes: Any, rows: Array, X: Array, drawn: Array, inch: float) -> None:
-    """Draw the extent of nodes X (n, 3) along x, y and z, clear of what is drawn (k, 2) m."""
-    low, high = X.min(axis=0), X.max(axis=0)
+def draw_rulers(axes: Any, rows: Array, mesh: Mesh, drawn: Array, inch: float) -> None:
+    """Draw the extent of the nodes of a mesh along x, y and z, clear of what is drawn (k, 2) m."""
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
     corners, texts = box_corners(low, high), []
-    factor, unit = _unit(float((high - low).max()))
+    factor, unit = _unit(float((high - low).max()), mesh.units)
     for i in range(3):
         along = rows[:2, i]
         if np.linalg.norm(along) < SHORTEST:
@@ -40,8 +42,10 @@ def draw_rulers(axes: Any, rows: Array, X: Array, drawn: Array, inch: float) -> 
     _separate(axes, texts, inch)
 
 
-def _unit(size: float) -> tuple[float, str]:
-    """Return the factor from m, and the unit, for a body of a size."""
+def _unit(size: float, units: str) -> tuple[float, str]:
+    """Return the factor from m, and the unit, for a body of a size; 1 and theirs of other lengths."""
+    if (other := UNITS[units].get("m")) is not None:
+        return 1.0, other[0]
     for least, factor, unit in ((1e4, 1e-3, "km"), (1e-2, 1.0, "m"), (1e-5, 1e3, "mm"), (1e-8, 1e6, "µm")):
         if size >= least:
             return factor, unit
@@ -86,7 +90,9 @@ def _free(text: Any, place: Array, renderer: Any, placed: list[Any]) -> bool:
     return not any(box.overlaps(other) for other in placed)
 
 
-def draw_triad(axes: Any, rows: Array, window: tuple[Array, Array], inch: float, down: float = 0.0) -> None:
+def draw_triad(
+    axes: Any, rows: Array, window: tuple[Array, Array], inch: float, down: float = 0.0, units: str = "SI"
+) -> None:
     """Draw the three axes and their length beneath the lower left of a window, `down` inches deeper."""
     low, high = window
     length = rounded(min(0.5 * inch, 0.3 * float((high - low).max())))
@@ -101,7 +107,7 @@ def draw_triad(axes: Any, rows: Array, window: tuple[Array, Array], inch: float,
             axes.plot(*np.array([start, start + end]).T, color=INK, lw=1.0, clip_on=False)
             place = start + end * (1 + 0.1 * inch / np.linalg.norm(end))
             axes.text(*place, name, ha="center", va="center", size=9, color=TEXT)
-    factor, unit = _unit(length)
+    factor, unit = _unit(length, units)
     place = start + np.array([np.maximum(ends[:, 0], 0).max() + 0.25 * inch, 0.0])
     axes.text(*place, f"{length * factor:g} {unit}", ha="left", va="center", size=9, color=TEXT)
 

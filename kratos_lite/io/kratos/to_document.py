@@ -60,6 +60,8 @@ def document_from(model: Model) -> Document:
     document = Document(written, properties, nodal_data=data, constraints=constraints)
     if mesh.conditions:
         document.notes.append(Note(0, "conditions are replaced by the nodal forces of their loads"))
+    if mesh.units != "SI":
+        document.notes.append(Note(0, f"that the numbers, which stay, are in {mesh.units}"))
     return document
 
 

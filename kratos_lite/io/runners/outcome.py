@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from kratos_lite.analysis.result import Result
 from kratos_lite.io.case import Case
 from kratos_lite.io.outputs import write_at_end
+from kratos_lite.tabular import in_units
 
 WIDTH = 22
 """Of the left column of tables."""
@@ -50,7 +51,8 @@ class Outcome:
         for where in self.case.outputs.sections if self.result else ():
             rows = [*rows, *self.result.section(where).table()]  # type: ignore[union-attr]
         shown = [(name, text) for name, text in rows if verbose or name != "skipped"]
-        return [*self.lines, *(f"{name:<{WIDTH}}{text}" for name, text in shown)]
+        units = self.case.model.units if self.case.is_of_model else "SI"
+        return [*self.lines, *(f"{name:<{WIDTH}}{in_units(text, units)}" for name, text in shown)]
 
     def compare(self) -> list[str]:
         """Return a line for each expected value of the case: passed, failed or not evaluated.

@@ -35,6 +35,7 @@ class RecordedBody:
     """A body, or many as arrays only."""
 
     columns: tuple[str, ...] = OF_BODIES
+    units = "SI"
     names: tuple[str, ...] = ("time", "step", "q", "u", "external_work")
 
     def __init__(self, body: Body, path: str | Path) -> None:
@@ -88,6 +89,7 @@ class RecordedModel:
 
     def __init__(self, transient: Any) -> None:
         self.transient = transient
+        self.units = self.mesh().units
 
     def now(self) -> Any:
         """Return the state of the model as it is now."""

@@ -105,7 +105,7 @@ def write_json(path: str | Path, result: Result, sections: Sequence[Any] = ()) -
 
     from kratos_lite import __version__
 
-    content = {"kratos_lite": __version__, "units": "SI", **summary(result), **_by_node(result)}
+    content = {"kratos_lite": __version__, "units": result.units, **summary(result), **_by_node(result)}
     if sections:
         content["sections"] = [_section(result.section(where)) for where in sections]
     try:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from kratos_lite.analysis.fields import labelled
 from kratos_lite.analysis.quasi_static import QuasiStaticAnalysis
 from kratos_lite.analysis.transient import TransientAnalysis
 from kratos_lite.atomic import refuse_nan, write_arrays
@@ -75,7 +76,8 @@ class Table(Arrays):
 
     def write(self) -> None:
         """Write the lines."""
-        write_table(self.path, dict(zip(self.subject.columns, np.transpose(self.rows), strict=True)))
+        columns = dict(zip(self.subject.columns, np.transpose(self.rows), strict=True))
+        write_table(self.path, labelled(columns, self.subject.units))
 
 
 class Page(Arrays):

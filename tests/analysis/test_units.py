@@ -1,0 +1,233 @@
+"""Models said to be in other units than those of SI: the same numbers with the right words everywhere."""
+
+import json
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.errors import KratosLiteError
+from kratos_lite.mesh.refinement import refine
+from kratos_lite.model.refined import refined
+from kratos_lite.tabular import UNITS, in_units, size_in_si, unit_name
+
+MM = "mm N MPa t"
+SIZES = {"SI": (1.0, 1.0, 1.0), MM: (1e3, 1e-6, 1e-12), "m kN kPa t": (1.0, 1e-3, 1e-3)}
+"""Sizes of 1 m, 1 Pa and 1 kg/m³ in each set of units."""
+
+
+def bracket(units="SI", gravity=0.0):
+    """Return a steel bar of 100 × 20 × 10 mm under 1 MPa across its end, with its numbers in units."""
+    m, Pa, dense = SIZES[units]
+    mesh = kl.box(np.array([0.1, 0.02, 0.01]) * m, (5, 1, 1), "KinematicLinear3D20N")
+    model = kl.Model(mesh, kl.Isotropic3D(E=210e9 * Pa, nu=0.3, density=7850 * dense), units=units)
+    model.fix("x-")
+    model.add(kl.Traction("x+", (0, 0, -1e6 * Pa)))
+    if gravity:
+        model.add(kl.Gravity((0, 0, -gravity)))
+    return model
+
+
+# ---- words -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("units", UNITS)
+def test_sets_of_units_are_consistent(units):
+    """Pa = N/m², J = N m, and N = kg m/s²."""
+    m, N, Pa, J, kg = (size_in_si(unit, units) for unit in ("m", "N", "Pa", "J", "kg"))
+    assert abs(N / m**2 / Pa - 1) < 1e-12
+    assert abs(N * m / J - 1) < 1e-12
+    assert abs(kg * m / N - 1) < 1e-12
+    assert abs(size_in_si("kg/m³", units) / (kg / m**3) - 1) < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("1.5e-3 m at node 3, (0, 0, 1) m", "1.5e-3 mm at node 3, (0, 0, 1) mm"),
+        ("[0, 1] × [0, 2] m", "[0, 1] × [0, 2] mm"),
+        ("3 Pa, 2 J, 4 N, 5 N m, 6 kg", "3 MPa, 2 mJ, 4 N, 5 N mm, 6 t"),
+        ("2 J/m³, 3 m/s², 4 kg m², 5 √J, 7 m² (8 m³)", "2 mJ/mm³, 3 mm/s², 4 t mm², 5 √mJ, 7 mm² (8 mm³)"),
+        (
+            "stress xx [Pa], area [m2], energy [J/m3], time [s]",
+            "stress xx [MPa], area [mm2], energy [mJ/mm3], time [s]",
+        ),
+        (
+            "13 nodes, 4 modes, 165 MB, 0.1 s, 3 Hz, 2 rad/s",
+            "13 nodes, 4 modes, 165 MB, 0.1 s, 3 Hz, 2 rad/s",
+        ),
+        ("8 KinematicLinear3D8N, E=3.0, 5 mm", "8 KinematicLinear3D8N, E=3.0, 5 mm"),
+    ],
+)
+def test_units_in_texts(text, words):
+    assert in_units(text, MM) == words
+    assert in_units(in_units(text, MM), MM) == words
+    assert in_units(text, "SI") == text
+
+
+def test_names_of_units():
+    assert unit_name("J/m³", MM) == "mJ/mm³"
+    assert unit_name("", MM) == ""
+    assert unit_name("my unit", MM) == "my unit"
+
+
+# ---- results -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("units", UNITS)
+def test_the_bracket_has_the_stress_of_its_units(units):
+    """Whatever the units, it is the same bracket."""
+    m, Pa, _ = SIZES[units]
+    result, same = bracket(units).solve(), bracket().solve()
+    assert abs(result.largest_von_mises()[0] / Pa / same.largest_von_mises()[0] - 1) < 1e-9
+    assert np.abs(result.u / m - same.u).max() < 1e-9 * np.abs(same.u).max()
+    assert abs(result.energy() * size_in_si("J", units) / same.energy() - 1) < 1e-9
+    assert result.report.warnings == same.report.warnings
+    assert result.report.notes == []
+
+
+def test_all_words_of_the_bracket_in_mm(tmp_path):
+    model = bracket(MM)
+    result = model.solve()
+    assert "extent    [0, 100] × [0, 20] × [0, 10] mm" in str(model)
+    assert ("units", MM) in model.table()
+    text = str(result)
+    for words in (" mm at node", " mJ", " MPa (at a Gauss point)", ") N", "√mJ", ") mm"):
+        assert words in text
+    assert " m\n" not in text
+    assert " Pa" not in text
+    assert " J" not in text
+    assert "mm" in result._repr_html_()
+    assert {"x [mm]", "displacement z [mm]", "stress xx [MPa]", "strain energy density [mJ/mm3]"} <= set(
+        result.columns()
+    )
+    line = result.along((0, 10, 5), (100, 10, 5), 3)
+    assert {"distance [mm]", "stress xx [MPa]"} <= set(line.columns())
+    cut = result.section(("x", 40.0))
+    assert "x = 40 mm, area 200 mm²" in str(cut)
+    assert "N mm" in str(cut)
+    assert "area [mm2]" in cut.columns()
+    assert "mJ" in str(kl.compare(result, result))
+    assert "√mJ" in str(result.error())
+    assert result.error(of=kl.DisplacementAt((100, 10, 5), "z")).unit == "mm"
+    kl.write(tmp_path / "r.json", result)
+    assert json.loads((tmp_path / "r.json").read_text())["units"] == MM
+
+
+def test_pictures_in_mm(tmp_path):
+    pytest.importorskip("matplotlib")
+    result = bracket(MM).solve()
+    figure = result.plot(tmp_path / "r.png")
+    texts = {text.get_text() for axes in figure.axes for text in axes.texts}
+    assert {"x  0 … 100 mm", "z  0 … 10 mm"} <= texts
+    labels = {axes.get_xlabel() + axes.get_ylabel() for axes in figure.axes}
+    assert any(label.strip() == "MPa" for label in labels)
+    axes = result.along((0, 10, 5), (100, 10, 5)).plot(values="sxx").axes[0]
+    assert axes.yaxis.get_major_formatter()(10, 0) == "10 MPa"
+    assert axes.xaxis.get_major_formatter()(5000, 0) == "5000 mm"
+
+
+def test_units_go_along_to_finer_meshes_and_studies():
+    model = bracket(MM)
+    assert refined(model, refine(model.mesh)).units == MM
+    assert model.mesh.replace(points=2 * model.mesh.points).units == MM
+    study = kl.converge(lambda h: bracket(MM), kl.MeanDisplacement("x+", "z"), (3, 2, 1))
+    assert study.unit == "mm"
+
+
+def test_steps_in_time_have_their_units(tmp_path, run, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    model = bracket(MM)
+    writer = kl.SeriesWriter("r.csv", transient := model.transient())
+    for state in kl.integrate(transient, 1e-5, 2):
+        writer.add(state)
+    writer.close()
+    assert "energy [mJ],largest displacement [mm]" in (tmp_path / "r.csv").read_text()
+    mesh = kl.box((100, 20, 10), (5, 1, 1))
+    kl.write("bar.vtu", mesh)
+    words = ["--units", MM, "--material", "E=210e3,nu=0.3,density=7.85e-9", "--fix", "x-:xyz"]
+    words += ["--traction", "x+:0,0,-1"]
+    static = run("solve", "bar.vtu", *words, "--section", "x=50")
+    assert "MPa (at a Gauss point)" in static.out
+    assert "(0, 0, -200) N" in static.out
+    assert "area 200 mm²" in static.out
+    moving = run("solve", "bar.vtu", *words, "--time", "1e-5:2")
+    assert " mJ at the start" in moving.out
+    assert " m at" not in moving.out
+    assert run("solve", "bar.vtu", *words, "--scale", "mm").refuses("--scale makes a mesh one in m")
+    assert run("solve", "bar.vtu", "--units", "cm").refuses("units must be one of SI, mm N MPa t")
+
+
+# ---- magnitudes --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("units", UNITS)
+def test_magnitudes_of_each_set_of_units(units):
+    m, Pa, dense = SIZES[units]
+    wrong = kl.Model(
+        kl.box(np.array([1, 1, 1]) * m), kl.Isotropic3D(E=1e16 * Pa, nu=0.3, density=1e8 * dense), units=units
+    )
+    wrong.fix("x-")
+    wrong.add(kl.Traction("x+", (1e6 * Pa, 0, 0)))
+    notes = " ".join(wrong.solve().report.notes)
+    assert f"(diamond): is it in {unit_name('Pa', units)}?" in notes
+    assert f"is it in {unit_name('kg/m³', units)} (steel: {7850 * dense:g})" in notes
+    assert f"to {1.2e12 * Pa:g}" in notes
+
+
+def test_metal_in_mm_is_no_mountain_and_its_waves_are_no_light():
+    assert bracket(MM).check() == bracket().check()
+    said_in_m = bracket(MM)
+    vars(said_in_m.mesh)["units"] = "SI"
+    assert any(
+        "m³" in text or "speed of waves" in text
+        for text in said_in_m.solve().report.warnings + said_in_m.remarks()
+    )
+
+
+@pytest.mark.parametrize(("gravity", "warned"), [(9.81, True), (9810.0, False)])
+def test_gravity_in_mm(gravity, warned):
+    warnings = " ".join(bracket(MM, gravity).check() + bracket(MM, gravity).solve().report.warnings)
+    assert ("this model is in mm N MPa t: give 9810" in warnings) == warned
+    assert "gravity is 9.81" not in " ".join(bracket("SI", 9.81).solve().report.warnings)
+
+
+# ---- refused -----------------------------------------------------------------------------------------------
+
+
+def _page(model, folder):
+    kl.write(folder / "r.html", model.solve())
+
+
+def _body(model, folder):
+    kl.FiniteElementBody(model.mesh, kl.Isotropic3D(E=1e3, nu=0.3, density=1e-9))
+
+
+@pytest.mark.parametrize(
+    ("act", "words"),
+    [
+        (_page, "pages are in SI, and this mesh is in mm N MPa t"),
+        (_body, "bodies in motion are in SI, and this mesh is in mm N MPa t"),
+        (
+            lambda model, _: kl.compare(model.solve(), bracket().solve()),
+            "one result is in mm N MPa t, the other in SI",
+        ),
+        (lambda model, _: model.mesh.use_units("m kN kPa t"), "is said to be in mm N MPa t"),
+        (
+            lambda model, _: kl.Model(kl.box(), units="mm"),
+            "units must be one of SI, mm N MPa t, m kN kPa t; got 'mm'",
+        ),
+        (lambda model, _: kl.Model(kl.box(), units=3), "units must be one of"),
+        (lambda model, _: kl.Mesh([[0, 0, 0]], units="inch"), "units must be one of"),
+    ],
+)
+def test_refused_by_name(act, words, tmp_path):
+    with pytest.raises(KratosLiteError) as error:
+        act(bracket(MM), tmp_path)
+    assert words in str(error.value)
+
+
+def test_a_file_of_a_model_does_not_hold_its_units(tmp_path):
+    notes = kl.write(tmp_path / "r.mdpa", bracket(MM))
+    assert any("that the numbers, which stay, are in mm N MPa t" in note for note in notes)
+    assert not any("numbers" in note for note in kl.write(tmp_path / "s.mdpa", bracket()))
