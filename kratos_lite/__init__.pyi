@@ -11,6 +11,7 @@ from kratos_lite.analysis.derived_quantities import material_velocity as materia
 from kratos_lite.analysis.derived_quantities import reaction_resultant as reaction_resultant
 from kratos_lite.analysis.error_estimate import ErrorEstimate as ErrorEstimate
 from kratos_lite.analysis.error_estimate import QuantityError as QuantityError
+from kratos_lite.analysis.harmonic import HarmonicResponse as HarmonicResponse
 from kratos_lite.analysis.homogenization import homogenized as homogenized
 from kratos_lite.analysis.integrators import HHT as HHT
 from kratos_lite.analysis.integrators import Bossak as Bossak

@@ -18,6 +18,7 @@ from kratos_lite.view.progress import watched
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from kratos_lite.analysis.harmonic import HarmonicLoads, HarmonicResponse
     from kratos_lite.analysis.matrices import LocalSystem, Matrices
     from kratos_lite.analysis.preload import Preload
     from kratos_lite.analysis.quantities import Quantity
@@ -345,6 +346,65 @@ class Model(Structure):
 
         with watched(progress) as shown:
             return buckling(self, count, preload, shown)
+
+    def harmonic(
+        self,
+        frequencies: ArrayLike,
+        *,
+        damping: ArrayLike = 0.0,
+        rayleigh: tuple[float, float] = (0.0, 0.0),
+        hysteretic: float = 0.0,
+        loads: HarmonicLoads | None = None,
+        method: str = "modes",
+        modes: int | None = None,
+        progress: Progress | None = None,
+    ) -> HarmonicResponse:
+        """Return the steady motion Re(u e^{iΩt}) under loads and prescribed displacements that swing.
+
+        ((1 + iη) K + iΩ (α M + β K) - Ω² M) u = f, about a state at rest whose stress does not matter.
+
+        Parameters
+        ----------
+        frequencies : Ω (f,) in rad/s.
+        damping : ratio ζ of all modes, or of each, (modes,); by modes alone.
+        rayleigh : α in 1/s and β in s of the damping α M + β K.
+        hysteretic : loss factor η of the stiffness (1 + iη) K.
+        loads : each alone or with a complex factor, ``(load, 1j)``; those of the model if not given.
+        method : ``modes`` with static correction: what they leave answers as K alone does; ``direct``: a
+            factorization for each frequency.
+        modes : number of modes; if not given, up to twice the largest frequency.
+        progress : called with the phase and the fraction done, 0 … 1.
+
+        Returns
+        -------
+        HarmonicResponse
+            With amplitudes and phases at points, curves, and stresses at an instant.
+
+        Raises
+        ------
+        MeshError, ModelError, InputError
+            If the model is broken, has no mass, is not linear or has a motion; a load or support is no
+            amplitude; its supports leave rigid motions free, by modes; or it is too large to factorize.
+        SolveError
+            If a frequency is that of an undamped mode, or the modes do not converge.
+
+        Examples
+        --------
+        >>> import numpy as np, kratos_lite as kl
+        >>> bar = kl.Model(kl.box((1, 0.1, 0.1), (8, 1, 1)), kl.Isotropic3D(E=1e6, nu=0.0, density=1.0))
+        >>> bar.fix("x-")
+        >>> bar.add(kl.Traction("x+", (1e3, 0, 0)))
+        >>> u = bar.harmonic([0.0, 500.0], hysteretic=0.01).at((1, 0.05, 0.05))[:, 0]
+        >>> exact = 2e-3 * float(np.tan(0.5))  # σ / (E k) tan k L
+        >>> np.abs(u).round(5).tolist(), round(exact, 5)
+        ([0.001, 0.00109], 0.00109)
+        """
+        from kratos_lite.analysis.harmonic import harmonic_response
+
+        with watched(progress) as shown:
+            return harmonic_response(
+                self, frequencies, damping, rayleigh, hysteretic, loads, method, modes, shown
+            )
 
     def complex_modes(
         self, count: int = 6, *, progress: Progress | None = None

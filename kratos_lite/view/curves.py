@@ -38,6 +38,14 @@ def study_figure(
     return figure
 
 
+def response_figure(frequencies: Array, amplitudes: Array, of: str) -> Any:
+    """Return a figure of amplitudes (f,) in m against frequencies (f,) in rad/s."""
+    figure, axes = new_plot((6, 4), "rad/s", "m", log=True)
+    axes.plot(frequencies, amplitudes, color=BLUE, lw=1.8)
+    label(axes, "frequency", of, "")
+    return figure
+
+
 def convergence_figure(
     unknowns: Array, errors: Array, goal: float | None, of: str, title: str, size: tuple[float, float]
 ) -> Any:

@@ -1,0 +1,290 @@
+"""Harmonic response: the steady motion of a model under loads and supports that swing, by modes or directly.
+
+u(t) = Re(u e^{iΩt}),   ((1 + iη) K + iΩ (α M + β K) - Ω² M) u = f.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from kratos_lite.analysis.element_fields import ElementFields
+from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
+from kratos_lite.analysis.modal import natural_modes
+from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.errors import InputError, ModelError, SolveError
+from kratos_lite.mesh import Mesh
+from kratos_lite.model.loads import Load, ScaledLoad, TimeDependentLoad
+from kratos_lite.model.loads.temperature import Temperature
+from kratos_lite.model.structure import Structure
+from kratos_lite.solvers.plan import FALLBACK_LIMIT
+from kratos_lite.tabular import Tabular
+from kratos_lite.typing import Array, ArrayLike, Complexes, Progress
+from kratos_lite.validation import choice, finite, instance, number, short, whole_number
+
+HarmonicLoads: TypeAlias = "Sequence[Load | tuple[Load, complex]]"
+"""Loads, each alone or with a complex factor."""
+METHODS = ("modes", "direct")
+ENOUGH = 2.0
+"""Frequency of the last mode that is taken over the largest one asked for; the others answer statically."""
+FIRST = 20
+"""Modes that are looked for first."""
+SINGULAR = 1e-8
+"""Of ω² - Ω² beside ω², as frequencies of modes are known to 1e-9."""
+UNDAMPED = "a frequency is that of an undamped mode; give damping, or leave it out"
+TOLERANCE = 1e-12
+"""Relative residual of the static solutions."""
+
+
+class HarmonicResponse(Tabular):
+    """The steady motion Re(u e^{iΩt}) of a model at some frequencies; `Model.harmonic` makes it.
+
+    Parameters
+    ----------
+    mesh : of n nodes.
+    groups : the elements with their materials.
+    frequencies : Ω (f,) in rad/s.
+    basis : (b, n, 3) displacements in m, of which
+    factors : (f, b) make the response at each frequency.
+    natural : frequencies of the modes taken, in rad/s; none of the direct method.
+
+    Notes
+    -----
+    It keeps a few displacements and their factors: all frequencies of a large mesh take no more room.
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        groups: list[ElementGroup],
+        frequencies: Array,
+        basis: Any,
+        factors: Complexes,
+        natural: Array,
+    ) -> None:
+        self.mesh, self.frequencies, self.natural = mesh, frequencies, natural
+        self._groups, self._basis, self._factors = groups, basis, factors  # (b, n, 3) m and (f, b)
+
+    def displacement(self, number: int) -> Complexes:
+        """Return the complex displacement at one frequency.
+
+        Parameters
+        ----------
+        number : of the frequency, from 0.
+
+        Returns
+        -------
+        (n, 3) in m; np.abs is the amplitude, np.angle the phase.
+        """
+        return np.tensordot(self._factors[number], self._basis, axes=1)
+
+    def at(self, points: ArrayLike) -> Complexes:
+        """Return the complex displacements of points at all frequencies.
+
+        Parameters
+        ----------
+        points : (..., 3) in m of the undeformed mesh.
+
+        Returns
+        -------
+        (f, ..., 3) in m; np.abs is the amplitude, np.angle the phase.
+
+        Raises
+        ------
+        MeshError
+            A point lies outside the mesh.
+        """
+        located = self.mesh.locate(points, required=True)
+        parts = np.moveaxis(self._basis, 0, -1)
+        values = np.moveaxis(located.interpolate(parts.real) + 1j * located.interpolate(parts.imag), -1, 0)
+        return np.tensordot(self._factors, values, axes=1)
+
+    def fields(self, number: int, phase: float = 0.0) -> ElementFields:
+        """Return strains and stresses at one frequency and instant, without those at rest.
+
+        Parameters
+        ----------
+        number : of the frequency, from 0.
+        phase : Ωt in rad of the instant.
+
+        Returns
+        -------
+        ElementFields
+            Of Re(u e^{i phase}), with `stress`, `von_mises` and others, as results have them.
+        """
+        u = np.real(self.displacement(number) * np.exp(1j * phase))
+        return ElementFields(self.mesh, self._groups, np.ascontiguousarray(u))
+
+    def table(self) -> list[tuple[str, str]]:
+        """Return the rows of a summary: frequencies, method, and the largest amplitude of all nodes."""
+        every = map(self.displacement, range(len(self.frequencies)))
+        size = [float(np.linalg.norm(u, axis=1).max()) for u in every]
+        top = int(np.argmax(size))
+        method = f"{len(self.natural)} modes with static correction" if len(self.natural) else "direct"
+        low, high = self.frequencies.min(), self.frequencies.max()
+        return [
+            ("frequencies", f"{len(size)}, {low:g} … {high:g} rad/s"),
+            ("method", method),
+            ("largest amplitude", f"{size[top]:.6e} m at {self.frequencies[top]:g} rad/s"),
+        ]
+
+    def columns(self, point: ArrayLike) -> dict[str, Array]:
+        """Return frequencies, amplitudes and phases of a point, as a data frame of pandas takes them.
+
+        Parameters
+        ----------
+        point : (3,) in m.
+
+        Returns
+        -------
+        (f,) each by headers with units: rad/s, m and rad.
+        """
+        u = self.at(finite(point, "a point", (3,)))
+        made = {"frequency [rad/s]": self.frequencies}
+        for i, axis in enumerate("xyz"):
+            made |= {f"amplitude {axis} [m]": np.abs(u[:, i]), f"phase {axis} [rad]": np.angle(u[:, i])}
+        return made
+
+    def plot(self, point: ArrayLike, axis: str = "z", path: str | Path | None = None) -> Any:
+        """Draw the amplitude of a point against the frequency, on logarithmic scales.
+
+        Parameters
+        ----------
+        point : (3,) in m.
+        axis : ``"x"``, ``"y"`` or ``"z"``.
+        path : picture to write; .png, .pdf or .svg.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        from kratos_lite.view.canvas import save
+        from kratos_lite.view.curves import response_figure
+
+        amplitude = self.columns(point)[f"amplitude {choice(axis, 'axis', tuple('xyz'))} [m]"]
+        figure = response_figure(self.frequencies, amplitude, f"amplitude of u{axis}")
+        if path is not None:
+            save(figure, path)
+        return figure
+
+
+def harmonic_response(
+    model: Structure,
+    frequencies: ArrayLike,
+    damping: ArrayLike,
+    rayleigh: tuple[float, float],
+    hysteretic: float,
+    loads: HarmonicLoads | None,
+    method: str,
+    modes: int | None,
+    progress: Progress | None,
+) -> HarmonicResponse:
+    """Return the harmonic response of a model; see `Model.harmonic`."""
+    omega, zeta = np.atleast_1d(finite(frequencies, "frequencies")), finite(damping, "damping")
+    if omega.ndim != 1 or not omega.size or (omega < 0).any() or (zeta < 0).any():
+        given = f"{short(frequencies)} and {short(damping)}"
+        raise InputError(f"frequencies (f,) in rad/s and damping are ≥ 0; got {given}")
+    eta, by_modes = number(hysteretic, "hysteretic", least=0), choice(method, "method", METHODS) == "modes"
+    if not by_modes and (zeta.any() or modes is not None):
+        raise InputError("damping of modes and their number belong to method='modes'; take rayleigh=…")
+    _check(model)
+    solver = "auto" if by_modes else "direct"
+    e = EquationsOfMotion(model, rayleigh=rayleigh, solver=solver, progress=progress)
+    if by_modes and e.free_motions.any:
+        raise ModelError("the supports leave rigid-body modes free, which method='direct' takes alone")
+    alpha, beta = e.rayleigh
+    f, c = _forces(model, e, loads), e.prescribed(0.0)
+    vectors = np.stack([f.real, f.imag, e.K @ c, e.mass.times(c)])
+    k, m = 1 + 1j * (eta + omega * beta), omega * (1j * alpha - omega)  # factors of K and M
+    factors = np.stack([1 + 0 * k, 1j + 0 * k, -k, -m], axis=1)  # of the vectors
+    here = vectors.any(axis=1)
+    swing = _by_modes if by_modes else _directly
+    basis, made, natural = swing(e, vectors[here], factors[:, here], (k, m), (omega, zeta, modes))
+    full, ones = np.concatenate([basis, e.system.scatter(c)[None]]), np.ones((len(omega), 1))
+    return HarmonicResponse(model.mesh, e.groups, omega, full, np.hstack([made, ones]), natural)
+
+
+def _directly(e: EquationsOfMotion, R: Array, s: Complexes, factors: Any, _: Any) -> tuple[Any, Any, Array]:
+    """Return the displacements (f, n, 3) at each frequency, by a factorization each."""
+    from scipy.sparse.linalg import spsolve
+
+    constraints, n = e.system.constraint_map, len(e.system.constraint_map.free)
+    if n > FALLBACK_LIMIT:
+        raise InputError(f"method='direct' factorizes up to {FALLBACK_LIMIT} unknowns; got {n}; take modes")
+    K, M = (constraints.reduce_matrix(A).tocsc() for A in (e.K.scipy().tocsr(), e.mass.matrix()))
+    r, out = np.stack([constraints.reduce(vector) for vector in R] or [np.zeros(n)]), []
+    s = s if len(R) else np.zeros((len(s), 1), dtype=complex)
+    for k, m, some in zip(*factors, s, strict=True):
+        q = spsolve(k * K + m * M, some @ r)
+        if not np.isfinite(q).all():
+            raise SolveError(UNDAMPED)
+        u = constraints.transform(q)
+        out.append(e.system.scatter(u.real) + 1j * e.system.scatter(u.imag))
+    return np.array(out), np.eye(len(s)), np.zeros(0)
+
+
+def _by_modes(
+    e: EquationsOfMotion, R: Array, s: Complexes, factors: Any, given: Any
+) -> tuple[Any, Any, Array]:
+    """Return modes with static solutions less their part (b, n, 3), and the factors (f, b) of all.
+
+    What the modes leave of the response is that of K alone.  Source: Craig & Kurdila, Fundamentals of
+    Structural Dynamics (2006), section 11.4 (mode acceleration).
+    """
+    (k, m), (omega, zeta, count) = factors, given
+    natural, shapes = _modes(e, count, ENOUGH * float(omega.max()))
+    if zeta.shape not in ((), natural.shape):
+        raise InputError(f"damping is one ratio, or one of each of {len(natural)} modes; got {zeta.shape}")
+    loads = np.stack([e.system.scatter(r) for r in R]) if len(R) else np.zeros((0, *shapes.shape[1:]))
+    P = np.einsum("lni,jni->lj", loads, shapes)
+    denominators = k[:, None] * natural**2 + m[:, None] + 2j * zeta * natural * omega[:, None]
+    if (np.abs(denominators) < SINGULAR * natural**2).any():
+        raise SolveError(UNDAMPED)
+    zero = np.zeros(e.size)
+    statics = [e.system.equations.solve(r, TOLERANCE, e.system.progress, zero).x for r in R]
+    rest = [
+        e.system.scatter(u) - np.tensordot(p / natural**2, shapes, axes=1)
+        for u, p in zip(statics, P, strict=True)
+    ]
+    basis = np.concatenate([shapes, np.array(rest).reshape(-1, *shapes.shape[1:])])
+    return basis, np.hstack([(s @ P) / denominators, s / k[:, None]]), natural
+
+
+def _modes(e: EquationsOfMotion, count: int | None, top: float) -> tuple[Array, Array]:
+    """Return so many modes, or all up to a frequency in rad/s and some beyond it."""
+    if count is not None:
+        return natural_modes(e.model, whole_number(count, "modes"), progress=e.system.progress)
+    n = len(e.system.constraint_map.free)
+    count = min(FIRST, n)
+    while True:
+        natural, shapes = natural_modes(e.model, count, progress=e.system.progress)
+        if natural[-1] > top or count == n:
+            return natural, shapes
+        count = min(2 * count, n)
+
+
+def _check(model: Structure) -> None:
+    """Raise ModelError for what does not swing harmonically about a state at rest."""
+    model.require_linear("harmonic response")
+    if model.motion is not None:
+        raise ModelError("harmonic response takes no motion of the material; take model.transient()")
+    if model.supports.motions:
+        raise ModelError("a support that is a function of time is no amplitude; prescribe a number")
+
+
+def _forces(model: Structure, e: EquationsOfMotion, loads: HarmonicLoads | None) -> Complexes:
+    """Return the amplitudes (3a,) of the forces in N."""
+    total = np.zeros(e.size, dtype=complex)
+    for item in model.loads if loads is None else loads:
+        load, factor = item if isinstance(item, tuple) and len(item) == 2 else (item, 1.0)
+        instance(load, "a load", Load, "kl.Traction('z+', (0, 0, 1e3)), or (load, factor)")
+        of = load.load if isinstance(load, ScaledLoad) else load
+        if isinstance(of, (Temperature, TimeDependentLoad)):
+            raise ModelError(f"{of!r} does not swing: harmonic response takes forces, each with a factor")
+        if not isinstance(factor, (int, float, complex)) or not np.isfinite(factor):
+            raise InputError(f"the factor of a load is a complex number; got {factor!r}")
+        total += factor * e.system.gather(load.forces(model.mesh, e.groups))
+    return total
