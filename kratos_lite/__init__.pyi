@@ -123,6 +123,7 @@ from kratos_lite.mesh.generators import annulus as annulus
 from kratos_lite.mesh.generators import box as box
 from kratos_lite.mesh.join import join as join
 from kratos_lite.mesh.join import split as split
+from kratos_lite.model.attachments import ElasticSupport as ElasticSupport
 from kratos_lite.model.loads import TimeDependentLoad as TimeDependentLoad
 from kratos_lite.model.loads.body import BodyForce as BodyForce
 from kratos_lite.model.loads.body import Gravity as Gravity
@@ -138,6 +139,7 @@ from kratos_lite.model.local_axes import Cylindrical as Cylindrical
 from kratos_lite.model.local_axes import LocalAxes as LocalAxes
 from kratos_lite.model.local_axes import Spherical as Spherical
 from kratos_lite.model.mass_properties import MassProperties as MassProperties
+from kratos_lite.model.remote_point import RemotePoint as RemotePoint
 from kratos_lite.shapes import Shape as Shape
 
 __version__: str

@@ -81,11 +81,12 @@ class EquationsOfMotion:
             hanging=model.mesh.hanging,
             patterns=model.patterns,
             progress=progress,
+            attached=model.attached,
         )
         self.applied = AppliedLoads(model, self.system, self.groups, initial=not model.is_nonlinear)
         self.prescribed = PrescribedMotion(model.supports, self.system)
         placed = self.system.points, self.system.groups, self.system.pattern
-        self.mass = Mass(*placed, lumped)
+        self.mass = Mass(*placed, lumped, self.system.attached.M if self.system.attached else None)
         self.terms: MotionMatrices | None = None
         if isinstance(model.motion, Motion):
             consistent = Mass(*placed, False) if lumped else self.mass
@@ -153,8 +154,8 @@ class EquationsOfMotion:
         return np.asarray(sum(parts)) if parts else None
 
     def damping_terms(self, time: float) -> Array | None:
-        """Return what motion and mass-proportional damping add to C, data (nnz,), or None."""
-        parts = [self.rayleigh[0] * self.mass.data] if self.rayleigh[0] else []
+        """Return what the motion adds to C, data (nnz,), or None."""
+        parts = []
         if self.terms is not None:
             if alpha := self.terms.motion.damping:
                 parts.append(alpha * self.terms.of_moving(self.mass.data))
@@ -187,6 +188,8 @@ class EquationsOfMotion:
     def times_damping(self, v: Array, time: float) -> Array:
         """Return C v at a time."""
         out = self.rayleigh[1] * (self.K @ v) if self.rayleigh[1] else np.zeros_like(v)
+        if self.rayleigh[0]:
+            out = out + self.rayleigh[0] * self.mass.times(v)
         if (scalar := self._scalars(time)[1]) is not None:
             out = out + (scalar @ v.reshape(-1, 3)).ravel()
         if self.dashpots is not None:
@@ -215,9 +218,7 @@ class EquationsOfMotion:
 
     def matrix(self, time: float, m: float, c: float, k: float) -> Any:
         """Return m M + c C + k K at a time, (3a, 3a)."""
-        if self.terms is None:
-            return self._elastic(m, c, k)
-        A = self._elastic(m, 0.0, k + c * self.rayleigh[1])
+        A = self._elastic(m, c, k)
         for factor, made in ((c, self.damping_terms), (k, self.stiffness_terms)):
             if factor and (terms := made(time)) is not None:
                 A.add_scalar(factor * terms)
@@ -234,6 +235,8 @@ class EquationsOfMotion:
             A = BlockMatrix(factor * K.data, K.indices, K.indptr)
             if mass:
                 A.add_scalar(mass * self.mass.data)
+                if self.mass.attached is not None:
+                    self.system.pattern.add_matrix(A.data, self.mass.attached, mass)
             return A
 
         if isinstance(self.K, BlockMatrix):

@@ -47,7 +47,7 @@ def natural_modes(
         )
     with phase("assemble"):
         small = is_small(n, count)
-        equations, M = e.system.equations, e.mass.scalar
+        equations = e.system.equations
         K_g = None if preload is None else preload_stiffness(e, preload, "a preload of modes")
     with phase("modes"):
         if near is not None:
@@ -75,7 +75,7 @@ def _by_iteration(
         return np.zeros(count), R[:count].T
     stiffness = solver.times if K_g is None else lambda u: solver.times(u) + K_g.times(u)
     times_K, times_M = (_reduced_product(constraints, times) for times in (stiffness, e.mass.times))
-    norms = solver.norm, float(abs(e.mass.scalar).sum(axis=1).max())
+    norms = solver.norm, float(abs(e.mass.matrix()).sum(axis=1).max())
     known = (R, times_M(R)) if len(R) else None
     problem = Problem(
         len(constraints.free), times_K, times_M, _preconditioner(e, solver), norms, known, progress

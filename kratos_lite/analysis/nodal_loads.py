@@ -11,9 +11,9 @@ import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup, add_nodal
 from kratos_lite.assembly.gauss_point_fields import internal_load
-from kratos_lite.mesh import Mesh
 from kratos_lite.model.checks import check_carried
 from kratos_lite.model.loads import Load, TimeDependentLoad
+from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.loads.temperature import Temperature, heated
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
@@ -24,12 +24,20 @@ Temperatures: TypeAlias = list[tuple[float, Load]]
 """Temperatures that act, each with a factor."""
 
 
-def external_loads(mesh: Mesh, groups: Sequence[ElementGroup], loads: Sequence[Load]) -> Array:
+def forces_of(model: Structure, groups: Sequence[ElementGroup], load: Load) -> Array:
+    """Return the nodal forces (n, 3) in N of a load at the time 0, the weight of added masses among them."""
+    rest = np.zeros_like(model.mesh.points)
+    if isinstance(load, TimeDependentLoad):
+        return rest + load.history(lambda one: forces_of(model, groups, one))(0.0)
+    forces = load.forces(model.mesh, groups)
+    if model.attached and isinstance(load, Gravity) and load.where is None:
+        forces += (model.attached.M @ load.at(model.mesh.points).ravel()).reshape(-1, 3)
+    return forces
+
+
+def external_loads(model: Structure, groups: Sequence[ElementGroup], loads: Sequence[Load]) -> Array:
     """Return the nodal forces (n, 3) in N of all loads."""
-    total = np.zeros_like(mesh.points)
-    for load in loads:
-        total += load.forces(mesh, groups)
-    return total
+    return sum((forces_of(model, groups, load) for load in loads), np.zeros_like(model.mesh.points))
 
 
 def initial_loads(model: Structure, groups: Sequence[ElementGroup]) -> Array | None:
@@ -94,7 +102,7 @@ class AppliedLoads:
         used = np.zeros(self.system.n_nodes, dtype=bool)
         used[self.system.nodes] = True
         mesh = self.model.mesh
-        forces = load.forces(mesh, self._groups)
+        forces = forces_of(self.model, self._groups, load)
         if isinstance(load, Temperature) and self._initial:
             cold = [group.without_initial for group in self._groups]
             forces = -internal_load(mesh.points, heated(mesh, cold, [(1.0, load)]), np.zeros_like(forces))

@@ -128,7 +128,9 @@ class NonlinearMotion(EquationsOfMotion):
     def stored_energy(self, u: Array, time: float) -> float:
         """Return the energy in J that the laws store."""
         groups = self._with_states(at_temperature(self.model, self.system.groups, time))
-        return totals(self.system.points, groups, self.assembly.strained(u))[0]
+        springs = self.assembly.springs
+        inner = totals(self.system.points, groups, self.assembly.strained(u))[0]
+        return inner if springs is None else inner + float(u @ (springs @ u)) / 2
 
     def load_of_result(self, u: Array, time: float) -> Array:
         """Return the nodal forces (3a,) at a time, those among them that follow the faces."""

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kratos_lite.analysis.nodal_loads import external_loads, initial_loads
+from kratos_lite.analysis.nodal_loads import external_loads, forces_of, initial_loads
 from kratos_lite.analysis.solution_checks import Phases
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.errors import InputError
+from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model import checks
 from kratos_lite.model.free_motions import FreeMotions
 from kratos_lite.model.loads import Load
@@ -122,14 +122,14 @@ def load_set(
             raise InputError(f"a load such as Gravity or Traction is needed; got {type(load).__name__}")
     mesh, supports = model.mesh, model.supports
     with phase("load"):
-        external = supports.on_independents(external_loads(mesh, state.groups, loads))
+        external = supports.on_independents(external_loads(model, state.groups, loads))
         groups = heated(mesh, state.groups, chain.from_iterable(load.acting(0.0) for load in loads))
         initial = initial_loads(model, groups)
         forces = external if initial is None else external - supports.on_independents(initial)
         checks.check_carried(mesh, forces, state.used)
         pushed = any_axis((forces != 0) & ~supports.fixed)
         moving = state.components_with(pushed | dirichlet.displaced)
-        state.free.check((load.forces(mesh, state.groups) for load in loads), moving)
+        state.free.check((forces_of(model, state.groups, load) for load in loads), moving)
     return LoadSet(list(loads), groups, external, forces, moving, phase)
 
 
@@ -185,7 +185,12 @@ def system_of(
     what = model.mesh.points, groups, constraints
     how: dict[str, Any] = {"solver": solver, "tolerance": tolerance, "progress": progress}
     if backend == "own":
-        return ConstrainedSystem(*what, **how, patterns=model.patterns, hanging=model.mesh.hanging)
+        how |= {"patterns": model.patterns, "hanging": model.mesh.hanging, "attached": model.attached}
+        return ConstrainedSystem(*what, **how)
+    if model.attached:
+        raise ModelError(
+            "springs and added masses are for the own backend; leave backend and PETSc options out"
+        )
     from kratos_lite.distributed.communicator import started
     from kratos_lite.distributed.petsc_system import PetscSystem
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.state import ModelInTime, State, check_state
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.nonlinear_assembly import NonlinearAssembly, States, named, unnamed
-from kratos_lite.assembly.stiffness import assemble_stiffness
 from kratos_lite.errors import InputError, ModelError, SolveError
 from kratos_lite.mesh.mesh import place_of
 from kratos_lite.model.loads.temperature import heated
@@ -105,9 +104,9 @@ class QuasiStaticAnalysis(ModelInTime):
         self.groups, self.warnings = model.checked()
         model.free_motions(self.groups).check((), moving=False)
         mesh, supports = model.mesh, model.supports
-        self.system = ConstrainedSystem(
-            mesh.points, self.groups, supports.constraint_map, patterns=model.patterns, hanging=mesh.hanging
-        )
+        what = mesh.points, self.groups, supports.constraint_map
+        how: dict[str, Any] = {"patterns": model.patterns, "hanging": mesh.hanging}
+        self.system = ConstrainedSystem(*what, **how, attached=model.attached)
         self.applied = AppliedLoads(model, self.system, self.groups, initial=False)
         self.prescribed = PrescribedMotion(supports, self.system)
         self.assembly = assembly_of(model, self.system)
@@ -322,8 +321,9 @@ class QuasiStaticAnalysis(ModelInTime):
     def _at_rest(self) -> LinearSolver:
         """Return what solves the body at rest."""
         system = self.system
-        K = assemble_stiffness(system.points, system.groups, system.pattern)
-        return LinearSolver(K, system.constraint_map, system.points, self.tangents.plan, groups=system.groups)
+        how = system.constraint_map, system.points, self.tangents.plan
+        springs = system.attached and system.attached.K
+        return LinearSolver(system.assembled(), *how, groups=system.groups, springs=springs)
 
     def _shortened(self, u: Array, du: Array, r: Array, load: Callable[[Array], Load], dt: float) -> Array:
         """Return a correction, shortened until the residual does little work over it.
@@ -390,7 +390,7 @@ class QuasiStaticAnalysis(ModelInTime):
         return self.system.scatter(values)
 
     def _reactions(self) -> Array:
-        return self.model.supports.supported(self._whole(self.internal - self.load))
+        return self.model.reactions(self._whole(self.internal - self.load), self._whole(self.u))
 
     def result(self, state: State | None = None) -> Result:
         """Return a state of this model, or that of now, with strains, stresses and internal variables."""
@@ -431,7 +431,8 @@ def assembly_of(model: Structure, system: ConstrainedSystem) -> NonlinearAssembl
     u0 = model.initial_displacement
     gathered = None if u0 is None else system.gather(u0)
     place = partial(place_of, model.mesh)
-    return NonlinearAssembly(system.points, system.groups, system.pattern, place, gathered)
+    springs = system.attached.K if system.attached else None
+    return NonlinearAssembly(system.points, system.groups, system.pattern, place, gathered, springs)
 
 
 def solve_nonlinear(model: Structure, solver: str, tolerance: float, progress: Progress | None) -> Result:

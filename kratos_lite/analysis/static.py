@@ -180,7 +180,7 @@ class StaticAnalysis:
         with phase("verify"):
             if case.moving.any():
                 reactions = system.residual(u, case.forces)
-            reactions = model.supports.supported(reactions)
+            reactions = model.reactions(reactions, u)
             inner = model.supports.on_independents(stress_load(model, case.groups, u))
             initial = case.external - case.forces
             roundoff = max(noise, self._initial_roundoff(case.forces) if initial.any() else 0.0)
@@ -191,8 +191,8 @@ class StaticAnalysis:
                 check_solution(solution, u, balance)
             if tolerance is None and not initial.any():
                 work = checks.work_of(u, inner, case.external, reactions)
-                prescribed = float(np.abs(model.supports.values).sum())  # whose work has roundoff of forces
-                warnings += checks.check_energy(work, 100 * noise * prescribed)
+                moved = float(np.abs(u).sum()) if model.attached else model.supports.displaced
+                warnings += checks.check_energy(work, 100 * noise * moved)  # which have roundoff of forces
             warnings += checks.check_rounding(noise, case.external, initial, reactions, model.supports)
             warnings += check_deformation(model, state.groups, u)
         report = {

@@ -213,7 +213,7 @@ class TransientAnalysis(ModelInTime):
         """Return the model as it is now."""
         residual, imbalance, _ = self._residual()
         values = {name: self._whole(getattr(self, name)).copy() for name in "uva"}
-        values["reactions"] = self.model.supports.supported(self._whole(residual))
+        values["reactions"] = self.model.reactions(self._whole(residual), self._whole(self.u))
         values["imbalance"] = np.array(imbalance)
         values |= self.equations.history_values()
         return State("model", str(self.integrator), self.time, self.step, values, self.parts)
@@ -284,7 +284,7 @@ class TransientAnalysis(ModelInTime):
 
     def reactions(self) -> Array:
         """Return M a + C v + K u - f (n, 3) in N: forces of supports and constraints, 0 where none act."""
-        return self.model.supports.supported(self._whole(self._residual()[0]))
+        return self.model.reactions(self._whole(self._residual()[0]), self._whole(self.u))
 
     def energy(self, state: State | None = None) -> float:
         """Return ½ v·M v + ½ u·K u, K with what the motion adds: constant without loads and damping.

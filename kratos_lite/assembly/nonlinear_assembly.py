@@ -27,7 +27,7 @@ from kratos_lite.elements import KinematicLinear, tables
 from kratos_lite.elements import total_lagrangian as lagrange
 from kratos_lite.errors import MaterialError, SolveError
 from kratos_lite.shapes.inverse import determinant
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Csr
 
 Heating: TypeAlias = "Sequence[Array | None]"
 """Temperatures (m, k) in K of the nodes of each group beyond those without strain, or None."""
@@ -51,9 +51,11 @@ class NonlinearAssembly:
         pattern: Pattern,
         place: Callable[[int], str],
         u0: Array | None = None,
+        springs: Csr | None = None,
     ) -> None:
         self.points, self.groups, self.pattern = as_double(points), list(groups), pattern
         self.place = place  # the words for an element in messages, of its index
+        self.springs = springs
         self._u0 = np.zeros(3 * len(points)) if u0 is None else u0
         self.symmetric = all(group.material.symmetric_tangent for group in groups)
         self._linear = _only(groups, (group.is_linear for group in groups))
@@ -78,7 +80,7 @@ class NonlinearAssembly:
         `states` are those at the start of a step of `dt` s, `heating` is that at its end.  SolveError names
         an element that is turned inside out; MaterialError says where a law fails.
         """
-        u = self.strained(u)
+        displacement, u = u, self.strained(u)
         K, at_rest = self._linear_part
         groups = self.groups
         if any(values is not None for values in heating):
@@ -103,6 +105,10 @@ class NonlinearAssembly:
                 add = part.add if before.modes is None else part.add_enhanced
                 parts.append(add(forces, before, dt))
             new.append(_joined(parts) if parts else None)
+        if self.springs is not None:
+            forces += (self.springs @ displacement).reshape(-1, 3)
+            if data is not None:
+                self.pattern.add_matrix(data, self.springs)
         return forces.ravel(), None if data is None else BlockMatrix(data, K.indices, K.indptr), new
 
     def strained(self, u: Array) -> Array:

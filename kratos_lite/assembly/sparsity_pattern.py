@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -43,6 +44,13 @@ class Pattern:
     def add(self, data: Array, number: int, window: slice, matrices: Array) -> None:
         """Add matrices of some elements of a number: (m, k, k, 3, 3) to (nnz, 3, 3), (m, k, k) to (nnz,)."""
         self.add_at(data, self.connectivity[number][window], matrices)
+
+    def add_matrix(self, data: Array, A: Any, factor: float = 1.0) -> None:
+        """Add a sparse matrix (3n, 3n), whose nodes share elements, to (nnz, 3, 3)."""
+        A = A.tobsr((3, 3))
+        A.sort_indices()
+        places = np.searchsorted(self._keys, block_rows(A.indptr) * self.n_nodes + A.indices)
+        data[places] += factor * A.data
 
     def add_tangents(self, data: Array, tangents: Sequence[tuple[Ints, Array]]) -> None:
         """Add tangents (m, k, 3, k, 3) at nodes (m, k), each of one element."""

@@ -219,7 +219,7 @@ def check_rounding(
     Raises SolveError where it is as large as the loads, to two digits: the solution means nothing.
     """
     size = float(max(np.abs(part).max(initial=0.0) for part in (loads, initial, reactions)))
-    if supports.values.any() or roundoff <= 1e-6 * size:
+    if supports.displaced or roundoff <= 1e-6 * size:
         return []
     return _doubted(
         f"rounding errors may reach {roundoff / size:.0e} of the loads: something hardly resists them; "
@@ -250,6 +250,13 @@ def check_energy(work: Array, rounding: float = 0.0) -> list[str]:
     )
 
 
+def check_attached(attached: bool, motion: object) -> list[str]:
+    """Raise ModelError for springs or masses on material that moves through the mesh."""
+    if attached and motion is not None:
+        raise ModelError("springs and added masses are for material that does not move through the mesh")
+    return []
+
+
 def check_loads(
     loads: Sequence[Load], groups: Sequence[ElementGroup], forces: Array, supports: Supports
 ) -> list[str]:
@@ -258,9 +265,10 @@ def check_loads(
     weights = [load.force for load in loads if isinstance(load, Gravity) and np.shape(load.force) == (3,)]
     if metre != 1 and any(9.7 < np.linalg.norm(g) < 9.9 for g in weights):
         return [f"gravity is 9.81 in m/s²; this model is in {supports.mesh.units}: give {9.81 / metre:g}"]
-    if any(isinstance(load, Gravity) for load in loads) and all(g.material.density == 0 for g in groups):
+    massless = all(g.material.density == 0 for g in groups) and not forces.any()
+    if massless and any(isinstance(load, Gravity) for load in loads):
         return ["gravity acts on no mass: every material has density 0; give density in kg/m³"]
-    if forces[~supports.fixed].any() or supports.values.any() or supports.constraints.constants.any():
+    if forces[~supports.fixed].any() or supports.displaced:
         return []
     if forces.any():
         return [LOADS_ON_SUPPORTS]

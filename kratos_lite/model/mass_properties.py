@@ -13,7 +13,8 @@ import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup, by_mass_rule
 from kratos_lite.errors import InputError, MeshError, ModelError
-from kratos_lite.typing import Array, ArrayLike, Mask
+from kratos_lite.solvers.constraints import rigid_modes
+from kratos_lite.typing import Array, ArrayLike, Csr, Mask
 from kratos_lite.validation import finite, reals
 
 SYMMETRIC = 1e-10
@@ -202,7 +203,9 @@ class MassProperties:
         return cls(mass, volume=volume, euler=(mass * r**2 / 5)[..., None, None] * np.eye(3))
 
     @classmethod
-    def of(cls, points: ArrayLike, groups: Sequence[ElementGroup]) -> MassProperties:
+    def of(
+        cls, points: ArrayLike, groups: Sequence[ElementGroup], added: Csr | None = None
+    ) -> MassProperties:
         """Return the mass properties of a mesh.
 
         They are exact for every shape, also for warped faces and curved quadratic cells, and lose no
@@ -212,6 +215,7 @@ class MassProperties:
         ----------
         points : (n, 3) nodes in m.
         groups : the elements with their materials.
+        added : (3n, 3n) kg, of added masses: ``model.attached.M``.
 
         Returns
         -------
@@ -246,6 +250,11 @@ class MassProperties:
         second = np.zeros((3, 3))
         for _ in range(2):  # about a node, then about the center
             mass, volume, first, second = _moments(X - center, groups)
+            if added is not None:  # of its rigid modes: m 1, m [c]×ᵀ and J
+                R = rigid_modes(X - center, np.zeros(3))
+                G = R.T @ (added @ R)
+                mass, first = mass + G[0, 0], first + np.array([G[1, 5], G[2, 3], G[0, 4]])
+                second = second + np.trace(G[3:, 3:]) / 2 * np.eye(3) - G[3:, 3:]
             center = center + first / mass
         return cls(mass, volume=volume, center=center, euler=(second + second.T) / 2)
 

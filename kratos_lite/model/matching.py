@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -81,7 +81,7 @@ class Periodic(PartTie):
         new.strain = strain
         return new
 
-    def refined(self, finer: RefinedMesh) -> Periodic:
+    def refined(self, finer: RefinedMesh, supports: Any) -> Periodic:
         """Return the pairs on a finer mesh; ModelError where its nodes are not opposite one another."""
         return Periodic(finer.mesh, [(finer.where(a), finer.where(b)) for a, b in self.parts], self.strain)
 
@@ -133,7 +133,7 @@ class Cut(PartTie):
         how = "free along its normal" if self.length is None else f"{self.length:g} m shorter"
         return f"cut from {super().__str__()}, {how}"
 
-    def refined(self, finer: RefinedMesh) -> Cut:
+    def refined(self, finer: RefinedMesh, supports: Any) -> Cut:
         """Return the cut on a finer mesh."""
         return Cut(finer.mesh, finer.where(self.a), finer.where(self.b), self.length)
 

@@ -42,7 +42,9 @@ def refined(structure: S, finer: RefinedMesh) -> S:
         new.supports.add(_refined_condition(condition, finer))
     _carry_constraints(structure, new, finer)
     for tie in structure.supports.ties:
-        new.supports.add_tie(tie.refined(finer))
+        new.supports.add_tie(tie.refined(finer, new.supports))
+    for attachment in structure.attachments:
+        new.add(attachment.refined(finer, structure.points, new.points))
     new.loads = [load.refined(finer) for load in structure.loads]
     for name, load in structure.named_loads.items():
         new._named[name] = new.loads[next(i for i, one in enumerate(structure.loads) if one is load)]

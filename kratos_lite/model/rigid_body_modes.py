@@ -137,7 +137,9 @@ def _equations(blocks: RigidBlocks, supports: Supports) -> tuple[Ints, Ints, Arr
     joins = np.ones(first, dtype=bool)  # hanging nodes that hang within a block hold in each of its motions
     fixed = int(supports.fixed.sum())
     joins[fixed : fixed + len(supports.hanging)] = False
-    joins[row[block != block[row]]] = True
+    of_row = np.zeros(first, dtype=np.int64)
+    of_row[row[::-1]] = block[::-1]
+    joins[row[block != of_row[row]]] = True
     kept = joins[row] & (block >= 0)
     node, *ends = blocks.joints
     joint = (3 * node[:, None] + np.arange(3)).ravel()

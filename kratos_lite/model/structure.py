@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from kratos_lite import voigt
+from kratos_lite.assembly.attached import Attached
 from kratos_lite.assembly.element_groups import ElementGroup, element_class, element_groups_of
 from kratos_lite.assembly.sparsity_pattern import PatternCache
 from kratos_lite.elements import ELEMENTS
@@ -22,6 +23,7 @@ from kratos_lite.errors import InputError, MeshError, ModelError, nearest
 from kratos_lite.materials import Material
 from kratos_lite.mesh import Mesh, Where, WhereElements, distinct
 from kratos_lite.model import checks
+from kratos_lite.model.attachments import AddedMass, MatrixAttachment, Place
 from kratos_lite.model.free_motions import FreeMotions, free_motions
 from kratos_lite.model.joints import check_coincident, check_joints
 from kratos_lite.model.loads import Load, ScaledLoad
@@ -29,6 +31,7 @@ from kratos_lite.model.loads.base import key_of
 from kratos_lite.model.local_axes import Cartesian, LocalAxes, normal_of_plane
 from kratos_lite.model.locking import check_locking
 from kratos_lite.model.matching import BoltForce, Cut, Periodic
+from kratos_lite.model.remote_point import RemotePoint
 from kratos_lite.model.spurious_modes import check_rules, check_spurious_modes
 from kratos_lite.model.supports import DirichletCondition, Supports, axis_numbers
 from kratos_lite.model.ties import Tie
@@ -68,6 +71,7 @@ class Structure(Tabular):
     Attributes
     ----------
     supports : what is prescribed; see `fix`, `release` and `constrain`.
+    attachments, attached : springs and added masses, and their matrices, or None.
     loads : those added; the list may be changed.
     notes : what readers of files remarked, for the report.
     """
@@ -92,6 +96,8 @@ class Structure(Tabular):
         self._changes = 0
         self.formulation = formulation
         self.supports = Supports(mesh)
+        self.attachments: list[MatrixAttachment] = []
+        self.attached: Attached | None = None
         self.loads: list[Load] = []
         self._named: dict[str, Load] = {}
         self._motion: Attachment | None = None
@@ -658,9 +664,139 @@ class Structure(Tabular):
         if load is not None:
             self.add(load, amplitude=amplitude, name=name)
 
+    def rigid(self, where: Where, point: ArrayLike) -> RemotePoint:
+        """Let all nodes of a part follow a point rigidly, by small rotations.
+
+        Parameters
+        ----------
+        where : nodes, as for `fix`, that do not lie on a line.
+        point : (3,) m; it need not be a node.
+
+        Returns
+        -------
+        RemotePoint
+            By which the part is loaded, held and read; as long as it is not held, it is free to move.
+
+        Raises
+        ------
+        ModelError
+            There is no node.
+        MeshError
+            There is no such part or node.
+
+        Examples
+        --------
+        >>> import kratos_lite as kl
+        >>> model = kl.Model(kl.box((4.0, 1, 1), (4, 2, 2)), kl.Isotropic3D(E=1e9, nu=0.3))
+        >>> model.fix("x-")
+        >>> end = model.rigid("x+", (6.0, 0.5, 0.5))
+        >>> model.add(end.load((0, 0, -100.0)))
+        >>> result = model.solve()
+        >>> bool(end.displacement(result)[2] < result.displacement("x+")[:, 2].min() < 0)
+        True
+        """
+        return self._remote(where, point, rigid=True)
+
+    def distribute(self, where: Where, point: ArrayLike) -> RemotePoint:
+        """Let a point move as the faces of a part do in the mean; they stay flexible.
+
+        Parameters
+        ----------
+        where : part; its conditions if it has any, otherwise the boundary faces among its nodes.
+        point : (3,) m; it need not be a node.
+
+        Returns
+        -------
+        RemotePoint
+            Force and moment on it are spread over the faces; what is prescribed of it, their mean does.
+
+        Raises
+        ------
+        ModelError
+            There is no face.
+        MeshError
+            There is no such part or node.
+
+        Examples
+        --------
+        >>> import kratos_lite as kl
+        >>> model = kl.Model(kl.box((4.0, 1, 1), (4, 2, 2)), kl.Isotropic3D(E=1e9, nu=0.3))
+        >>> model.distribute("x-", (0, 0.5, 0.5)).fix("x")
+        >>> model.distribute("x+", (4.0, 0.5, 0.5)).fix("x", 1e-3)
+        >>> [model.fix(side, axis) for side, axis in (("y-", "y"), ("z-", "z"))]
+        [None, None]
+        >>> float(model.solve().stress("element")[:, 0].mean().round(3))
+        250000.0
+        """
+        return self._remote(where, point, rigid=False)
+
+    def _remote(self, where: Where, point: ArrayLike, rigid: bool) -> RemotePoint:
+        new = RemotePoint(self.supports, where, point, rigid)
+        self.supports.add_tie(new)
+        return new
+
+    @property
+    def points(self) -> list[RemotePoint]:
+        """The remote points; see `rigid` and `distribute`."""
+        return [tie for tie in self.supports.ties if isinstance(tie, RemotePoint)]
+
+    def add_mass(self, where: Place, mass: float, inertia: ArrayLike | None = None) -> None:
+        """Add mass, which has weight under gravity on the whole body.
+
+        Parameters
+        ----------
+        where : a point (x, y, z) in m, a `RemotePoint`, or a part over whose faces it is spread by area.
+        mass : kg.
+        inertia : (3, 3) kg m² about a remote point; none if not given.
+
+        Raises
+        ------
+        InputError
+            Mass or inertia make no sense.
+        MeshError, ModelError
+            There is no such part, or it has no faces.
+
+        Examples
+        --------
+        >>> import kratos_lite as kl
+        >>> model = kl.Model(kl.box(), kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0))
+        >>> model.fix("z-")
+        >>> model.add_mass("z+", 500.0)
+        >>> model.add(kl.Gravity((0, 0, -10.0)))
+        >>> float(model.solve().reactions[:, 2].sum().round(6))
+        15000.0
+        """
+        self.add(AddedMass(where, mass, inertia))
+
+    def _attach(self, attachment: MatrixAttachment) -> None:
+        """Add springs or mass."""
+        if not self.mesh.whole:
+            raise ModelError("springs and added masses need the whole mesh; solve without mpirun")
+        matrix = attachment.matrix(self.mesh)
+        known = self.attached or Attached(0 * matrix, 0 * matrix)
+        K, M = (known.K, known.M + matrix) if attachment.is_mass else (known.K + matrix, known.M)
+        self.attached, self.supports.springs = Attached(K, M), K
+        self.attachments.append(attachment)
+        self._changes += 1
+
     def rigid_modes(self) -> Array:
         """Return the rigid-body modes (3n, 6): translations in x, y and z, rotations about x, y and z."""
         return rigid_modes(self.mesh.points)
+
+    def reactions(self, residual: Array, u: Array) -> Array:
+        """Return the forces of supports, constraints and springs on the body.
+
+        Parameters
+        ----------
+        residual : (n, 3) N, internal and inertia forces less loads.
+        u : (n, 3) m.
+
+        Returns
+        -------
+        (n, 3) N, 0 where none of them acts.
+        """
+        forces = self.supports.supported(residual)
+        return forces + self.supports.on_independents(self.attached.forces(u)) if self.attached else forces
 
     # ---- loads and motion ----------------------------------------------------------------------
 
@@ -677,17 +813,18 @@ class Structure(Tabular):
 
     def add(
         self,
-        load: Load | Attachment,
+        load: Load | Attachment | MatrixAttachment,
         *,
         amplitude: Factor | None = None,
         name: str | None = None,
         override: bool = False,
     ) -> None:
-        """Add a load (loads add up), or the motion of the material through the mesh (there is one).
+        """Add a load (loads add up), springs, or the motion of the material through the mesh (there is one).
 
         Parameters
         ----------
-        load : such as `Gravity` or `Traction`; or a motion such as `kratos_lite.ale.Rotation`.
+        load : such as `Gravity` or `Traction`; `ElasticSupport`; or a motion such as
+            `kratos_lite.ale.Rotation`.
         amplitude : number, `TimeSeries` or function of time in s that multiplies the load; statics uses its
             value at t = 0.
         name : by which `remove` and `named_loads` know the load.  An equal one of this name is added once.
@@ -710,9 +847,14 @@ class Structure(Tabular):
         >>> model.loads[0].amplitude(0.5)
         1.0
         """
-        if isinstance(load, Attachment):
+        if isinstance(load, (Attachment, MatrixAttachment)):
             if amplitude is not None or name is not None:
-                raise InputError("a motion takes no amplitude (its rate may be a function of time) nor name")
+                raise InputError(
+                    "a motion (its rate may be a function of time) or a spring takes no amplitude nor name"
+                )
+            if isinstance(load, MatrixAttachment):
+                self._attach(load)
+                return
             load.attach(self)
             self._motion = load
             return
@@ -837,7 +979,8 @@ class Structure(Tabular):
             rows.append(("stiffness", f"times {span}, a factor for each element"))
         rows.append(("fixed", f"{self.supports.fixed.sum()} components"))
         rows += [("support", str(condition)) for condition in self.supports.named.values()]
-        rows += [("tie", str(tie)) for tie in self.supports.ties]
+        rows += [(tie.title, str(tie)) for tie in self.supports.ties]
+        rows += [("attached", repr(attachment)) for attachment in self.attachments]
         if len(self.supports.constraints):
             rows.append(("constraints", str(len(self.supports.constraints))))
         names = {id(load): f"{name}: " for name, load in self.named_loads.items()}
@@ -865,6 +1008,8 @@ CHECKS: tuple[Callable[[Structure, Sequence[ElementGroup]], Iterable[str]], ...]
     lambda model, groups: check_spurious_modes(model.mesh, groups, model.supports),
     lambda model, groups: checks.check_nodes(model.mesh),
     lambda model, groups: model.supports.check_used(model.mesh.used_nodes()),
+    lambda model, groups: [text for point in model.points for text in point._check(groups, model.motion)],
+    lambda model, groups: checks.check_attached(model.attached is not None, model.motion),
     lambda model, groups: [text for load in model.loads for text in load.warnings(model.mesh, groups)],
 )
 """What is checked of each model with sound cells: a check returns warnings, or raises an error."""

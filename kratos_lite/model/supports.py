@@ -12,10 +12,10 @@ from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh, Where
 from kratos_lite.model.loads.base import key_of
 from kratos_lite.model.local_axes import LocalAxes
-from kratos_lite.model.ties import PartTie
+from kratos_lite.model.ties import Coupling
 from kratos_lite.solvers.constraints import ConstraintMap, Constraints, constraint_map, eliminate
 from kratos_lite.time_series import function_of
-from kratos_lite.typing import Array, ArrayLike, Ints, Mask
+from kratos_lite.typing import Array, ArrayLike, Csr, Ints, Mask
 from kratos_lite.validation import finite, short, whole_numbers
 
 AXES = "xyz"
@@ -74,7 +74,7 @@ class Supports:
     fixed : (n, 3) bool, read-only, which degrees of freedom are prescribed.
     values : (n, 3) float, read-only, their displacements in m, at the time 0 where they move.
     conditions : the Dirichlet conditions that these came from, in order.
-    ties : of parts, in order.
+    ties : of parts, and remote points, in order.
     hanging : the constraints of hanging nodes, the first of all.
     version : counts the changes of what is prescribed, but for values and functions of time.
     value_version : counts all changes.
@@ -95,9 +95,10 @@ class Supports:
         if mesh.hanging is not None:
             self._hangs[mesh.hanging.nodes] = True
         self.conditions: list[DirichletCondition] = []
-        self.ties: list[PartTie] = []
+        self.ties: list[Coupling] = []
         self._every: tuple[int, Constraints] = (-1, Constraints.none())
         self.version = self.value_version = 0
+        self.springs: Csr | None = None  # (3n, 3n) N/m
         self._dependents: tuple[int, Constraints] = (-1, Constraints.none())
 
     def __str__(self) -> str:
@@ -143,8 +144,7 @@ class Supports:
         self.conditions = [other for other in self.conditions if other is not condition]
         self._fixed[:], self._values[:], self._function[:] = False, 0.0, CONSTANT
         self._inclined, self._inclined_rows = Constraints.none(), []
-        self.version += 1
-        self.value_version += 1
+        self.changed()
         for other in self.conditions:
             self._apply(replace(other, override=True))
 
@@ -155,8 +155,7 @@ class Supports:
         if condition.released:
             at = np.ix_(nodes, np.array(numbers))
             self._fixed[at], self._values[at], self._function[at] = False, 0.0, CONSTANT
-            self.version += 1
-            self.value_version += 1
+            self.changed()
             if self._inclined_rows:
                 self._resolve_inclined()
             return
@@ -196,8 +195,7 @@ class Supports:
         """Prescribe components (m, k) along local axes: a·u = value at nodes, for each of these axes."""
         a = local.directions(self.mesh.points[nodes])[:, numbers]
         self._inclined_rows.append((np.repeat(nodes, len(numbers)), a.reshape(-1, 3), values.ravel()))
-        self.version += 1
-        self.value_version += 1
+        self.changed()
         self._resolve_inclined()
 
     def _resolve_inclined(self) -> None:
@@ -281,7 +279,7 @@ class Supports:
 
     @property
     def constraints(self) -> Constraints:
-        """The multi-point constraints: of hanging nodes, those added, of local axes, and of ties of parts."""
+        """All constraints: of hanging nodes, those added, of local axes, of ties and remote points."""
         if not self.ties:
             return self._constraints + self._inclined if len(self._inclined) else self._constraints
         if self._every[0] != self.value_version:
@@ -307,10 +305,14 @@ class Supports:
     def add_constraints(self, constraints: Constraints) -> None:
         """Add constraints."""
         self._constraints += constraints
+        self.changed()
+
+    def changed(self) -> None:
+        """Count a change of what is prescribed."""
         self.version += 1
         self.value_version += 1
 
-    def add_tie(self, tie: PartTie) -> None:
+    def add_tie(self, tie: Coupling) -> None:
         """Add a tie, or replace the one between the same parts."""
         old = [other for other in self.ties if other.place == tie.place]
         self.ties = [tie if other in old else other for other in self.ties] + [tie] * (not old)
@@ -324,6 +326,11 @@ class Supports:
                 self._check_agreement(*tie.held_twice(self.fixed))
             self._dependents = self.value_version, self._eliminated(self.values)
         return self._dependents[1]
+
+    @property
+    def displaced(self) -> float:
+        """The sum of the sizes of all prescribed displacements, in m."""
+        return float(np.abs(self.values).sum() + np.abs(self.dependents().constants).sum())
 
     def constrain(
         self,
@@ -422,14 +429,28 @@ class Supports:
         return forces if self.mesh.hanging is None else self.mesh.hanging.gather(forces)
 
     def constraint_rows(self) -> tuple[Ints, Ints, Array]:
-        """Return all that is prescribed, but its values, as sparse rows of equations: (row, dof, weight)."""
+        """Return all that is prescribed, but its values, and what springs resist, as equations.
+
+        They are sparse rows: (row, dof, weight).
+        """
         fixed, every = np.flatnonzero(self.fixed), self.constraints
         rows = len(fixed) + np.arange(len(every))
+        row, dof, weight = self._spring_rows()
         return (
-            np.concatenate([np.arange(len(fixed)), rows, rows[every.owner]]),
-            np.concatenate([fixed, every.dependents, every.independents]),
-            np.concatenate([np.ones(len(fixed) + len(every)), -every.weights]),
+            np.concatenate([np.arange(len(fixed)), rows, rows[every.owner], len(fixed) + len(every) + row]),
+            np.concatenate([fixed, every.dependents, every.independents, dof]),
+            np.concatenate([np.ones(len(fixed) + len(every)), -every.weights, weight]),
         )
+
+    def _spring_rows(self) -> tuple[Ints, Ints, Array]:
+        """Return likewise K of springs, whose forces are 0 in what they leave free, but for rounding."""
+        if self.springs is None:
+            return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0)
+        K = self.springs.tocoo()
+        size = np.zeros(K.shape[0])
+        np.maximum.at(size, K.row, np.abs(K.data))
+        kept = (size > 1e-9 * np.repeat(size.reshape(-1, 3).max(axis=1), 3))[K.row]
+        return K.row[kept].astype(np.int64), K.col[kept].astype(np.int64), K.data[kept]
 
 
 def hanging_constraints(mesh: Mesh) -> Constraints:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,17 +25,37 @@ HOPS = 3
 WHOLE = 1 - 1e-6
 
 
-class PartTie(ABC):
-    """What ties part b to part a; one with the same `place` takes its place.
+class Coupling(ABC):
+    """Constraints of parts, made anew when supports or the mesh change; one with its `place` replaces it.
 
     Attributes
     ----------
-    place : type and nodes.
+    title : what it is, for the summary.
+    place : type and nodes, or the coupling itself.
+    nodes_of : of parts that are tied to one another.
     equations : what K depends on, beside `place`; the constants of constraints do not belong to it.
     """
 
+    title = "tie"
     place: Hashable
+    nodes_of: Sequence[Ints] = ()
     equations: Hashable = None
+
+    @abstractmethod
+    def constraints(self, fixed: Mask, known: Mask) -> Constraints:
+        """Return the constraints of degrees of freedom that are not `known` (n, 3): fixed, or dependent."""
+
+    def held_twice(self, fixed: Mask) -> tuple[Ints, Ints, Array]:
+        """Return pairs of degrees of freedom that are fixed, both, and what must be between them in m."""
+        return NO_ROWS, NO_ROWS, np.zeros(0)
+
+    @abstractmethod
+    def refined(self, finer: RefinedMesh, supports: Any) -> Coupling:
+        """Return the same on a finer mesh with supports of its own."""
+
+
+class PartTie(Coupling):
+    """What ties part b to part a."""
 
     def __init__(self, mesh: Mesh, a: Where, b: Where) -> None:
         self.mesh, self.a, self.b = mesh, a, b
@@ -47,18 +67,6 @@ class PartTie(ABC):
                 f"cannot tie {PartTie.__str__(self)}: both have node {mesh.node_ids[both[0]]}, and "
                 f"{len(both) - 1} more; each side needs nodes and a part of its own"
             )
-
-    @abstractmethod
-    def constraints(self, fixed: Mask, known: Mask) -> Constraints:
-        """Return the constraints of degrees of freedom that are not `known` (n, 3): fixed, or dependent."""
-
-    def held_twice(self, fixed: Mask) -> tuple[Ints, Ints, Array]:
-        """Return pairs of degrees of freedom that are fixed, both, and what must be between them in m."""
-        return NO_ROWS, NO_ROWS, np.zeros(0)
-
-    @abstractmethod
-    def refined(self, finer: RefinedMesh) -> PartTie:
-        """Return the tie on a finer mesh."""
 
     def __str__(self) -> str:
         return f"{name_of(self.a, self.nodes_of[0])} to {name_of(self.b, self.nodes_of[1])}"
@@ -81,7 +89,7 @@ class Tie(PartTie):
     def __str__(self) -> str:
         return f"{super().__str__()}: {len(self.integrals.nodes)} nodes depend on the others"
 
-    def refined(self, finer: RefinedMesh) -> Tie:
+    def refined(self, finer: RefinedMesh, supports: Any) -> Tie:
         """Return the tie on a finer mesh."""
         return Tie(finer.mesh, finer.where(self.a), finer.where(self.b), self.tolerance)
 

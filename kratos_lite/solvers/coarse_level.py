@@ -22,7 +22,7 @@ from kratos_lite.mesh.centers import surroundings
 from kratos_lite.mesh.hanging import HangingNodes
 from kratos_lite.shapes import Shape
 from kratos_lite.solvers.plan import EXTREME, PER_EXTREME, PER_STRETCHED, STRETCHED
-from kratos_lite.typing import Array, Ints, Rows
+from kratos_lite.typing import Array, Csr, Ints, Rows
 
 LINEAR: dict[type[Shape] | None, type[KinematicLinear]] = {
     element.shape: element
@@ -47,6 +47,14 @@ class PCoarseLevel:
         """The stiffness matrix (3m, 3m) of the linear elements on the corner nodes."""
         return self.assemble()
 
+    def with_springs(self, springs: Csr) -> PCoarseLevel:
+        """Return the level of K with springs (3n, 3n) on all nodes."""
+        from scipy.sparse import csr_array, eye_array, kron
+
+        shape = len(self.indptr) - 1, len(self.nodes)
+        P = kron(csr_array((self.weights, self.indices, self.indptr), shape=shape), eye_array(3))
+        return replace(self, assemble=lambda: BlockMatrix.of(self.K.scipy().tocsr() + P.T @ springs @ P))
+
     def with_mass(self, k: float, nodal: Array) -> PCoarseLevel:
         """Return the level of k K + M, with masses of all nodes (n,) lumped at the corners."""
         fine = np.repeat(np.arange(len(self.indptr) - 1), np.diff(self.indptr))
@@ -62,6 +70,8 @@ class PCoarseLevel:
 
 SAMPLE = 2000
 """Cells of a group that show whether it is stretched."""
+RIGID = 100
+"""Dependents of one degree of freedom, in ties of several directions, from which they are a rigid part."""
 LONG = 3.0
 """Length of a cell to its second length from which its halves are the linear elements."""
 
@@ -283,10 +293,11 @@ def _on(level: PCoarseLevel, nodes: Ints, inner: Any, P: Any) -> PCoarseLevel:
     )
 
 
-def apply_ties(level: PCoarseLevel, T: Any, free: Ints) -> PCoarseLevel:
+def apply_ties(level: PCoarseLevel, T: Any, free: Ints) -> PCoarseLevel | None:
     """Return the level of fields that keep the ties of nodes, where these tie all components alike.
 
-    Without it the linear elements of both sides come apart.  Other ties leave the level as it is.
+    Without it the linear elements of both sides come apart.  Other ties leave the level as it is; but None
+    for rigid parts, which it would hold at rest.
     """
     from scipy.sparse import csr_array, diags_array
 
@@ -307,7 +318,7 @@ def apply_ties(level: PCoarseLevel, T: Any, free: Ints) -> PCoarseLevel:
     ]
     alike = all(abs(by_axis[0] - other).nnz == 0 for other in by_axis[1:])
     if not alike or (row % 3 != column % 3).any():
-        return level
+        return None if np.bincount(column).max() > RIGID else level
     W = csr_array((level.weights, level.indices, level.indptr), shape=(n, m))
     inner = diags_array(1.0 * ~is_dependent[level.nodes]) + (by_axis[0] @ W)[level.nodes]
     return _on(level, level.nodes, inner, (W @ inner).tocsr())

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kratos_lite.assembly.attached import Attached
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.matrix_free import MatrixFree
@@ -46,12 +47,14 @@ class ConstrainedSystem:
         patterns: PatternCache | None = None,
         progress: Progress | None = None,
         hanging: HangingNodes | None = None,
+        attached: Attached | None = None,
     ) -> None:
         self.n_nodes = len(points)
         self.nodes, self.groups = renumber(self.n_nodes, groups)
         self.points = points[self.nodes]
         self.constraint_map = constraints(self.nodes)
         self.tolerance, self.progress = tolerance, progress
+        self.attached = None if attached is None else attached.on(self.nodes)
         self._hanging = hanging if hanging is None else hanging.select(self.nodes, self.n_nodes)
         self.skipped: list[str] = []
         self.warnings: list[str] = []
@@ -66,7 +69,7 @@ class ConstrainedSystem:
             3 * len(self.nodes),
             bulk_over_shear=lambda: largest_bulk_over_shear(self.groups),
             bandwidth=self._bandwidth,
-            has_product=lambda: all(map(MatrixFree.takes, self.groups)),
+            has_product=lambda: not self.attached and all(map(MatrixFree.takes, self.groups)),
             contrast=lambda: stiffness_contrast(self.groups),
             is_stretched=self._is_stretched,
             is_plate=self._is_plate,
@@ -89,25 +92,36 @@ class ConstrainedSystem:
     @cached_property
     def pattern(self) -> Pattern:
         """The sparsity of matrices on these nodes."""
-        return self._patterns.get(len(self.nodes), [group.nodes for group in self.groups])
+        pairs = [self.attached.pairs] if self.attached else []
+        return self._patterns.get(len(self.nodes), [group.nodes for group in self.groups] + pairs)
 
     @cached_property
     def K(self) -> Any:
         """The stiffness matrix (3a, 3a) in N/m: a BlockMatrix, or a full array for the method ``dense``."""
         if self.plan.method == "dense":
-            return assemble_dense(self.points, self.groups)
+            K = assemble_dense(self.points, self.groups)
+            return K + self.attached.K.toarray() if self.attached else K
         if self.plan.method == "displacement-pressure":
             from kratos_lite.solvers.dilatation import assemble  # a quick start for small models
 
-            return assemble(self.points, self.groups, self.pattern, self.progress)
+            split = assemble(self.points, self.groups, self.pattern, self.progress)
+            self._add_springs(split.A)
+            return split
         if not self.plan.matrix_free:
-            return self._assembled()
+            return self.assembled()
         if any(len(group.element.shape.nodes) > group.element.shape.corners for group in self.groups):
             self.skipped.append(NO_MATRIX)
-        return MatrixFree(self.points, self.groups, self._assembled)
+        return MatrixFree(self.points, self.groups, self.assembled)
 
-    def _assembled(self) -> BlockMatrix:
-        return assemble_stiffness(self.points, self.groups, self.pattern, self.progress)
+    def assembled(self) -> BlockMatrix:
+        """Return the stiffness of elements and springs as a matrix."""
+        K = assemble_stiffness(self.points, self.groups, self.pattern, self.progress)
+        self._add_springs(K)
+        return K
+
+    def _add_springs(self, K: BlockMatrix) -> None:
+        if self.attached:
+            self.pattern.add_matrix(K.data, self.attached.K)
 
     @cached_property
     def norm(self) -> float:
@@ -118,9 +132,9 @@ class ConstrainedSystem:
     def equations(self) -> LinearSolver:
         """What solves them."""
         groups = getattr(self.K, "groups", self.groups)  # those of a split matrix have other materials
-        return LinearSolver(
-            self.K, self.constraint_map, self.points, self.plan, groups=groups, hanging=self._hanging
-        )
+        what = self.K, self.constraint_map, self.points, self.plan
+        springs = self.attached and self.attached.K
+        return LinearSolver(*what, groups=groups, hanging=self._hanging, springs=springs)
 
     def solve(
         self,

@@ -224,3 +224,14 @@ def rigid_modes(points: Array, center: ArrayLike | None = None) -> Array:
     R[:, 0, 4], R[:, 2, 4] = z, -x
     R[:, 0, 5], R[:, 1, 5] = -y, x
     return R.reshape(-1, 6)
+
+
+def independent_rows(A: Array) -> Ints:
+    """Return as many rows of A (m, k) as span all of them, each the largest beside those before it."""
+    from scipy.linalg import qr
+
+    if not A.size:
+        return np.zeros(0, dtype=np.int64)
+    R, order = qr(A.T, mode="r", pivoting=True)
+    size = np.abs(np.diagonal(R))
+    return np.asarray(order[: np.count_nonzero(size > 1e-9 * size.max())], dtype=np.int64)

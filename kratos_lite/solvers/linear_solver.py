@@ -53,6 +53,7 @@ class LinearSolver:
     near: LinearSolver | None = None  # of a matrix not far from K, symmetric: its multigrid serves K, too
     groups: Sequence[ElementGroup] = ()  # with `hanging`: quadratic elements, whose linear ones are a level
     hanging: HangingNodes | None = None
+    springs: Any = None  # (3n, 3n) N/m, what K has beside the groups, or None
     with_mass: tuple[float, Array] | None = None  # k, masses of nodes (n,), where K is k K + M of the groups
 
     def __getstate__(self) -> dict[str, Any]:
@@ -174,6 +175,8 @@ class LinearSolver:
         from kratos_lite.solvers.coarse_level import apply_ties, p_coarse_level  # a quick start
 
         linear, map = p_coarse_level(self.points, self.groups, self.hanging), self.constraint_map
+        if linear is not None and self.springs is not None:
+            linear = linear.with_springs(self.springs)
         if linear is not None and self.with_mass is not None:
             linear = linear.with_mass(*self.with_mass)
         if linear is not None and map.T is not None:

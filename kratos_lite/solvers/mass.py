@@ -32,7 +32,9 @@ class Mass:
         groups: Sequence[ElementGroup],
         pattern: Pattern,
         lumped: bool,
+        attached: Csr | None = None,
     ) -> None:
+        self.attached = attached  # (3n, 3n) kg beside the elements, not in `scalar`, `nodal` and `data`
         self._points, self._groups = points, groups
         self.lumped, self.pattern = lumped, pattern
 
@@ -60,6 +62,10 @@ class Mass:
 
     def times(self, v: Array) -> Array:
         """Return M v of a nodal vector (3n,), or of several (k, 3n), which read the matrix together."""
+        product = self._times(v)
+        return product if self.attached is None else product + (self.attached @ v.T).T
+
+    def _times(self, v: Array) -> Array:
         M, compiled = self.scalar, kernels("sparse")
         vectors = np.ascontiguousarray(v).reshape(-1, 3 * len(self._points))
         if compiled is not None:
@@ -76,7 +82,7 @@ class Mass:
 
     def solve_constrained(self, f: Array, constraint_map: ConstraintMap, c: Array) -> Array:
         """Return x = T q + c with T^T (M x - f) = 0, (3n,), by conjugate gradients: M is well-conditioned."""
-        diagonal = self.scalar.diagonal().repeat(3)
+        diagonal = self.matrix().diagonal()
         T = constraint_map.T
         D = diagonal[constraint_map.free] if T is None else T.multiply(T).T @ diagonal
         b = constraint_map.reduce(f - self.times(c))
@@ -102,7 +108,8 @@ class Mass:
         """Return the mass matrix of all components, (3n, 3n) in kg."""
         from scipy.sparse import csr_array, eye_array, kron
 
-        return csr_array(kron(self.scalar, eye_array(3), format="csr"))
+        M = csr_array(kron(self.scalar, eye_array(3), format="csr"))
+        return M if self.attached is None else M + self.attached
 
     @cached_property
     def _factors(self) -> direct.Factorization:

@@ -46,7 +46,7 @@ class Scene:
 
     def forces(self) -> Array:
         """Return the nodal forces (n, 3) in N of all loads."""
-        return external_loads(self.model.mesh, self.model.element_groups(), self.model.loads)
+        return external_loads(self.model, self.model.element_groups(), self.model.loads)
 
 
 def manufactured(kind: str, n: int, distortion: float = 0.0) -> Scene:

@@ -19,7 +19,7 @@ def model(kind="8N", cells=(2, 2, 1)):
 
 def totals(structure):
     """Return force (3,) and moment (3,) of all loads."""
-    forces = external_loads(structure.mesh, structure.element_groups(), structure.loads)
+    forces = external_loads(structure, structure.element_groups(), structure.loads)
     return np.concatenate([forces.sum(axis=0), np.cross(structure.mesh.points, forces).sum(axis=0)])
 
 

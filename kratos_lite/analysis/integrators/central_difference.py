@@ -21,7 +21,7 @@ from kratos_lite.errors import ModelError
 class CentralDifference(ModelIntegrator):
     """Central differences with lumped mass: explicit, order 2, stable for steps below 2/ω.
 
-    It takes neither a motion of the material nor constraints.
+    It takes neither a motion of the material nor constraints, springs or added masses.
     """
 
     name = "central_difference"
@@ -33,12 +33,14 @@ class CentralDifference(ModelIntegrator):
         Raises
         ------
         ModelError
-            The model has a motion of its material, or constraints.
+            The model has a motion of its material, constraints, springs or added masses.
         """
         if e.terms is not None:
             raise ModelError("central differences do not take a motion of the material; use Newmark()")
         if len(e.model.supports.constraints):
             raise ModelError("central differences do not take constraints; use Newmark()")
+        if e.model.attached:
+            raise ModelError("central differences do not take springs nor added masses; use Newmark()")
 
     def critical_step(self, e: EquationsOfMotion) -> float:
         """Return 2/ω (√(1 + ξ²) - ξ) in s, ω of a bound for the elements, ξ the damping ratio of β."""

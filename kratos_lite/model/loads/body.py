@@ -125,6 +125,21 @@ class Gravity(BodyForce):
     ) -> None:
         super().__init__(acceleration, where, local=local)
 
+    def at(self, points: Array) -> Array:
+        """Return the acceleration at the nodes.
+
+        Parameters
+        ----------
+        points : (n, 3) m.
+
+        Returns
+        -------
+        (n, 3) m/s².
+        """
+        force = placed(self.force, self.local, self.what[0])
+        force = force(points) if callable(force) else force
+        return np.broadcast_to(force, points.shape)
+
     def _scale(self, group: ElementGroup) -> float:
         """Return the density."""
         return group.material.density

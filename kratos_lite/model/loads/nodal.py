@@ -66,7 +66,7 @@ class PointLoad(Load):
                     "if so, give each=True; a force in all is kl.Resultant(part, force), or --resultant"
                 )
         else:
-            _around(mesh, self._point)
+            around(mesh, self._point)
 
     def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
         """Return the nodal forces (n, 3) in N.
@@ -80,7 +80,7 @@ class PointLoad(Load):
         """
         total = np.zeros_like(mesh.points)
         if self._point is not None:
-            nodes, N = _around(mesh, self._point)
+            nodes, N = around(mesh, self._point)
             total[nodes] = N[:, None] * self._at(self._point)
             return total
         nodes = mesh.nodes(self.where)
@@ -105,8 +105,8 @@ class PointLoad(Load):
         return PointLoad(same, self.force, self.each, local=self.local)
 
 
-def _around(mesh: Mesh, point: Array) -> tuple[Ints, Array]:
-    """Return the nodes (k,) on which a force on a point acts, and its fraction (k,) on each."""
+def around(mesh: Mesh, point: Array, what: str = "a point load") -> tuple[Ints, Array]:
+    """Return the nodes (k,) on which something on a point acts, and its fraction (k,) on each."""
     nodes, nearby = nodes_at(point, mesh.points)
     nodes = nodes[mesh.used_nodes()[nodes]][:1]
     size = float(np.linalg.norm(mesh.extent[1] - mesh.extent[0]))
@@ -116,7 +116,7 @@ def _around(mesh: Mesh, point: Array) -> tuple[Ints, Array]:
     if located.inside:
         return located.nodes_and_weights()
     if mesh.whole and not len(nodes):
-        raise MeshError(f"a point load at {point.tolist()} m acts outside the mesh; {nearby}")
+        raise MeshError(f"{what} at {point.tolist()} m acts outside the mesh; {nearby}")
     return nodes, np.ones(len(nodes))
 
 

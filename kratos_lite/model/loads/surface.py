@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -43,7 +43,7 @@ class FaceLoad(DistributedLoad):
 
     def integral(self, mesh: Mesh, groups: Sequence[ElementGroup], factors: int) -> Array:
         """Return the nodal forces (n, 3) in N of all faces."""
-        total, faces = np.zeros_like(mesh.points), _faces(mesh, self.where, self.what, self.cells)
+        total, faces = np.zeros_like(mesh.points), loaded_faces(mesh, self.where, self.what, self.cells)
         for block, forces in zip(faces, self.on_faces(mesh, faces, factors), strict=True):
             add_nodal(total, block.nodes, forces)
         return total
@@ -52,7 +52,7 @@ class FaceLoad(DistributedLoad):
         """Return the derivative (n, 3) in N of v·f by the nodes; ModelError of a function of places."""
         if callable(getattr(self, self.nodal[0], None)) or self.local is not None:
             raise self.without_derivative("it is a function of places, or along local axes")
-        total, faces = np.zeros_like(v), _faces(mesh, self.where, self.what, self.cells)
+        total, faces = np.zeros_like(v), loaded_faces(mesh, self.where, self.what, self.cells)
         for block, tangent in zip(faces, self.tangents(mesh, faces), strict=True):
             add_nodal(total, block.nodes, np.einsum("mac,macbi->mbi", v[block.nodes], tangent))
         return total
@@ -170,7 +170,7 @@ class Pressure(FaceLoad):
 
     def follow(self, mesh: Mesh, x: Array) -> Iterator[tuple[Rows, Array, Array]]:
         """Yield what deformed faces change, if the pressure follows them."""
-        for block in _faces(mesh, self.where, self.what) if self.follower else ():
+        for block in loaded_faces(mesh, self.where, self.what) if self.follower else ():
             p = np.asarray(_on(block, self.pressure, mesh, self.what, ())) + np.zeros(block.nodes.shape)
             if self.normal == "outward":
                 p = p * outward(mesh, block)[:, None]
@@ -191,6 +191,7 @@ class Resultant(FaceLoad):
     about : (3,) float, m; the point on which the force acts and about which the moment is.  The centroid if
         not given.
     local : axes of force and moment, those at the point on which the force acts; x y z if not given.
+    nodes : whether the nodes of the part take it, alike in place of areas; as on a rigid part.
 
     Raises
     ------
@@ -214,26 +215,40 @@ class Resultant(FaceLoad):
         force: ArrayLike,
         moment: ArrayLike = (0.0, 0.0, 0.0),
         about: ArrayLike | None = None,
+        nodes: bool = False,
         *,
         local: LocalAxes | None = None,
     ) -> None:
-        self.where = where
+        self.where, self._nodes = where, flag(nodes, "nodes")
         self._along(local)
         self.force = vectors(force, "a resultant force", "(3,) in N")
         self.moment = vectors(moment, "a resultant moment", "(3,) in N m")
         self.about = None if about is None else vectors(about, "the point of a resultant", "(3,) in m")
 
-    def on_faces(self, mesh: Mesh, faces: list[Block], factors: int) -> Iterable[Array]:
-        """Return ∫ N t dA (m, k, 3) in N of each face.
+    def integral(self, mesh: Mesh, groups: Sequence[ElementGroup], factors: int) -> Array:
+        """Return the nodal forces (n, 3) in N of all faces, or of the nodes.
 
         Raises
         ------
         ModelError
-            The mesh is a part of a larger one.
+            The mesh is a part of a larger one, or the nodes take no moment.
         """
+        if not self._nodes:
+            return super().integral(mesh, groups, factors)
+        total, nodes = np.zeros_like(mesh.points), mesh.nodes(self.where)
+        total[nodes] = self._traction(mesh, mesh.points[nodes], np.ones(len(nodes)))(mesh.points[nodes])
+        return total
+
+    def on_faces(self, mesh: Mesh, faces: list[Block], factors: int) -> Iterable[Array]:
+        """Return ∫ N t dA (m, k, 3) in N of each face."""
+        X, dA = (np.concatenate(values) for values in zip(*_points_of(mesh, faces, factors), strict=True))
+        traction = self._traction(mesh, X, dA)
+        return [surface_load(b.known_shape, mesh.points[b.nodes], traction, factors) for b in faces]
+
+    def _traction(self, mesh: Mesh, X: Array, dA: Array) -> Callable[[Array], Array]:
+        """Return the traction at places (..., 3), from points (k, 3) that stand for areas (k,)."""
         if not mesh.whole:
             raise ModelError("a resultant needs all faces of its part in one mesh; give a traction instead")
-        X, dA = (np.concatenate(values) for values in zip(*_points_of(mesh, faces, factors), strict=True))
         center = dA @ X / dA.sum()
         arms = X - center
         inertia = (dA * (arms**2).sum(axis=1)).sum() * np.eye(3) - (dA * arms.T) @ arms
@@ -241,12 +256,17 @@ class Resultant(FaceLoad):
         force, moment = self.force, self.moment
         if self.local is not None:
             force, moment = self.local.globally([force, moment], [center + arm] * 2)
-        turn = np.linalg.solve(inertia, moment + np.cross(arm, force))
+        moment = moment + np.cross(arm, force)
+        turn = np.linalg.pinv(inertia, rcond=1e-12, hermitian=True) @ moment
+        if np.abs(inertia @ turn - moment).max() > 1e-9 * np.abs(moment).max():
+            raise ModelError(
+                f"{self!r}: its nodes lie on a line or at one place, and take no moment about it"
+            )
 
         def traction(x: Array) -> Array:
             return np.asarray(force / dA.sum() + np.cross(turn, x - center))
 
-        return [surface_load(b.known_shape, mesh.points[b.nodes], traction, factors) for b in faces]
+        return traction
 
 
 class ConditionLoads(Load):
@@ -367,7 +387,8 @@ def outward(mesh: Mesh, block: Block) -> Array:
     return signs
 
 
-def _faces(mesh: Mesh, where: Where, what: str, cells: Sequence[str] = SURFACES) -> list[Block]:
+def loaded_faces(mesh: Mesh, where: Where, what: str, cells: Sequence[str] = SURFACES) -> list[Block]:
+    """Return the faces of a part, or lines; ModelError, which names what needs them, for none."""
     faces = mesh.faces(where)
     wanted = "faces" if cells == SURFACES else "lines"
     for block in faces:

@@ -1,0 +1,196 @@
+"""Attachments: springs and masses on points, faces and remote points."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from copy import copy
+from typing import TYPE_CHECKING, ClassVar, TypeAlias
+
+import numpy as np
+
+from kratos_lite.errors import InputError, ModelError
+from kratos_lite.mesh import Mesh, Where
+from kratos_lite.mesh.selection import point_of
+from kratos_lite.model.remote_point import RemotePoint
+from kratos_lite.typing import Array, ArrayLike, Csr
+from kratos_lite.validation import finite, number, short
+
+if TYPE_CHECKING:
+    from kratos_lite.mesh.refined_mesh import RefinedMesh
+
+Place: TypeAlias = "Where | RemotePoint"
+"""A part, a point (x, y, z) in m, or a remote point."""
+
+
+class MatrixAttachment(ABC):
+    """A matrix Jᵀ W J on what moves by J u, integrated over faces."""
+
+    what: ClassVar[str]
+    is_mass: ClassVar[bool] = False
+    where: Place
+    to: Place | None = None
+    W: Array
+
+    def matrix(self, mesh: Mesh) -> Csr:
+        """Return the matrix (3n, 3n) on a mesh."""
+        from scipy.sparse import bsr_array, csr_array
+
+        J, vectors = _places(mesh, self.where, self.what)
+        W = self.W[None] if vectors is None else self._weights(vectors)
+        p, r = len(W), W.shape[1]
+        if p * r > J.shape[0]:
+            raise ModelError(f"{self.what} with rotations is for remote points, such as model.rigid(...)")
+        J = J[: p * r]
+        if self.to is not None:
+            other, more = _places(mesh, self.to, self.what)
+            if vectors is not None or more is not None or other.shape[0] < r:
+                raise ModelError(f"{self.what} between parts joins their remote points: model.rigid(...)")
+            J = J - other[:r]
+        A = csr_array(J.T @ bsr_array((W, np.arange(p), np.arange(p + 1)), shape=(p * r, p * r)) @ J)
+        A.eliminate_zeros()
+        return A
+
+    @abstractmethod
+    def _weights(self, vectors: Array) -> Array:
+        """Return W (p, 3, 3) at places of faces with normals times areas (p, 3) in m²."""
+
+    def refined(
+        self, finer: RefinedMesh, old: Sequence[RemotePoint], new: Sequence[RemotePoint]
+    ) -> MatrixAttachment:
+        """Return the same on a finer mesh, whose remote points are new."""
+        made = copy(self)
+        for name in ("where", "to"):
+            place = getattr(self, name)
+            if isinstance(place, RemotePoint):
+                setattr(made, name, new[old.index(place)])
+            elif place is not None and _point_of(place) is None:
+                setattr(made, name, finer.where(place))
+        return made
+
+    def __repr__(self) -> str:
+        named = {name: value for name, value in vars(self).items() if name != "W" and value is not None}
+        return f"{type(self).__name__}({', '.join(f'{name}={short(v)}' for name, v in named.items())})"
+
+
+class ElasticSupport(MatrixAttachment):
+    """Springs: on a point or remote point, or over faces as an elastic foundation; to ground or to another.
+
+    Its forces on the body are among the reactions of a result.
+
+    Parameters
+    ----------
+    where : a point (x, y, z) in m, a `RemotePoint`, or a part: its conditions if it has any, otherwise the
+        boundary faces among its nodes.
+    stiffness : on points (3,) along x, y, z, or (3, 3), N/m; on remote points also (6,) or (6, 6) with those
+        of rotations in N m/rad.  On faces a number, along the normal, or (3,) or (3, 3), N/m³.
+    to : the other end, a point or remote point; the ground if not given.
+
+    Raises
+    ------
+    InputError
+        The stiffness has another shape, is not symmetric, or would push what moves.
+    ModelError
+        Two ends lie apart, and the stiffness is not along the line between them: it would resist rotations.
+
+    Notes
+    -----
+    K = ∫ Nᵀ k N dA.  Source: Hetényi, Beams on Elastic Foundation (1946), chapter I.
+
+    Examples
+    --------
+    >>> import kratos_lite as kl
+    >>> block = kl.Model(kl.box((2.0, 1.0, 1.0)), kl.Isotropic3D(E=1e9, nu=0.3))
+    >>> block.add(kl.ElasticSupport("z-", (1e5, 1e5, 1e7)))
+    >>> block.add(kl.Resultant("z+", (0, 0, -1e4)))
+    >>> result = block.solve()
+    >>> print(f"{result.displacement('z-')[:, 2].mean():.2e} m, {result.reaction('z-')[:, 2].sum():.2e} N")
+    -5.00e-04 m, 1.00e+04 N
+    """
+
+    what = "an elastic support"
+
+    def __init__(self, where: Place, stiffness: ArrayLike, to: Place | None = None) -> None:
+        k = finite(stiffness, "the stiffness of an elastic support")
+        if k.shape not in ((), (3,), (6,), (3, 3), (6, 6)):
+            raise InputError(f"the stiffness must be a number, (3,), (3, 3), (6,) or (6, 6); got {k.shape}")
+        W = _semidefinite(k if k.ndim == 2 else np.diag(np.atleast_1d(k)), "the stiffness")
+        self.where, self.stiffness, self.to, self.W = where, W.tolist() if k.ndim else float(k), to, W
+        one, other = _point_of(where), _point_of(to)
+        if k.ndim == 0 and one is not None:
+            raise InputError("the stiffness on a point is (3,) or (3, 3), in N/m; got a number")
+        if one is not None and other is not None:
+            size = float(np.linalg.norm(other - one) * np.abs(W).max())
+            if np.abs(np.cross(other - one, W[:3, :3])).max() > 1e-9 * size:
+                raise ModelError(
+                    "a spring between two places acts along the line between them, k d dᵀ with its direction "
+                    "d; for others give both ends one place, such as two remote points there"
+                )
+
+    def _weights(self, vectors: Array) -> Array:
+        """Return k dA at places of faces, along the normal for a number."""
+        areas = np.linalg.norm(vectors, axis=1)[:, None, None]
+        return areas * self.W if len(self.W) > 1 else self.W * vectors[:, :, None] * vectors[:, None] / areas
+
+
+class AddedMass(MatrixAttachment):
+    """Mass on a point, over faces, or on a remote point; see `Structure.add_mass`."""
+
+    what, is_mass = "an added mass", True
+
+    def __init__(self, where: Place, mass: float, inertia: ArrayLike | None = None) -> None:
+        self.where, self.mass = where, number(mass, "an added mass", above=0, unit="kg")
+        self.W = np.diag([self.mass] * 3 + [0.0] * 3 * isinstance(where, RemotePoint))
+        if inertia is not None:
+            if not isinstance(where, RemotePoint):
+                raise InputError("an inertia is for remote points, such as model.rigid(...)")
+            inertia = finite(inertia, "the inertia of an added mass", (3, 3))
+            self.W[3:, 3:] = _semidefinite(inertia, "the inertia of an added mass")
+
+    def _weights(self, vectors: Array) -> Array:
+        """Return the mass at places of faces, by area."""
+        areas = np.linalg.norm(vectors, axis=1)[:, None, None]
+        return areas / areas.sum() * self.W
+
+
+def _semidefinite(W: Array, what: str) -> Array:
+    """Return a symmetric matrix without negative eigenvalues; InputError for any other."""
+    size = 1e-12 * float(np.abs(W).max())
+    if np.abs(W - W.T).max() > size or np.linalg.eigvalsh(W)[0] < -size:
+        raise InputError(f"{what} must be symmetric, and ≥ 0 in each direction; got {short(W.tolist())}")
+    return W
+
+
+def _point_of(end: Place | None) -> Array | None:
+    """Return the point (3,) at which a spring ends; None for faces and the ground."""
+    return end.point if isinstance(end, RemotePoint) else None if end is None else point_of(end)
+
+
+def _places(mesh: Mesh, where: Place, what: str) -> tuple[Csr, Array | None]:
+    """Return J (r, 3n), displacements at places by those of nodes, and normals times areas of faces."""
+    from scipy.sparse import csr_array, eye_array, kron, vstack
+
+    from kratos_lite.elements.surface import area_vectors, face_rule  # a quick start without springs
+    from kratos_lite.elements.tables import tabulate
+    from kratos_lite.model.loads.nodal import around
+    from kratos_lite.model.loads.surface import loaded_faces
+
+    n = mesh.n_nodes
+    if isinstance(where, RemotePoint):
+        dofs, D = where._tying()
+        rows, columns = np.repeat(np.arange(6), len(dofs)), np.tile(dofs, 6)
+        return csr_array((D.ravel(), (rows, columns)), shape=(6, 3 * n)), None
+    point, vectors = point_of(where), []
+    if point is not None:
+        nodes, N = around(mesh, point, what)
+        parts = [csr_array((N, (0 * nodes, nodes)), shape=(1, n))]
+    else:
+        parts = []
+        for block in loaded_faces(mesh, where, what):
+            rule = face_rule(block.known_shape)
+            N, (m, k) = tabulate(block.known_shape, rule)[0], block.nodes.shape
+            entries = np.tile(N, (m, 1)).ravel(), np.repeat(block.nodes, len(N), axis=0).ravel()
+            parts.append(csr_array((*entries, np.arange(m * len(N) + 1) * k), shape=(m * len(N), n)))
+            vectors.append(area_vectors(block.known_shape, mesh.points[block.nodes], rule).reshape(-1, 3))
+    J = csr_array(kron(vstack(parts), eye_array(3)))
+    return J, np.concatenate(vectors) if vectors else None
