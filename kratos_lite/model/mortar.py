@@ -28,7 +28,7 @@ FACING = 0.5
 """Least cosine of the angle between two cells that meet."""
 SMALL = 1e-9
 """Fraction of its radius by which a cell is not straight, or covered by others."""
-PAIRS = 4000
+PAIRS = 1000
 """Pairs of cells that are clipped at a time."""
 OUTLINES: dict[int, list[tuple[int, ...]]] = {
     6: [(0, 3, 5, 5), (3, 1, 4, 4), (5, 4, 2, 2), (3, 4, 5, 5)],
