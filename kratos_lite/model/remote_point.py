@@ -136,8 +136,9 @@ class RemotePoint(Coupling):
         values = finite(value, f"the {what} of a remote point")
         if values.shape not in ((), (len(components),)):
             raise InputError(f"the {what} needs one number, or {len(components)}; got shape {values.shape}")
+        known = bool(self.fixed[components].all())
         self.fixed[components], self.values[components] = True, values
-        self._supports.changed()
+        self._supports.changed(values_only=known)
 
     def release(self) -> None:
         """Prescribe nothing any more."""

@@ -307,9 +307,9 @@ class Supports:
         self._constraints += constraints
         self.changed()
 
-    def changed(self) -> None:
-        """Count a change of what is prescribed."""
-        self.version += 1
+    def changed(self, values_only: bool = False) -> None:
+        """Count a change of what is prescribed, or of its values alone."""
+        self.version += not values_only
         self.value_version += 1
 
     def add_tie(self, tie: Coupling) -> None:

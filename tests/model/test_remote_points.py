@@ -192,6 +192,19 @@ def test_load_cases_amplitudes_and_the_summary():
     assert np.abs(model.solve().reactions.sum(axis=0) + 2 * FORCE).max() < 1e-6
 
 
+def test_a_new_value_is_used_with_the_same_matrix():
+    model = bar()
+    point = model.rigid("x+", POINT)
+    point.fix("xyz", 1e-3)
+    analysis = model.static()
+    first, system = analysis.solve(), analysis.system
+    point.fix("xyz", (1e-3, 3e-3, 2e-3))
+    second = analysis.solve()
+    assert analysis.system is system
+    assert np.abs(second.u - model.solve().u).max() < 1e-9 * 3e-3
+    assert np.abs(first.u - second.u).max() > 1e-3
+
+
 def large(model):
     model.formulation = "total_lagrangian"
     model.rigid("x+", POINT)
