@@ -140,7 +140,7 @@ def links():
 def test_a_scene_without_a_matrix_says_so_and_never_makes_one(make, monkeypatch):
     model = make()
     monkeypatch.setattr(MatrixFree, "_assembled", None)
-    monkeypatch.setattr(ConstrainedSystem, "_assembled", None)
+    monkeypatch.setattr(ConstrainedSystem, "assembled", None)
     analysis = model.static("amg")
     result = analysis.solve()
     assert isinstance(analysis.system.K, MatrixFree)
