@@ -130,7 +130,13 @@ def _moduli(result: Any) -> Array:
 
 
 def _check_supports(model: Structure) -> None:
-    """Raise ModelError where what supports prescribe depends on places."""
+    """Raise ModelError where what supports, ties or springs do depends on places."""
+    attached = [("attached", each) for each in model.attachments]
+    for title, each in [(tie.title, tie) for tie in model.supports.ties] + attached:
+        raise ModelError(
+            f"there is no derivative by coordinates with the {title} {each}, whose equations depend on "
+            "places; take another wrt, or a model without it"
+        )
     for condition in model.supports.conditions:
         local = condition.local is not None and not isinstance(condition.local, Cartesian)
         if local or condition.field is not None:

@@ -160,7 +160,8 @@ def converge(
         )
     if uniform:
         h = np.asarray(
-            0.5 ** np.arange(whole_number(meshes, "meshes of a model that is refined", least=3)), float
+            0.5 ** np.arange(whole_number(meshes, "meshes of a model that is refined", least=3, most=20)),
+            float,
         )
         check_quantity(quantity if isinstance(quantity, Quantity) else None)
         check_geometry(geometry, model.mesh)  # type: ignore[union-attr]

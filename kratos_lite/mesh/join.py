@@ -95,7 +95,8 @@ def split(mesh: Mesh, where: Where, names: tuple[str, str] = ("cut-", "cut+")) -
     (24, [20, 21, 22, 23])
     """
     rows, X = mesh.nodes(where), mesh.points
-    _, sizes, axes = np.linalg.svd(X[rows] - X[rows].mean(axis=0), full_matrices=False)
+    center = X[rows].sum(axis=0) / max(len(rows), 1)
+    _, sizes, axes = np.linalg.svd(X[rows] - center, full_matrices=False)
     if len(rows) < 3 or sizes[1] <= FLAT * sizes[0] or sizes[2] > FLAT * sizes[0] or mesh.hanging is not None:
         raise MeshError(f"a cut needs three or more nodes in one plane, and none that hang; got {len(rows)}")
     normal = axes[2] * np.sign(axes[2, np.abs(axes[2]).argmax()])

@@ -76,6 +76,8 @@ class RemotePoint(Coupling):
     (-50.0, True)
     """
 
+    title = "remote point"
+
     def __init__(self, supports: Supports, where: Where, point: ArrayLike, rigid: bool) -> None:
         self.mesh, self._supports, self.where, self.is_rigid = supports.mesh, supports, where, rigid
         self.point = finite(point, "a remote point", (3,))

@@ -238,6 +238,18 @@ def with_support(**support):
     return model
 
 
+def with_point():
+    model = bar()
+    model.rigid("x+", (3.0, 0.5, 0.5))
+    return model
+
+
+def with_springs():
+    model = bar()
+    model.add(kl.ElasticSupport("x+", 1e2))
+    return model
+
+
 PLACES = lambda X: X[:, :1] * [[0.0, 0.0, 1.0]]  # noqa: E731
 
 
@@ -248,6 +260,8 @@ PLACES = lambda X: X[:, :1] * [[0.0, 0.0, 1.0]]  # noqa: E731
         (plastic, None, "E", InputError, "gradient is one of linear elasticity, and J2Plasticity3D"),
         (orthotropic, None, "E", InputError, "Orthotropic3D has no Young's modulus"),
         (free, None, "density", ModelError, "supports that hold the body"),
+        (with_point, None, "coordinates", ModelError, "remote point rigid x\\+"),
+        (with_springs, None, "coordinates", ModelError, "attached ElasticSupport"),
         (bar, OwnLoad(), "coordinates", ModelError, "OwnLoad.* defines no by_coordinates"),
         (bar, kl.Traction("z+", PLACES), "coordinates", ModelError, "Traction.*function of places"),
         (bar, kl.Gravity(PLACES), "coordinates", ModelError, "Gravity.*function of places"),

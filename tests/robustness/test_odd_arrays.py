@@ -22,6 +22,9 @@ INPUT = re.compile(r"ArrayLike|Where|Points|Sequence\[(int|float)\]|OfPlace|Fact
 """Annotations of what users give; others are of arrays that the library makes."""
 
 
+STRAIN = np.array([1e-3, 0, 0, 2e-4, 0, 0])
+
+
 def static():
     model = kl.Model(CUBE, ROCK)
     model.fix("z-")
@@ -66,6 +69,42 @@ def tied(dependents=(0, 1), independents=(12, 13), constant=0.0, weights=1.0):
     return model.supports.constraints.weights
 
 
+def remote(kind, where="z+", point=POINT, **done):
+    """Return displacements under a load on a remote point, after calls of its methods."""
+    model = static()
+    made = getattr(model, kind)(where, point)
+    model.add(made.load(**{"force": VECTOR, **done.pop("load", {})}))
+    for name, argument in done.items():
+        getattr(made, name)(value=argument)
+    return model.solve().u
+
+
+def coupled(mesh, name, *arguments, **options):
+    """Return displacements of a body between its ends, with a tie."""
+    model = kl.Model(mesh, ROCK)
+    ends = mesh.extent[:, 2]
+    model.fix(np.flatnonzero(np.isin(mesh.points[:, 2], ends)))
+    getattr(model, name)(*arguments, **options)
+    model.add(kl.Gravity(VECTOR))
+    return model.solve().u
+
+
+def repeated(where, strain=STRAIN):
+    """Return displacements of a cell that is periodic along z."""
+    model = kl.Model(CUBE, ROCK)
+    model.fix(range(1))
+    model.periodic(where, "z+", strain=strain)
+    model.periodic("x-", "x+")
+    model.periodic("y-", "y+")
+    return model.solve().u
+
+
+def swung(**options):
+    model = static()
+    model.add(kl.Traction("z+", VECTOR))
+    return model.harmonic(**{"frequencies": [10.0], **options}).at([POINT])
+
+
 def released(where):
     model = static()
     model.fix(range(8))
@@ -87,6 +126,9 @@ def enhanced(name, *arguments):
 
 
 PRESCRIBED = (POINT, VECTOR, 0.0)
+STACK = kl.join({"lower": CUBE, "upper": kl.box(origin=(0, 0, 1))})
+CENTRAL = np.flatnonzero(kl.box(cells=(1, 1, 2)).points[:, 2] == 0.5)
+BOLT = kl.split(kl.box(cells=(1, 1, 2)), lambda X: X[:, 2] == 0.5)
 NODES, CELLS, TOP = np.arange(4), np.arange(8)[None], CUBE.nodes("z+")
 TURNED = 1e-3 * CUBE.points[:, ::-1]
 U, STRESS = np.full((8, 3), 1e-3), np.full(6, 1e3)
@@ -117,6 +159,50 @@ CASES: Case = {
     ("Structure.fix", "value"): (lambda v: changed("fix", "z+", "xyz", v), VECTOR),
     ("Structure.assign", "where"): (lambda v: changed("assign", ROCK, v), [0]),
     ("Structure.symmetry", "where"): (lambda v: changed("symmetry", v), TOP),
+    ("Structure.rigid", "where"): (lambda v: remote("rigid", v), TOP),
+    ("Structure.rigid", "point"): (lambda v: remote("rigid", "z+", v), POINT),
+    ("Structure.distribute", "where"): (lambda v: remote("distribute", v), TOP),
+    ("Structure.distribute", "point"): (lambda v: remote("distribute", "z+", v), POINT),
+    ("RemotePoint.load", "force"): (lambda v: remote("rigid", load={"force": v}), VECTOR),
+    ("RemotePoint.load", "moment"): (lambda v: remote("rigid", load={"moment": v}), VECTOR),
+    ("RemotePoint.fix", "value"): (lambda v: remote("rigid", fix=v), VECTOR),
+    ("RemotePoint.fix_rotation", "value"): (lambda v: remote("rigid", fix_rotation=v), VECTOR),
+    ("ElasticSupport", "stiffness"): (lambda v: loaded(kl.ElasticSupport("z+", v)), (1e5, 2e5, 3e5)),
+    ("Structure.add_mass", "inertia"): (
+        lambda v: changed("add_mass", static().rigid("z+", POINT), 1.0, v),
+        np.eye(3),
+    ),
+    ("Structure.tie", "a"): (lambda v: coupled(STACK, "tie", v, "upper.z-"), STACK.nodes("lower.z+")),
+    ("Structure.tie", "b"): (lambda v: coupled(STACK, "tie", "lower.z+", v), STACK.nodes("upper.z-")),
+    ("Structure.periodic", "a"): (repeated, CUBE.nodes("z-")),
+    ("Structure.periodic", "b"): (lambda v: changed("periodic", "x-", v), CUBE.nodes("x+")),
+    ("Structure.periodic", "strain"): (lambda v: repeated("z-", v), STRAIN),
+    ("Structure.pretension", "a"): (
+        lambda v: coupled(BOLT, "pretension", v, "cut+", force=1.0),
+        BOLT.nodes("cut-"),
+    ),
+    ("Structure.pretension", "b"): (
+        lambda v: coupled(BOLT, "pretension", "cut-", v, length=1e-3),
+        BOLT.nodes("cut+"),
+    ),
+    ("Structure.pretension", "amplitude"): (
+        lambda v: coupled(BOLT, "pretension", "cut-", "cut+", force=1.0, amplitude=v),
+        2.0,
+    ),
+    ("split", "where"): (lambda v: kl.split(kl.box(cells=(1, 1, 2)), v).points, CENTRAL),
+    ("Structure.scale_stiffness", "factors"): (lambda v: changed("scale_stiffness", v), [0.5]),
+    ("Structure.scale_stiffness", "where"): (lambda v: changed("scale_stiffness", 0.5, v), [0]),
+    ("Model.harmonic", "frequencies"): (lambda v: swung(frequencies=v), [10.0, 20.0]),
+    ("Model.harmonic", "damping"): (lambda v: swung(damping=v), np.full(12, 0.01)),
+    ("HarmonicResponse.columns", "point"): (
+        lambda v: list(static().harmonic([10.0]).columns(v).values()),
+        POINT,
+    ),
+    ("Section.moment_about", "point"): (RESULT.section(("z", 0.5)).moment_about, VECTOR),
+    ("converge", "meshes"): (
+        lambda v: kl.converge(lambda h: static(), lambda result: 1.0, v).values,
+        [3.0, 2.0, 1.0],
+    ),
     ("Cartesian", "x"): (lambda v: kl.Cartesian(v).directions(POINT), VECTOR),
     ("Cartesian", "y"): (lambda v: kl.Cartesian((0, 0, 1), v).directions(POINT), VECTOR),
     ("Structure.use_rule", "where"): (lambda v: changed("use_rule", 2, v), [0]),
@@ -406,6 +492,8 @@ ELSEWHERE = {
     *(("animate", name) for name in ("clim", "modes", "values")),
     *(("material_point", name) for name in ("strain", "stress")),
     ("PlacedCell", "X"),
+    *(("RemotePoint", name) for name in ("where", "point")),
+    ("plot", "point"),
     ("Block", "shape"),
     ("UMAT", "constants"),
 }
