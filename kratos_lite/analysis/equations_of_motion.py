@@ -21,7 +21,7 @@ from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.linear_solver import LinearSolver
 from kratos_lite.solvers.mass import Mass
-from kratos_lite.solvers.plan import Facts, Plan, stepped
+from kratos_lite.solvers.plan import Plan, stepped
 from kratos_lite.typing import Array, Mask, Progress
 from kratos_lite.validation import finite
 
@@ -39,7 +39,7 @@ class EquationsOfMotion:
     Vectors are (3a,): dof = 3·node + axis of these nodes.  `rayleigh` are α in 1/s and β in s of the damping
     α M + β K.  Supports may leave rigid motions `free` or not.  If `steady`, a rate that changes is taken as
     one that stays, unless the motion is given an acceleration.  Materials may be `massless` where the mass is
-    only looked at.  The `solver` says whether K is a matrix.
+    only looked at.
     """
 
     def __init__(
@@ -51,7 +51,7 @@ class EquationsOfMotion:
         free: bool = True,
         steady: bool = False,
         massless: bool = False,
-        solver: str | Callable[[Facts], Plan] = "direct",
+        solver: str = "direct",
         progress: Progress | None = None,
     ) -> None:
         self.model, self._steady = model, steady
@@ -135,9 +135,10 @@ class EquationsOfMotion:
     # ---- matrices ----------------------------------------------------------------------------------------
 
     @property
-    def K(self) -> Any:
-        """Stiffness (3a, 3a) of the elements alone in N/m, a matrix or a product."""
-        return self.system.K
+    def K(self) -> BlockMatrix:
+        """Stiffness (3a, 3a) of the elements alone in N/m."""
+        K: BlockMatrix = self.system.K
+        return K
 
     def stiffness_terms(self, time: float) -> Array | None:
         """Return what the motion adds to K, data (nnz,) on the pattern, or None."""
@@ -216,7 +217,7 @@ class EquationsOfMotion:
             self._scalar_kept = key, (sparse(self.stiffness_terms(time)), sparse(self.damping_terms(time)))
         return self._scalar_kept[1]
 
-    def matrix(self, time: float, m: float, c: float, k: float) -> Any:
+    def matrix(self, time: float, m: float, c: float, k: float) -> BlockMatrix:
         """Return m M + c C + k K at a time, (3a, 3a)."""
         A = self._elastic(m, c, k)
         for factor, made in ((c, self.damping_terms), (k, self.stiffness_terms)):
@@ -226,22 +227,15 @@ class EquationsOfMotion:
             A.data += c * self.dashpots.data
         return A
 
-    def _elastic(self, m: float, c: float, k: float) -> Any:
-        """Return m M + c C + k K without what a motion adds, (3a, 3a), a matrix or a product as K is."""
-        alpha, beta = self.rayleigh
-        factor, mass = k + c * beta, m + c * alpha
-
-        def assembled(K: BlockMatrix) -> BlockMatrix:
-            A = BlockMatrix(factor * K.data, K.indices, K.indptr)
-            if mass:
-                A.add_scalar(mass * self.mass.data)
-                if self.mass.attached is not None:
-                    self.system.pattern.add_matrix(A.data, self.mass.attached, mass)
-            return A
-
-        if isinstance(self.K, BlockMatrix):
-            return assembled(self.K)
-        return self.K.plus(factor, mass * self.mass.scalar, lambda: assembled(self.K.assembled()))
+    def _elastic(self, m: float, c: float, k: float) -> BlockMatrix:
+        """Return m M + c C + k K without what a motion adds, (3a, 3a)."""
+        K, (alpha, beta) = self.K, self.rayleigh
+        A = BlockMatrix((k + c * beta) * K.data, K.indices, K.indptr)
+        if mass := m + c * alpha:
+            A.add_scalar(mass * self.mass.data)
+            if self.mass.attached is not None:
+                self.system.pattern.add_matrix(A.data, self.mass.attached, mass)
+        return A
 
     def solver(self, time: float, m: float, c: float, k: float, h: float) -> Solve:
         """Return what solves (m M + c C + k K) u = f + reactions, u of a step of h s.
@@ -306,9 +300,9 @@ class EquationsOfMotion:
         damped = bool(self.terms and self.terms.motion.damping)
         return not (acceleration or (rate and (c or damped)))
 
-    def _solver(self, A: Any, near: BlockMatrix | None, m: float, k: float) -> Solve:
+    def _solver(self, A: BlockMatrix, near: BlockMatrix | None, m: float, k: float) -> Solve:
         """Return what solves A x = f; `near` is what it has beside skew parts, if it is not symmetric."""
-        made, plan = self.system.equations, stepped(self.system.facts)
+        made, plan = self.system.equations, stepped(len(self.system.constraint_map.free))
         equations = replace(made, K=A, plan=plan, symmetric=near is None, with_mass=(k, m * self.mass.nodal))
         if near is not None and plan.iterates:
             equations.near = replace(equations, K=near, symmetric=True)

@@ -121,7 +121,7 @@ def complex_modes(
     with phase("assemble"):
         M, C, K = (reduced(e, e.matrix(0.0, *factors)) for factors in ((1, 0, 0), (0, 1, 0), (0, 0, 1)))
     with phase("modes"):
-        solver = replace(e.system.equations, plan=stepped(e.system.facts))
+        solver = replace(e.system.equations, plan=stepped(len(e.system.constraint_map.free)))
 
         def start(number: int) -> Array:
             return _by_iteration(e, solver, number + len(_free_motions(e)), progress)[1].T

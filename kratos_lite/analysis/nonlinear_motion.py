@@ -78,7 +78,7 @@ class NonlinearMotion(EquationsOfMotion):
 
         Tangents are solved with the multigrid of the body at rest.
         """
-        plan, made = stepped(self.system.facts), super().solver
+        plan, made = stepped(len(self.system.constraint_map.free)), super().solver
         tangents = Tangents(
             self.system,
             plan,

@@ -110,7 +110,7 @@ class QuasiStaticAnalysis(ModelInTime):
         self.applied = AppliedLoads(model, self.system, self.groups, initial=False)
         self.prescribed = PrescribedMotion(supports, self.system)
         self.assembly = assembly_of(model, self.system)
-        plan = stepped(self.system.facts, solver)
+        plan = stepped(len(self.system.constraint_map.free), solver)
         if arc_length:
             plan = Plan("direct", "tangents beyond a limit point are not positive definite")
         self.tangents = Tangents(self.system, plan, self.assembly.symmetric and not arc_length, self._at_rest)

@@ -20,34 +20,23 @@ from kratos_lite.elements.tables import tabulate
 from kratos_lite.quadrature import Rule
 from kratos_lite.registry import remembered
 from kratos_lite.shapes import Shape
-from kratos_lite.typing import Array, Bsr, Csr, Ints
+from kratos_lite.typing import Array, Bsr, Ints
 
 
 class MatrixFree:
-    """The stiffness K (3n, 3n) in N/m of elements that the kernels know, which is only multiplied.
-
-    With `masses` M (n, n) of pairs of nodes and a factor k it is k K + M.
-    """
+    """The stiffness K (3n, 3n) in N/m of elements that the kernels know, which is only multiplied."""
 
     def __init__(
         self,
         points: Array,
         groups: Sequence[ElementGroup],
         assembled: Callable[[], BlockMatrix] | None = None,
-        k: float = 1.0,
-        masses: Csr | None = None,
     ) -> None:
-        self.points, self.groups, self.masses = as_double(points), list(groups), masses
+        self.points, self.groups = as_double(points), list(groups)
         self.assembled = self._assembled if assembled is None else assembled
         self.tied = False
         module = compiled("multigrid", self.groups[0].element)
-        self.product: Any = module.Product(self.points, [_tables(group, k) for group in self.groups])
-        if masses is not None:
-            self.product.add_masses(masses.indptr, masses.indices, masses.data)
-
-    def plus(self, k: float, masses: Csr, assembled: Callable[[], BlockMatrix]) -> MatrixFree:
-        """Return k K + M, which `assembled` makes."""
-        return MatrixFree(self.points, self.groups, assembled, k, masses)
+        self.product: Any = module.Product(self.points, list(map(_tables, self.groups)))
 
     def tie(self, T: Any, assembled: Callable[[], BlockMatrix]) -> MatrixFree:
         """Return T^T K T (3n, 3n), with T in the numbering of all components; `assembled` makes it."""
@@ -78,8 +67,7 @@ class MatrixFree:
 
     def norm(self) -> float:
         """Return the largest row sum of |K| over the nodes of an element at the stiffest node."""
-        mass = 0.0 if self.masses is None else float(abs(self.masses).sum(axis=1).max())
-        return float(self.product.norm()) + mass
+        return float(self.product.norm())
 
     def scipy(self) -> Bsr:
         """Return the matrix itself, made now."""
@@ -90,10 +78,10 @@ class MatrixFree:
         return assemble_stiffness(self.points, self.groups, pattern)
 
 
-def _tables(group: ElementGroup, k: float) -> tuple[Any, ...]:
-    """Return nodes, dN, weights, k C and factors of a group, as kernels take them."""
+def _tables(group: ElementGroup) -> tuple[Any, ...]:
+    """Return nodes, dN, weights, C and factors of a group, as kernels take them."""
     nodes, _, dN, weights = group.tables()
-    C, tables = k * group.kernel_arguments()[0], factors(group.element.shape, group.rule)
+    C, tables = group.kernel_arguments()[0], factors(group.element.shape, group.rule)
     if tables is None:
         return nodes, dN, weights, C, None
     order, *by_axis = tables

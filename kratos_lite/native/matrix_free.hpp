@@ -4,7 +4,6 @@
 
 #pragma once
 #include <algorithm>
-#include <cstring>
 #include <numeric>
 #include <tuple>
 #include <utility>
@@ -54,29 +53,10 @@ struct Ties {
     }
 };
 
-// Masses of pairs of nodes, the same along each axis, that are added to K: (n, n) sparse rows.
-struct Masses {
-    std::vector<int32_t> start, columns;
-    std::vector<double> values;
-
-    // Row i times x, which has a number behind its last; the fourth of the sum means nothing.
-    template <class T>
-    KL_INLINE void add(int64_t i, const T* x, vec<T, 4>& sum) const {
-        for (int32_t p = start[i]; p < start[i + 1]; ++p) {
-            vec<T, 4> at;
-            std::memcpy(&at, x + 3 * static_cast<int64_t>(columns[p]), sizeof at);
-            sum += static_cast<T>(values[p]) * at;
-        }
-    }
-};
-
 class MatrixFree {
 public:
     // With nodes at X (n, 3).
-    MatrixFree(int64_t n, const double* X) : n(n), X(X, X + 3 * n) {
-        this->X.push_back(0);
-        masses.start.assign(n + 1, 0);
-    }
+    MatrixFree(int64_t n, const double* X) : n(n), X(X, X + 3 * n) { this->X.push_back(0); }
 
     // Elements, whose arrays the caller keeps, with C = lambda, mu where it is isotropic.
     void add(const Elements& w, const TensorTables<double>& tensor) {
@@ -103,7 +83,7 @@ public:
         for (ProductGroup& s : groups) find_places(s);
     }
 
-    // done(i, y) with y = (K x)_i, and M x where there are masses, for each node i, by all threads; tied or not.
+    // done(i, y) with y = (K x)_i for each node i, by all threads; tied or not.
     template <class T, class F>
     void multiply(const T* x, const F& done, bool tied = true) const {
         const auto turn = turns.take();
@@ -122,7 +102,6 @@ public:
             vec<T, 4> sum = {};
             for (int32_t p = start[i]; p < start[i + 1]; ++p)
                 sum += *reinterpret_cast<const vec<T, 4>*>(room.data() + 4 * static_cast<int64_t>(met[p]));
-            masses.add(i, x, sum);
             return sum;
         };
         for (size_t t = 0; t < passed_on.size(); ++t) passed_on[t] = force(ties.dependents[t] / 3)[ties.dependents[t] % 3];
@@ -185,13 +164,12 @@ public:
     int64_t bytes() const {
         int64_t all = 4 * static_cast<int64_t>(start.size() + met.size() + std::get<0>(rooms).size() + 2 * std::get<1>(rooms).size());
         for (const ProductGroup& s : groups) all += 4 * static_cast<int64_t>(s.geometry.size());
-        all += static_cast<int64_t>(sizeof(Ties::Share) * ties.shares.size() + 12 * masses.values.size());
+        all += static_cast<int64_t>(sizeof(Ties::Share) * ties.shares.size());
         return all;
     }
 
     int64_t n;
     Ties ties;
-    Masses masses;
 
 private:
     std::vector<double> diagonal_blocks() const {
@@ -206,12 +184,9 @@ private:
             });
         parallel_ranges(n, NODES, [&](int64_t first, int64_t last) {
             const int at[9] = {0, 3, 5, 3, 1, 4, 5, 4, 2};
-            for (int64_t i = first; i < last; ++i) {
+            for (int64_t i = first; i < last; ++i)
                 for (int32_t p = start[i]; p < start[i + 1]; ++p)
                     for (int e = 0; e < 9; ++e) D[9 * i + e] += each[6 * static_cast<int64_t>(met[p]) + at[e]];
-                for (int32_t p = masses.start[i]; p < masses.start[i + 1]; ++p)
-                    for (int e = 0; masses.columns[p] == i && e < 9; e += 4) D[9 * i + e] += masses.values[p];
-            }
         });
         return D;
     }

@@ -254,7 +254,6 @@ KL_MODULE(_multigrid, m) {
     add_class<Matrix>("kratos_lite.native.Matrix", {});
     add_class<Product>("kratos_lite.native.Product",
                        {method<&Product::times>("times", nullptr, {"x", {"tied", Py_False}}), method<&Product::tie>("tie"),
-                        method<&Product::add_masses>("add_masses"),
                         method<&Product::largest_row_sum>("norm")});
     add_class<Pressures>("kratos_lite.native.Pressures", {method<&Pressures::solve>("solve")});
     add_class<Multigrid>("kratos_lite.native.Multigrid",

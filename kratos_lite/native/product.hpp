@@ -61,15 +61,6 @@ public:
         ties = Ties(dependents.copy(), indptr.copy(), independents.copy(), weights.copy(), n);
     }
 
-    // Masses (n, n) of pairs of nodes that are added to the stiffness from now on.
-    void add_masses(Array<int32_t> indptr, Array<int32_t> indices, Array<double> values) {
-        require(indptr.size() == n + 1, "indptr must have a row for each node");
-        require(values.size() == indices.size(), "one mass for each index is needed");
-        check_rows(indptr, indices.size());
-        require(are_rows(indices, n), "indices must be nodes");
-        masses = Masses{indptr.copy(), indices.copy(), values.copy()};
-    }
-
     Array<double> times(Array<double> x, bool tied) const {
         require(x.size() == 3 * n, "x must have three numbers for each point");
         Array<double> y(3 * n);

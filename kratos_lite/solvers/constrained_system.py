@@ -42,7 +42,7 @@ class ConstrainedSystem:
         groups: Sequence[ElementGroup],
         constraints: Callable[[Ints], ConstraintMap],
         *,
-        solver: str | Callable[[Facts], Plan] = "auto",
+        solver: str = "auto",
         tolerance: float = 1e-10,
         patterns: PatternCache | None = None,
         progress: Progress | None = None,
@@ -59,12 +59,10 @@ class ConstrainedSystem:
         self.skipped: list[str] = []
         self.warnings: list[str] = []
         self._patterns = patterns or PatternCache()
-        self.plan = choose(solver, self.facts) if isinstance(solver, str) else solver(self.facts)
+        self.plan = self._planned(solver)
 
-    @property
-    def facts(self) -> Facts:
-        """What the choice of a method needs to know."""
-        return Facts(
+    def _planned(self, solver: str) -> Plan:
+        facts = Facts(
             len(self.constraint_map.free),
             3 * len(self.nodes),
             bulk_over_shear=lambda: largest_bulk_over_shear(self.groups),
@@ -74,6 +72,7 @@ class ConstrainedSystem:
             is_stretched=self._is_stretched,
             is_plate=self._is_plate,
         )
+        return choose(solver, facts)
 
     def _bandwidth(self) -> float:
         width = nodal_width(self.pattern, self.pattern.rows(), cuthill_mckee(self.pattern)[1])

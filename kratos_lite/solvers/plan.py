@@ -166,15 +166,13 @@ def repeated(solver: str, unknowns: int, symmetric: bool) -> Plan:
     return Plan("amg", f"{unknowns} unknowns > {REPEATED_LIMIT}: multigrid takes least memory")
 
 
-def stepped(facts: Facts, solver: str = "auto") -> Plan:
+def stepped(unknowns: int, solver: str = "auto") -> Plan:
     """Return how to solve the equations of a step in time, whose matrix serves many times."""
-    unknowns = facts.unknowns
     if choice(solver, "solver", METHODS) != "auto":
         return Plan("amg" if solver == "amg" else "direct", REQUESTED)
     if unknowns <= STEPPED_LIMIT:
         return Plan("direct", f"{unknowns} unknowns ≤ {STEPPED_LIMIT}: factors are fastest over many steps")
-    why = f"{unknowns} unknowns > {STEPPED_LIMIT}: few iterations from the last state"
-    return Plan("amg", why, needs_no_matrix(facts))
+    return Plan("amg", f"{unknowns} unknowns > {STEPPED_LIMIT}: few iterations from the last state")
 
 
 def of_band(unknowns: int, width: int, height: int) -> Plan:

@@ -17,7 +17,6 @@ from kratos_lite.native import kernels
 from kratos_lite.quadrature import Rule
 from kratos_lite.solvers.coarse_level import p_coarse_level
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
-from kratos_lite.solvers.mass import Mass
 from kratos_lite.solvers.multigrid import multigrid
 
 pytestmark = compiled
@@ -65,24 +64,6 @@ def test_smoothing_is_that_of_the_matrix(kind, material):
     linear = p_coarse_level(system.points, system.groups)
     r[~free] = 0.0
     z = [multigrid(A, free, model.mesh.points, linear).precondition(r) for A in (product, K)]
-    close(*z, 1e-4)  # in single precision
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_products_and_smoothing_with_masses_are_those_of_the_matrix(kind):
-    model = model_of(kind, curved=True)
-    system = system_of(model, solver="amg")
-    K = both(model)[1]
-    factor, mass = 0.3, Mass(system.points, system.groups, system.pattern, False)
-    masses = 0.2 * K.norm() / mass.nodal.mean() * mass.scalar
-    A = BlockMatrix(factor * K.data, K.indices, K.indptr)
-    A.add_scalar(masses.data)
-    product = MatrixFree(system.points, system.groups).plus(factor, masses, lambda: A)
-    free = system.constraint_map.is_free
-    r = np.random.default_rng(4).standard_normal(A.shape[0]) * free
-    close(product @ r, A @ r, 2e-14)
-    assert 1 <= product.norm() / A.norm() < 2
-    z = [multigrid(each, free, system.points, None).precondition(r) for each in (product, A)]
     close(*z, 1e-4)  # in single precision
 
 
