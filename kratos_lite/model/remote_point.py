@@ -301,7 +301,9 @@ class RemotePoint(Coupling):
         self._check_rigid(A, known, dofs[held])
         Z = np.linalg.qr(A[known].T, mode="complete")[0][:, len(known) :]
         R, free, of_nodes = R[~held], dofs[~held], known >= p
-        masters = independent_rows(R @ Z)
+        corner = np.flatnonzero(_corners(self.mesh)[free // 3])  # the coarse level has these, too
+        masters = corner[independent_rows((R @ Z)[corner])]
+        masters = masters if len(masters) == Z.shape[1] else independent_rows(R @ Z)
         if len(masters) < Z.shape[1]:
             raise ModelError(
                 f"the nodes of {short(self.where)} lie on a line or at one place, and a rotation of the "
@@ -348,6 +350,14 @@ class RemotePoint(Coupling):
         others, inverse = np.delete(np.arange(len(dofs)), chosen), np.linalg.inv(C[:, chosen])
         each = np.broadcast_to(dofs[others], (len(C), len(others)))
         return Constraints.of(dofs[chosen], each, -inverse @ C[:, others], inverse @ self.values[self.fixed])
+
+
+def _corners(mesh: Mesh) -> Mask:
+    """Return which nodes (n,) are corners of elements."""
+    corner = np.zeros(mesh.n_nodes, dtype=bool)
+    for block in mesh.blocks:
+        corner[block.nodes[:, : block.known_shape.corners]] = True
+    return corner
 
 
 def dofs_of(nodes: Ints) -> Ints:

@@ -78,11 +78,12 @@ public:
         const Matrix& finest = *linear;
         require(linear_fixed.size() == 3 * finest.rows(), "one entry for each linear unknown");
         require(3 * (indptr.size() - 1) == static_cast<int64_t>(fixed.size()), "weights must have one row for each node");
-        require(weights.size() == indices.size(), "one weight for each index is needed");
+        const int of_pair = weights.size() == 9 * indices.size() && indices.size() ? 9 : 1;
+        require(weights.size() == of_pair * indices.size(), "one weight, or 3 x 3, for each index is needed");
         require(are_rows(indices, finest.rows()), "indices must be nodes of the linear level");
         Bytes coarse_fixed = linear_fixed.copy();
         Doubles B = free_modes(modes, coarse_fixed), X = coordinates(points, coarse_fixed.size());
-        Transfer transfer(prolongator_of(indptr, indices, weights, false), fixed, coarse_fixed);
+        Transfer transfer(prolongator_of(indptr, indices, weights, false), of_pair, fixed, coarse_fixed);
         coarsen([&] {
             below = std::move(linear);
             hierarchy.add_linear(finest.graph(), finest.data.data(), coarse_fixed, std::move(transfer), std::move(X));

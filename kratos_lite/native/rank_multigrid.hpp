@@ -194,7 +194,7 @@ private:
         require(indptr.size() == fine.n + 1 && are_rows(indices, coarse), "P must lead from own nodes to coarse ones");
         require(data.size() == (weights ? 1 : fine.b * MODES) * indices.size(), "P must be weights (nnz) or blocks (nnz, b, 6)");
         Prolongator blocks = prolongator_of(indptr, indices, data, !weights);
-        return weights ? Transfer(std::move(blocks), fixed, coarse_fixed) : Transfer(std::move(blocks), coarse);
+        return weights ? Transfer(std::move(blocks), 1, fixed, coarse_fixed) : Transfer(std::move(blocks), coarse);
     }
 
     const Level& with_matrix() const {

@@ -42,23 +42,31 @@ KL_INLINE void prolong_rows(const Prolongator& P, const float* from, float* to, 
     }
 }
 
-// From a level to the next coarser one: blocks b x 6 of smoothed aggregation, or one weight for each
-// pair of nodes (linear elements within quadratic ones).
+// From a level to the next coarser one: blocks b x 6 of smoothed aggregation, or one weight or 3 x 3 of them for
+// each pair of nodes (linear elements within quadratic ones).
 struct Transfer {
     Prolongator P;
     Transposed columns;
-    bool weights = false;
+    int weights = 0;  // of a pair: 1, 9, or 0 for blocks
     Bytes fine_fixed, coarse_fixed;  // components that weights must not touch
 
     Transfer(Prolongator prolongator, int64_t coarse_nodes)
         : P(std::move(prolongator)), columns(coarse_nodes, P.indptr, P.indices) {}
-    Transfer(Prolongator prolongator, Bytes fine_fixed, Bytes coarse_fixed)
+    Transfer(Prolongator prolongator, int weights, Bytes fine_fixed, Bytes coarse_fixed)
         : P(std::move(prolongator)), columns(static_cast<int64_t>(coarse_fixed.size()) / 3, P.indptr, P.indices),
-          weights(true), fine_fixed(std::move(fine_fixed)), coarse_fixed(std::move(coarse_fixed)) {}
+          weights(weights), fine_fixed(std::move(fine_fixed)), coarse_fixed(std::move(coarse_fixed)) {}
 
     int64_t bytes() const {
         return 4 * static_cast<int64_t>(P.indptr.size() + P.indices.size() + P.data.size() + columns.indptr.size() +
                                         columns.rows.size() + columns.entries.size());
+    }
+
+    // Component c of the weights of pair k, or of their transpose, times x.
+    template <int row, int column>
+    KL_INLINE float along(int32_t k, int c, const float* x) const {
+        if (weights == 1) return P.data[k] * x[c];
+        const float* p = &P.data[9 * static_cast<int64_t>(k) + row * c];
+        return p[0] * x[0] + p[column] * x[1] + p[2 * column] * x[2];
     }
 
     // c of the coarse level = P^T y of the fine one
@@ -77,7 +85,7 @@ struct Transfer {
                 float sum[3] = {};
                 for (int32_t k = columns.indptr[I]; k < columns.indptr[I + 1]; ++k)
                     for (int c = 0; c < 3; ++c)
-                        sum[c] += P.data[columns.entries[k]] * from[3 * static_cast<int64_t>(columns.rows[k]) + c];
+                        sum[c] += along<1, 3>(columns.entries[k], c, from + 3 * static_cast<int64_t>(columns.rows[k]));
                 for (int c = 0; c < 3; ++c) to[3 * I + c] = coarse_fixed[3 * I + c] ? 0.0f : sum[c];
             }
         });
@@ -99,7 +107,7 @@ struct Transfer {
                 float sum[3] = {};
                 for (int32_t k = P.indptr[i]; k < P.indptr[i + 1]; ++k)
                     for (int c = 0; c < 3; ++c)
-                        sum[c] += P.data[k] * from[3 * static_cast<int64_t>(P.indices[k]) + c];
+                        sum[c] += along<3, 1>(k, c, from + 3 * static_cast<int64_t>(P.indices[k]));
                 for (int c = 0; c < 3; ++c)
                     if (!fine_fixed[3 * i + c]) to[3 * i + c] += sum[c];
             }

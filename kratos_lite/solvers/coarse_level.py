@@ -277,14 +277,14 @@ def _continuous(
 
 
 def _on(level: PCoarseLevel, nodes: Ints, inner: Any, P: Any) -> PCoarseLevel:
-    """Return the level on some nodes, from which `inner` leads to its corner nodes and P to all nodes."""
-    from scipy.sparse import bsr_array
+    """Return the level on some nodes, from which `inner` leads to its corner nodes and P to all nodes.
+
+    Both have a weight, or a block of 3 x 3, for each pair of nodes.
+    """
+    from scipy.sparse import bsr_array, eye_array, kron
 
     def assemble() -> BlockMatrix:
-        weights = inner.tocsr()
-        blocks = weights.data[:, None, None] * np.eye(3)
-        shape = (3 * weights.shape[0], 3 * weights.shape[1])
-        axes = bsr_array((blocks, weights.indices, weights.indptr), shape=shape)
+        axes = inner if isinstance(inner, bsr_array) else kron(inner, eye_array(3)).tobsr((3, 3))
         return BlockMatrix.of(axes.T @ level.K.scipy() @ axes)
 
     P.sort_indices()
@@ -294,12 +294,12 @@ def _on(level: PCoarseLevel, nodes: Ints, inner: Any, P: Any) -> PCoarseLevel:
 
 
 def apply_ties(level: PCoarseLevel, T: Any, free: Ints) -> PCoarseLevel | None:
-    """Return the level of fields that keep the ties of nodes, where these tie all components alike.
+    """Return the level of fields that keep the ties of nodes.
 
-    Without it the linear elements of both sides come apart.  Other ties leave the level as it is; but None
-    for rigid parts, which it would hold at rest.
+    Without it the linear elements of both sides come apart.  Corner nodes that depend on others than corner
+    nodes leave the level as it is; but None for rigid parts, which it would hold at rest.
     """
-    from scipy.sparse import csr_array, diags_array
+    from scipy.sparse import bsr_array, csr_array, diags_array, eye_array, kron
 
     n, m = T.shape[0] // 3, len(level.nodes)
     entries = T.tocoo()
@@ -310,18 +310,24 @@ def apply_ties(level: PCoarseLevel, T: Any, free: Ints) -> PCoarseLevel | None:
     is_dependent = np.asarray(dependent.any(axis=1))
     if not is_dependent[level.nodes].any():
         return level  # as with hanging nodes, which the level omits
-    chosen = is_dependent[entries.row // 3]
-    row, column, data = entries.row[chosen], column[chosen], entries.data[chosen]
+    corner = np.full(n, -1)
+    corner[level.nodes] = np.arange(m)
+    of_corners = dependent.flat[entries.row] & (corner[entries.row // 3] >= 0)
+    row, column, data = entries.row[of_corners], column[of_corners], entries.data[of_corners]
+    W = csr_array((level.weights, level.indices, level.indptr), shape=(n, m))
     by_axis = [
         csr_array((data[at], (row[at] // 3, column[at] // 3)), shape=(n, n))
         for at in (row % 3 == axis for axis in range(3))
     ]
-    alike = all(abs(by_axis[0] - other).nnz == 0 for other in by_axis[1:])
-    if not alike or (row % 3 != column % 3).any():
+    if all(abs(by_axis[0] - other).nnz == 0 for other in by_axis[1:]) and (row % 3 == column % 3).all():
+        inner = diags_array(1.0 * ~is_dependent[level.nodes]) + (by_axis[0] @ W)[level.nodes]
+        return _on(level, level.nodes, inner, (W @ inner).tocsr())
+    if (corner[column // 3] < 0).any():
         return None if np.bincount(column).max() > RIGID else level
-    W = csr_array((level.weights, level.indices, level.indptr), shape=(n, m))
-    inner = diags_array(1.0 * ~is_dependent[level.nodes]) + (by_axis[0] @ W)[level.nodes]
-    return _on(level, level.nodes, inner, (W @ inner).tocsr())
+    at = tuple(3 * corner[dofs // 3] + dofs % 3 for dofs in (row, column))
+    ties = csr_array((data, at), shape=(3 * m, 3 * m))
+    blocks = bsr_array(diags_array(1.0 * ~dependent[level.nodes].ravel()) + ties, blocksize=(3, 3))
+    return _on(level, level.nodes, blocks, kron(W, eye_array(3)).tobsr((3, 3)) @ blocks)
 
 
 def _followers(

@@ -85,7 +85,9 @@ class Compiled:
         else:
             self._kernel = self._module.Multigrid(self._matrix(A), *settings, thin)
         lines = self._kernel.labels()
-        plate = plate_level(points, free, axes, lines, linear) if linear is not None and len(lines) else None
+        plate = None
+        if linear is not None and len(lines) and linear.weights.ndim == 1:
+            plate = plate_level(points, free, axes, lines, linear)
         if plate is not None:
             self._kernel.aggregate_plate(plate.indptr, plate.indices, plate.blocks, plate.modes)
         else:
@@ -200,15 +202,18 @@ def above_linear(A: BlockMatrix, free: Mask, points: Array, linear: PCoarseLevel
     """Return pyamg's hierarchy of the linear elements below a level of quadratic ones."""
     from pyamg import MultilevelSolver
     from pyamg.relaxation.smoothing import change_smoothers
-    from scipy.sparse import csr_array, diags_array, identity, kron
+    from scipy.sparse import bsr_array, csr_array, diags_array, identity, kron
 
     corners = free.reshape(-1, 3)[linear.nodes].ravel()
     below = aggregated(uncoupled(linear.K, corners), corners, points[linear.nodes])
-    shape = (len(points), len(linear.nodes))
-    nodal = csr_array((linear.weights, linear.indices, linear.indptr), shape=shape)
+    n, m, weights = len(points), len(linear.nodes), (linear.weights, linear.indices, linear.indptr)
+    if linear.weights.ndim == 1:
+        P = kron(csr_array(weights, shape=(n, m)), identity(3))
+    else:
+        P = bsr_array(weights, shape=(3 * n, 3 * m))
     top = MultilevelSolver.Level()
     top.A = A.scipy()
-    top.P = (diags_array(free * 1.0) @ kron(nodal, identity(3)) @ diags_array(corners * 1.0)).tocsr()
+    top.P = (diags_array(free * 1.0) @ P @ diags_array(corners * 1.0)).tocsr()
     top.R = top.P.T.tocsr()
     hierarchy = MultilevelSolver([top, *below.levels], coarse_solver="splu")
     change_smoothers(hierarchy, FORWARD, BACKWARD)

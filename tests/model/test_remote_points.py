@@ -143,12 +143,10 @@ def test_modes_of_a_bar_with_a_rigid_end_and_weight():
     model = bar(cells=(8, 1, 1))
     model.rigid("x+", (2, 0.5, 0.5))
     model.add(kl.Gravity((0, 0, -9.81)))
-    omega, shapes = model.modes(3)
+    omega, shapes = model.modes(6)
     wave = np.pi / 4 * np.sqrt(200e9 / 7800.0)  # of the rod in length, ν → its ends hardly matter
-    (longitudinal,) = [
-        o for o, s in zip(omega, shapes, strict=True) if abs(s[:, 0]).max() > abs(s[:, 2]).max()
-    ] or [0]
-    assert longitudinal == 0 or abs(longitudinal / wave - 1) < 0.05
+    longitudinal = omega[np.abs(shapes).max(axis=1).argmax(axis=1) == 0][0]
+    assert abs(longitudinal / wave - 1) < 0.05
     X = model.mesh.points[model.mesh.nodes("x+")]
     moved = model.points[0].displacement(shapes)
     turned = np.cross(model.points[0].rotation(shapes)[:, None], X - (2, 0.5, 0.5))

@@ -103,6 +103,15 @@ def stiff_end(kind="8N", held=False):
     return model
 
 
+def rigid_end(kind):
+    """Return a beam whose end is rigid and turns about an axis in front of it."""
+    model = clamped(box(kind=kind, cells=(5, 4, 3)))
+    point = model.rigid("x+", (1.2, 0.3, 0.2))
+    point.fix("z")
+    point.fix_rotation("x")
+    return model
+
+
 def partly_fixed():
     """Return a block whose nodes are held in components chosen at random."""
     model = clamped(box(cells=(5, 4, 4)))
@@ -161,6 +170,8 @@ MODELS = {
     "end that moves as one, quadratic": lambda: stiff_end("20N"),
     "independent that is held": lambda: stiff_end(held=True),
     "independent that is held, quadratic": lambda: stiff_end("10N", held=True),
+    "rigid end, 20N": lambda: rigid_end("20N"),
+    "rigid end, 10N": lambda: rigid_end("10N"),
     "partly fixed": partly_fixed,
     "prescribed": prescribed,
     "contrast": lambda: contrast(1e6),
@@ -241,7 +252,16 @@ def solver_of(model):
     return system.equations._multigrid, b, system.norm
 
 
-CYCLES = ["clamped 8N", "clamped 10N", "clamped 20N", "partly fixed", "bodies", "bar", "contrast"]
+CYCLES = [
+    "clamped 8N",
+    "clamped 10N",
+    "clamped 20N",
+    "partly fixed",
+    "bodies",
+    "bar",
+    "contrast",
+    "rigid end, 20N",
+]
 
 
 @pytest.mark.parametrize("name", CYCLES)
@@ -365,7 +385,7 @@ def test_coarse_levels_of_the_wrong_shape_are_refused():
         ("aggregate_linear", linear, 1, corners[:-1], "one entry for each linear unknown"),
         ("aggregate_linear", linear, 2, level.indptr[:-1], "one row for each node"),
         ("aggregate_linear", linear, 3, level.indices + 3 * m, "nodes of the linear level"),
-        ("aggregate_linear", linear, 4, level.weights[:-1], "one weight for each"),
+        ("aggregate_linear", linear, 4, level.weights[:-1], "one weight, or 3 x 3, for each"),
         ("aggregate_linear", linear, 6, np.zeros((3, 6)), "modes must be"),
         ("aggregate_plate", plate, 0, rows[:-1], "one row for each node"),
         ("aggregate_plate", plate, 1, none + 1, "nodes of the plate"),
