@@ -14,7 +14,7 @@ import kratos_lite as kl
 from kratos_lite.mesh.centers import raise_order
 from kratos_lite.mesh.refinement import refine
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
-from kratos_lite.typing import Array, Ints
+from kratos_lite.typing import Array
 from kratos_lite.verification.meshes import element, kind_of
 from kratos_lite.verification.scenes import Scene
 
@@ -75,29 +75,21 @@ def _centers(mesh: kl.Mesh) -> Array:
 
 
 def periodic(kind: str, n: int) -> kl.Model:
-    """Return the unit cube whose side x- moves as its side x+ does."""
+    """Return the unit cube whose sides x- and x+ move alike."""
     model = weighty(kl.box(cells=(n, n, n), element=element(kind)))
-    X = model.mesh.points
-    left, right = (side[np.lexsort(X[side, 1:].T)] for side in map(model.mesh.nodes, ("x-", "x+")))
-    _link(model, right, [([node], [1.0]) for node in left])
+    model.periodic("x-", "x+")
     return model
 
 
-def bonded(kind: str, n: int) -> kl.Model:
-    """Return two blocks, one on the other, whose nodes do not meet: those of the finer follow the coarser."""
+def tied(kind: str, n: int) -> kl.Model:
+    """Return two blocks, one on the other, whose nodes do not meet."""
     lower, upper = (
         kl.box((1, 1, 0.5), (m, m, (m + 1) // 2), element(kind), (0, 0, z))
         for m, z in ((round(0.85 * n), 0.0), (round(1.1 * n), 0.5))
     )
-    start = lower.n_nodes
-    nodes = np.vstack([lower.blocks[0].nodes, upper.blocks[0].nodes + start])
-    points = np.vstack([lower.points, upper.points])
-    model = weighty(kl.Mesh(points, [kl.Block(element(kind), nodes)]), ())
-    model.fix(lower.nodes("z-"))
-    dependent = upper.nodes("z-")
-    W = lower.locate(upper.points[dependent]).weights()
-    rows = zip(np.split(W.indices, W.indptr[1:-1]), np.split(W.data, W.indptr[1:-1]), strict=True)
-    _link(model, dependent + start, rows)
+    model = weighty(kl.join({"lower": lower, "upper": upper}), ())
+    model.fix("lower.z-")
+    model.tie("lower.z+", "upper.z-")
     return model
 
 
@@ -106,18 +98,6 @@ def hanging(kind: str, n: int) -> kl.Model:
     mesh = kl.box((1.0, 1.0, 1.0), 3 * (max(2, round(n / 1.875 ** (1 / 3))),), element(kind))
     centers = np.concatenate([mesh.points[block.nodes].mean(axis=1) for block in mesh.blocks])
     return weighty(refine(mesh, (centers < 0.5).all(axis=1)).mesh)
-
-
-def _link(
-    model: kl.Model, dependent: Ints, independent: Iterable[tuple[Iterable[int], Iterable[float]]]
-) -> None:
-    """Let nodes that nothing holds follow others, given with their weights."""
-    held = model.supports.fixed.any(axis=1)
-    for node, (nodes, weights) in zip(dependent.tolist(), independent, strict=True):
-        if not held[node]:
-            terms = [(int(k), float(w)) for k, w in zip(nodes, weights, strict=True) if abs(w) > 1e-12]
-            for axis in "xyz":
-                model.constrain((node, axis), {(k, axis): w for k, w in terms})
 
 
 def unordered(kind: str, n: int, jitter: float = 0.25) -> kl.Model:
@@ -164,7 +144,7 @@ MAKERS: dict[str, Maker] = {
     "contrast_layers": layered,
     "contrast_inclusions": with_inclusions,
     "links_periodic": periodic,
-    "links_bonded": bonded,
+    "links_tied": tied,
     "links_hanging": hanging,
     "tetrahedra": unordered,
     **{name_of(nu): nearly_incompressible(nu) for nu in RATIOS},

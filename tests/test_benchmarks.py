@@ -357,8 +357,8 @@ def test_scenes_that_may_stall_have_ratios_to_the_block_and_to_other_solvers():
 
 @pytest.mark.parametrize("name", [tables.OURS, *SOLVERS])
 def test_solvers_take_one_linear_system(name, measured):
-    runs = stall.runs([tables.OURS, *SOLVERS], 250, ["links_bonded"])
-    (row,) = measured(name, [run for run in runs if (run.scene, run.kind) == ("links_bonded", "8N")])
+    runs = stall.runs([tables.OURS, *SOLVERS], 250, ["links_tied"])
+    (row,) = measured(name, [run for run in runs if (run.scene, run.kind) == ("links_tied", "8N")])
     assert row["residual"] < 3e-8
     assert row["unknowns"] == 246
     assert set(row["phases"]) >= {"solve"}
