@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.analysis.fields import Fields
+from kratos_lite.analysis.nodal_loads import forces_of
 from kratos_lite.analysis.quantities import Compliance, Quantity
+from kratos_lite.assembly.attached import Attached
 from kratos_lite.assembly.gauss_point_fields import internal_load, virtual_work, work_by_coordinates
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model.free_motions import FreeMotions
@@ -30,13 +32,21 @@ def adjoint_of(
     quantity: Quantity,
     load: Array,
     adjoint: Callable[..., Array],
+    attached: Attached | None,
     tolerance: float | None = None,
 ) -> Array:
-    """Return the adjoint solution (n, 3) of a quantity whose derivative by u is a load (n, 3)."""
-    motion = quantity.motion(result)
+    """Return the adjoint solution (n, 3) of a quantity whose derivative by u is a load (n, 3).
+
+    The forces of springs are among reactions, so that those of a part are a load, too.
+    """
+    motion, hanging = quantity.motion(result), result.mesh.hanging
+    held = result.reactions
+    if motion.any() and attached:
+        of_springs = attached.forces(motion if hanging is None else hanging.interpolate(motion))
+        load, held = load - of_springs, held - attached.forces(result.u)
     z = adjoint(load, motion, tolerance)
     if motion.any():
-        work, size = -float((result.reactions * z).sum()), float(np.abs(result.reactions).sum())
+        work, size = float((load * result.u - held * z).sum()), float(np.abs(result.reactions).sum())
         if abs(work - quantity.value(result)) > SAME * size:
             raise ModelError(
                 f"{quantity}: multi-point constraints tie the part to nodes beside it, so that its reaction "
@@ -65,21 +75,21 @@ def gradient_of(
         _check_held(model.free_motions(result.groups), wrt)
 
     def of_loads(v: Array) -> Array:
-        return _of_loads(result, by, v)
+        return _of_loads(model, result, by, v)
 
     if isinstance(quantity, Compliance) and _is_own_adjoint(result, model):
         z = result.u
     else:
-        z = adjoint_of(result, quantity, quantity.derivative(result), adjoint)
+        z = adjoint_of(result, quantity, quantity.derivative(result), adjoint, model.attached)
     total = of_loads(z) - _of_stresses(result, by, z) + quantity.explicit(result, by, of_loads)
     return np.asarray(total / E)
 
 
-def _of_loads(result: Any, by: str, v: Array) -> Array:
+def _of_loads(model: Structure, result: Any, by: str, v: Array) -> Array:
     """Return the derivative of the work v·f of the loads."""
     known = result.mesh, result.groups
     if by == "loads":
-        return np.array([(load.forces(*known) * v).sum() for load in result._acting])
+        return np.array([(forces_of(model, known[1], load) * v).sum() for load in result._acting])
     total = np.zeros_like(v) if by == "coordinates" else np.zeros(result.mesh.n_elements)
     for load in result._acting if by != "stiffness" else ():
         for factor, part in load.acting(0.0):

@@ -22,6 +22,7 @@ from kratos_lite.typing import Array, Mask
 if TYPE_CHECKING:
     from kratos_lite.analysis.quantities import Quantity
     from kratos_lite.assembly.recovery import Recovery
+    from kratos_lite.model.structure import Structure
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +193,7 @@ def error_of(
     result: Fields,
     quantity: Quantity,
     adjoint: Callable[..., Array],
-    fixed: Mask,
+    model: Structure,
     strained: Array,
     recovery: Recovery,
 ) -> QuantityError:
@@ -212,8 +213,8 @@ def error_of(
     Estimation in Finite Element Analysis (2000), chapter 8.
     """
     motion, value = quantity.motion(result), quantity.value(result)
-    z = adjoint_of(result, quantity, quantity.load(result), adjoint, ADJOINT_TOLERANCE)
-    warnings = _shared(result, fixed, motion != 0) if motion.any() else []
+    z = adjoint_of(result, quantity, quantity.load(result), adjoint, model.attached, ADJOINT_TOLERANCE)
+    warnings = _shared(result, model.supports.fixed, motion != 0) if motion.any() else []
     contributions, averaged = recovery.products(strained, z, result.mesh.n_elements)
     local = quantity.local(result)
     absolute = max(

@@ -6,6 +6,7 @@ u(t) = Re(u e^{iΩt}),   ((1 + iη) K + iΩ (α M + β K) - Ω² M) u = f.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from numbers import Complex
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -14,6 +15,7 @@ import numpy as np
 from kratos_lite.analysis.element_fields import ElementFields
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.modal import natural_modes
+from kratos_lite.analysis.nodal_loads import forces_of
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError, ModelError, SolveError
 from kratos_lite.mesh import Mesh
@@ -79,7 +81,9 @@ class HarmonicResponse(Tabular):
         -------
         (n, 3) in m; np.abs is the amplitude, np.angle the phase.
         """
-        return np.tensordot(self._factors[number], self._basis, axes=1)
+        f = len(self.frequencies)
+        at = whole_number(number, "the number of a frequency", least=-f, most=f - 1)
+        return np.tensordot(self._factors[at], self._basis, axes=1)
 
     def at(self, points: ArrayLike) -> Complexes:
         """Return the complex displacements of points at all frequencies.
@@ -115,7 +119,8 @@ class HarmonicResponse(Tabular):
         ElementFields
             Of Re(u e^{i phase}), with `stress`, `von_mises` and others, as results have them.
         """
-        u = np.real(self.displacement(number) * np.exp(1j * phase))
+        turned = np.exp(1j * finite(phase, "the phase", ()))
+        u = np.real(self.displacement(number) * turned)
         return ElementFields(self.mesh, self._groups, np.ascontiguousarray(u))
 
     def table(self) -> list[tuple[str, str]]:
@@ -195,6 +200,8 @@ def harmonic_response(
     e = EquationsOfMotion(model, rayleigh=rayleigh, solver=solver, progress=progress)
     if by_modes and e.free_motions.any:
         raise ModelError("the supports leave rigid-body modes free, which method='direct' takes alone")
+    if e.free_motions.any and not omega.all():
+        raise ModelError(f"the frequency 0 needs supports that hold the body; {e.free_motions.described()}")
     alpha, beta = e.rayleigh
     f, c = _forces(model, e, loads), e.prescribed(0.0)
     vectors = np.stack([f.real, f.imag, e.K @ c, e.mass.times(c)])
@@ -278,13 +285,14 @@ def _check(model: Structure) -> None:
 def _forces(model: Structure, e: EquationsOfMotion, loads: HarmonicLoads | None) -> Complexes:
     """Return the amplitudes (3a,) of the forces in N."""
     total = np.zeros(e.size, dtype=complex)
-    for item in model.loads if loads is None else loads:
+    loads = model.loads if loads is None else instance(loads, "loads", (list, tuple), "[load]")
+    for item in loads:
         load, factor = item if isinstance(item, tuple) and len(item) == 2 else (item, 1.0)
         instance(load, "a load", Load, "kl.Traction('z+', (0, 0, 1e3)), or (load, factor)")
         of = load.load if isinstance(load, ScaledLoad) else load
         if isinstance(of, (Temperature, TimeDependentLoad)):
             raise ModelError(f"{of!r} does not swing: harmonic response takes forces, each with a factor")
-        if not isinstance(factor, (int, float, complex)) or not np.isfinite(factor):
+        if not isinstance(factor, Complex) or not np.isfinite(factor):
             raise InputError(f"the factor of a load is a complex number; got {factor!r}")
-        total += factor * e.system.gather(load.forces(model.mesh, e.groups))
+        total += factor * e.system.gather(forces_of(model, e.groups, load))
     return total

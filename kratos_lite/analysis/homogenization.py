@@ -10,6 +10,7 @@ from kratos_lite.errors import ModelError
 from kratos_lite.model.matching import Periodic
 from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array
+from kratos_lite.validation import instance
 
 
 def homogenized(model: Structure, *, solver: str = "auto", tolerance: float = 1e-10) -> Array:
@@ -36,8 +37,8 @@ def homogenized(model: Structure, *, solver: str = "auto", tolerance: float = 1e
 
     Notes
     -----
-    Mean stress from the forces f of the periodic parts: V σ = Σ f x, Hill, J. Mech. Phys. Solids 11 (1963)
-    357-372.
+    Mean stress by the virtual work of the forces f that strain the cell: V σ·ε = Σ f·u, Hill, J. Mech. Phys.
+    Solids 11 (1963) 357-372.
 
     Examples
     --------
@@ -49,6 +50,7 @@ def homogenized(model: Structure, *, solver: str = "auto", tolerance: float = 1e
     >>> bool(np.abs(kl.homogenized(cell) - steel.C).max() < 1e-9 * steel.C.max())
     True
     """
+    instance(model, "a cell", Structure, "kl.Model(mesh, material)")
     cell = next((tie for tie in model.supports.ties if isinstance(tie, Periodic)), None)
     ways = np.zeros((0, 3)) if cell is None else cell.ways
     if cell is None or ways.shape != (3, 3) or np.linalg.matrix_rank(ways) < 3:
@@ -60,13 +62,18 @@ def homogenized(model: Structure, *, solver: str = "auto", tolerance: float = 1e
         raise ModelError("supports hold more of the cell than one node; release them")
     if model.prestress is not None or model.initial_displacement is not None:
         raise ModelError("a cell with initial stress has no stiffness alone; leave the initial stress out")
-    analysis, C = StaticAnalysis(model, solver, tolerance), np.zeros((6, 6))
+    size, K = model.supports.fixed.size, model.attached.K if model.attached else None
+    if K is not None and np.abs(K @ np.tile(np.eye(3), (model.mesh.n_nodes, 1))).max() > 1e-9 * abs(K).max():
+        raise ModelError("springs hold the cell to the ground; join parts of the cell by them alone")
+    analysis, rows = StaticAnalysis(model, solver, tolerance), []
     try:
-        for i, strain in enumerate(np.diag(voigt.HALF_SHEAR)):
+        for strain in (np.zeros(6), *np.diag(voigt.HALF_SHEAR)):
             model.supports.add_tie(cell.strained(voigt.tensor(strain)))
-            stress = analysis.solve([]).reactions.T @ model.mesh.points / abs(np.linalg.det(ways))
-            C[:, i] = voigt.vector((stress + stress.T) / 2)
+            result = analysis.solve([]) if model.supports.displaced else None
+            rows.append([result.u.ravel(), result.reactions.ravel()] if result else np.zeros((2, size)))
     finally:
         model.supports.add_tie(cell)
         analysis.release()
-    return C
+    u, forces = np.swapaxes(np.array(rows[1:]) - rows[0], 0, 1)  # less what displaces the cell by itself
+    forces = forces if K is None else forces + (K @ u.T).T
+    return np.asarray(forces @ u.T / abs(np.linalg.det(ways)))

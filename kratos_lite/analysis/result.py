@@ -311,8 +311,8 @@ class Result(ElementFields, Tabular):
         from kratos_lite.analysis.quantities import Quantity
 
         quantity = instance(of, "of", Quantity, "kl.DisplacementAt((1, 0, 0), 'z')")
-        fixed = analysis.model.supports.fixed
-        return error_of(self, quantity, analysis.adjoint, fixed, self._strained, self._recovery)
+        how = analysis.adjoint, analysis.model, self._strained, self._recovery
+        return error_of(self, quantity, *how)
 
     def gradient(self, of: Quantity, wrt: str = "stiffness") -> Array:
         """Return the derivative of a quantity by what the model is made of, by one adjoint solution.

@@ -222,7 +222,7 @@ class StaticAnalysis:
         self._follow()
         supports, load = self.model.supports, self._state.free.balanced(load)
         moved = np.where(supports.fixed, motion, 0.0)
-        if motion.any() and not moved.any():
+        if motion.any() and not (moved.any() or load.any()):
             raise ModelError("nothing is prescribed on the part along this axis, so that it has no reaction")
         moving = self._state.components_with(any_axis(load != 0) | any_axis(moved != 0))
         if not moving.any():

@@ -133,6 +133,17 @@ class Cut(PartTie):
         how = "free along its normal" if self.length is None else f"{self.length:g} m shorter"
         return f"cut from {super().__str__()}, {how}"
 
+    def is_pulled_by(self, load: Load) -> bool:
+        """Return whether a load, or what an amplitude scales, is a force on these sides."""
+        force = getattr(load, "load", load)
+        return isinstance(force, BoltForce) and self.place == Cut(self.mesh, force.a, force.b).place
+
+    def _check(self, groups: Sequence[ElementGroup], motion: object) -> list[str]:
+        """Warn where displacements are large, with which the normal does not turn."""
+        if self.length == 0.0 or not any(group.element.finite for group in groups):
+            return []
+        return [f"the {self}, keeps its normal however far the body turns: it must hardly turn there"]
+
     def refined(self, finer: RefinedMesh, supports: Any) -> Cut:
         """Return the cut on a finer mesh."""
         return Cut(finer.mesh, finer.where(self.a), finer.where(self.b), self.length)

@@ -634,7 +634,7 @@ class Structure(Tabular):
         InputError
             There is not one of force and length.
         ModelError
-            A side has no faces, or their nodes do not lie at the same places.
+            A side has no faces, their nodes do not lie at the same places, or another load has the name.
         MeshError
             There is no such part or node.
 
@@ -658,9 +658,15 @@ class Structure(Tabular):
             raise InputError("a pretension is a force in N or a length in m; give one of them")
         length = None if length is None else number(length, "the length of a pretension", least=-np.inf)
         load = None if force is None else BoltForce(a, b, force)
-        self.supports.add_tie(Cut(self.mesh, a, b, length))
-        if name in self.named_loads:
-            self.remove(name)
+        cut, other = Cut(self.mesh, a, b, length), self.named_loads.get(name)
+        pulling = [old for old in self.loads if cut.is_pulled_by(old)]
+        if load is not None and not (other is None or other in pulling):
+            raise ModelError(
+                f"{name!r} is another load, {other!r}; give each cut a name of its own, name=..."
+            )
+        self.supports.add_tie(cut)
+        for old in pulling:
+            self.remove(old)
         if load is not None:
             self.add(load, amplitude=amplitude, name=name)
 
@@ -1008,7 +1014,7 @@ CHECKS: tuple[Callable[[Structure, Sequence[ElementGroup]], Iterable[str]], ...]
     lambda model, groups: check_spurious_modes(model.mesh, groups, model.supports),
     lambda model, groups: checks.check_nodes(model.mesh),
     lambda model, groups: model.supports.check_used(model.mesh.used_nodes()),
-    lambda model, groups: [text for point in model.points for text in point._check(groups, model.motion)],
+    lambda model, groups: [text for tie in model.supports.ties for text in tie._check(groups, model.motion)],
     lambda model, groups: checks.check_attached(model.attached is not None, model.motion),
     lambda model, groups: [text for load in model.loads for text in load.warnings(model.mesh, groups)],
 )

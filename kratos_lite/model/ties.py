@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import ModelError
 from kratos_lite.mesh import NO_ROWS, Block, Mesh, Where
 from kratos_lite.model.mortar import NEAR, Cells, Mortar, mortar
@@ -48,6 +49,10 @@ class Coupling(ABC):
     def held_twice(self, fixed: Mask) -> tuple[Ints, Ints, Array]:
         """Return pairs of degrees of freedom that are fixed, both, and what must be between them in m."""
         return NO_ROWS, NO_ROWS, np.zeros(0)
+
+    def _check(self, groups: Sequence[ElementGroup], motion: object) -> list[str]:
+        """Return warnings of what elements and a motion of their material mean for it; raise ModelError."""
+        return []
 
     @abstractmethod
     def refined(self, finer: RefinedMesh, supports: Any) -> Coupling:
@@ -168,22 +173,21 @@ def _without_gaps(x: Mortar, points: Array) -> Csr:
 
     Then rigid motions of both leave no force behind.
     """
-    from scipy.sparse import bsr_array, csr_array
+    from scipy.sparse import bsr_array, csr_array, kron
 
     W, X = x.W, points - points.mean(axis=0)
-    count = np.maximum(np.diff(W.indptr), 1)
-    owner = np.repeat(np.arange(len(count)), np.diff(W.indptr))
-    blocks = W.data[:, None, None] * np.eye(3)
-    gap = x.inverse @ X[x.nodes] - W @ X
+    full, gap = csr_array(kron(W, np.eye(3))), x.inverse @ X[x.nodes] - W @ X
     if np.abs(gap).max() > 1e-9 * np.abs(X).max():
+        near = csr_array(abs(W) + x.neighbors @ abs(W))  # a node opposite another alone knows no rotation
+        count = np.maximum(np.diff(near.indptr), 1)
+        owner = np.repeat(np.arange(len(count)), np.diff(near.indptr))
         center = np.zeros_like(gap)
-        np.add.at(center, owner, X[W.indices] / count[owner, None])
-        r = _cross(X[W.indices] - center[owner])
+        np.add.at(center, owner, X[near.indices] / count[owner, None])
+        r = _cross(X[near.indices] - center[owner])
         A = np.zeros((len(count), 3, 3))
         np.add.at(A, owner, np.swapaxes(r, 1, 2) @ r)
-        blocks = blocks - (_cross(gap) @ np.linalg.inv(A))[owner] @ r
-    shape = 3 * W.shape[0], 3 * W.shape[1]
-    full = csr_array(bsr_array((blocks, W.indices, W.indptr), shape=shape).tocsr())
+        blocks = -(_cross(gap) @ np.linalg.pinv(A, hermitian=True))[owner] @ r
+        full = csr_array(full + bsr_array((blocks, near.indices, near.indptr), shape=full.shape))
     full.eliminate_zeros()
     return full
 

@@ -139,6 +139,8 @@ def carried():
         (cantilever, {"loads": [kl.Temperature(3.0)]}, ModelError, "Temperature.* does not swing"),
         (cantilever, {"loads": [kl.TimeDependentLoad(lambda t: None)]}, ModelError, "does not swing"),
         (cantilever, {"loads": [(kl.Traction("x+", (1.0, 0, 0)), "x")]}, InputError, "complex number"),
+        (cantilever, {"loads": kl.Traction("x+", (1.0, 0, 0))}, InputError, "loads must be a list"),
+        (free, {"frequencies": [1.0, 0.0], "method": "direct"}, ModelError, "frequency 0 needs supports"),
         (lambda: cantilever(density=0.0), {}, ModelError, "needs mass"),
         (free, {}, ModelError, "method='direct' takes alone"),
         (plastic, {}, ModelError, "harmonic response takes linear laws"),
@@ -149,6 +151,17 @@ def carried():
 def test_what_does_not_swing_is_refused(make, options, error, message):
     with pytest.raises(error, match=message):
         make().harmonic(**{"frequencies": [1.0], **options})
+
+
+def test_what_is_read_is_checked():
+    model = cantilever()
+    model.add(kl.Traction("x+", (0, 0, 1.0)))
+    response = model.harmonic([1.0, 2.0], loads=[(model.loads[0], np.complex64(1j))])
+    assert (response.displacement(-1) == response.displacement(1)).all()
+    with pytest.raises(InputError, match="the number of a frequency"):
+        response.displacement(2)
+    with pytest.raises(InputError, match="the phase"):
+        response.fields(0, "x")
 
 
 def test_an_undamped_mode_has_no_response_at_its_frequency():

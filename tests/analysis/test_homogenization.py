@@ -92,6 +92,38 @@ def test_a_cell_with_a_ball_is_cubic_and_within_bounds():
     assert np.linalg.eigvalsh(C - reuss).min() > 0
 
 
+def within(low, high):
+    return lambda X: ((X > low) & (X < high)).all(axis=1)
+
+
+def test_a_rigid_inclusion_is_one_of_a_stiff_material():
+    mesh = kl.box(cells=(4, 4, 4))
+    rigid, stiff = cell(mesh), cell(mesh)
+    rigid.rigid(within(0.2, 0.8), (0.5, 0.5, 0.5))
+    centers = mesh.points[mesh.blocks[0].nodes].mean(axis=1)
+    stiff.assign(kl.Isotropic3D(E=1e15, nu=0.3), np.flatnonzero(within(0.2, 0.8)(centers)))
+    C = kl.homogenized(rigid)
+    assert np.abs(C - kl.homogenized(stiff)).max() < 1e-4 * C.max()
+
+
+def test_springs_inside_store_energy_and_what_displaces_the_cell_does_not_count():
+    model = cell(kl.box(cells=(4, 4, 4)))
+    model.add(kl.ElasticSupport((0.25, 0.5, 0.5), (1e9, 0, 0), to=(0.75, 0.5, 0.5)))
+    C = kl.homogenized(model)
+    model.periodic("x-", "x+", strain=(1, 0, 0, 0, 0, 0))
+    result = model.solve()
+    u = result.u.ravel()
+    assert abs(C[0, 0] / (2 * result.energy() + u @ (model.attached.K @ u)) - 1) < 1e-9
+    assert C[0, 0] > SOFT.C[0, 0] + 1e7
+    tied = []
+    for constant in (0.0, 0.5):
+        other = cell(kl.box(cells=(4, 4, 4)))
+        other.constrain((62, "x"), {(63, "x"): 1.0}, constant)
+        tied.append(kl.homogenized(other))
+    assert np.abs(tied[1] - tied[0]).max() < 1e-9 * SOFT.C.max()
+    assert np.abs(tied[0] - SOFT.C).max() > 1e6
+
+
 def test_six_strains_use_one_matrix(monkeypatch):
     made = []
     plain = StaticAnalysis._equations_of
@@ -167,9 +199,16 @@ def stressed():
     return model
 
 
+def grounded():
+    model = cell(kl.box(cells=(2, 2, 2)))
+    model.add(kl.ElasticSupport((0.5, 0.5, 0.5), (1e6, 1e6, 1e6)))
+    return model
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [
+        (grounded, "springs hold the cell to the ground"),
         (lambda: kl.Model(kl.box(), SOFT), "three pairs of periodic parts along three directions; got 0"),
         (only_two, "got 2"),
         (held, "hold more of the cell than one node"),

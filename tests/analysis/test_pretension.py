@@ -71,6 +71,36 @@ def test_load_cases_take_the_force_or_leave_the_bolt_loose():
     assert np.abs(np.array(forces) - [FORCE, 0, FORCE]).max() < 1e-6 * FORCE
 
 
+def test_a_cut_has_one_force_and_cuts_have_names_of_their_own():
+    model = joint()
+    model.pretension("bolt.cut-", "bolt.cut+", force=3 * FORCE, amplitude=2.0, name="first")
+    model.pretension("bolt.cut-", "bolt.cut+", force=FORCE, name="second")
+    assert list(model.named_loads) == ["second"]
+    assert abs(bolt_force(model.solve()) / FORCE - 1) < 1e-9
+    both = kl.join({"one": kl.box(cells=(1, 1, 2)), "two": kl.box(cells=(1, 1, 2), origin=(3, 0, 0))})
+    for name in ("one", "two"):
+        cut = both.parts[name].nodes[both.points[both.parts[name].nodes, 2] == 0.5]
+        both = kl.split(both, cut, (f"{name}-", f"{name}+"))
+    two = kl.Model(both, BOLT)
+    two.fix(lambda X: (X[:, 2] == 0) | (X[:, 2] == 1))
+    two.pretension("one-", "one+", force=1e5)
+    with pytest.raises(kl.ModelError, match="give each cut a name of its own"):
+        two.pretension("two-", "two+", force=2e5)
+    two.pretension("two-", "two+", length=0.0)
+    two.pretension("two-", "two+", force=2e5, name="other")
+    stress = two.solve().stress("element")[:, 2]
+    assert np.abs(stress - [1e5, 1e5, 2e5, 2e5]).max() < 1e-4
+
+
+def test_large_displacements_are_warned_of():
+    model = joint()
+    model.formulation = "total_lagrangian"
+    model.pretension("bolt.cut-", "bolt.cut+", force=FORCE)
+    assert any("keeps its normal" in text for text in model.check())
+    model.pretension("bolt.cut-", "bolt.cut+", length=0.0)
+    assert not any("keeps its normal" in text for text in model.check())
+
+
 def test_an_amplitude_scales_the_force():
     model = joint()
     model.pretension("bolt.cut-", "bolt.cut+", force=FORCE, amplitude=lambda t: 0.5 + t)

@@ -200,6 +200,35 @@ def test_weight_scales_with_amplitudes_and_stands_in_load_cases():
     assert np.abs(body.center - center).max() < 1e-12
 
 
+def test_derivatives_and_harmonic_response_know_the_weight_of_masses():
+    """Of one load, the derivative by its factor is the value; the frequency 0 is statics."""
+    model = block(law=RUBBER)
+    model.fix("z-")
+    model.add_mass("z+", 300.0)
+    model.add(kl.Gravity((0, 0, -10.0)))
+    result, top = model.solve(), kl.DisplacementAt((0.5, 0.5, 1), "z")
+    assert abs(result.gradient(top, "loads")[0] / top.value(result) - 1) < 1e-9
+    for method in ("modes", "direct"):
+        swinging = model.harmonic(0.0, method=method).displacement(0)
+        assert np.abs(swinging - result.u).max() < 1e-9 * np.abs(result.u).max()
+
+
+@pytest.mark.parametrize("part", ["x-", "x+", "z-", "y+"])
+def test_derivatives_of_reactions_know_springs(part):
+    """Linear in the load: the derivative by its factor is the reaction, of supports, springs or both."""
+    model = kl.Model(refine(kl.box((1, 1, 1), (2, 2, 2)), np.array([0])).mesh, RUBBER)
+    model.fix("x-")
+    model.add(kl.ElasticSupport("x+", (1e5, 1e5, 1e6)))
+    model.add(kl.ElasticSupport("z-", 1e6))
+    model.add(kl.Traction("z+", (0, 1e3, -1e4)))
+    result = model.solve()
+    for axis in "yz":
+        force = kl.ReactionOf(part, axis)
+        exact, size = force.value(result), np.abs(result.reactions).sum()
+        assert abs(result.gradient(force, "loads")[0] - exact) < 1e-8 * size
+        assert result.error(of=force).value == exact
+
+
 @pytest.mark.parametrize("law", [STEEL, kl.NeoHookean3D(1e9, 0.0, density=7800.0)], ids=["linear", "any law"])
 def test_a_mass_on_a_spring_swings_in_time(law):
     """Half a period after its start at z0 it is at -z0; energy stays."""

@@ -117,6 +117,20 @@ def test_rigid_motions_pass_where_faces_are_curved_or_apart(gap):
     assert model.free_motions(model.element_groups()).counts.tolist() == [6]
 
 
+@pytest.mark.parametrize("kind", ["8N", "4N", "20N", "10N"])
+@pytest.mark.parametrize("cells", [1, 2, 3])
+def test_rigid_motions_pass_a_gap_where_nodes_lie_opposite_one_another(kind, cells):
+    element = f"KinematicLinear3D{kind}"
+    low = kl.box(cells=(cells, cells, 1), element=element)
+    mesh = kl.join({"low": low, "top": kl.box(cells=(3, 3, 1), element=element, origin=(0, 0, 1.1))})
+    model = kl.Model(mesh, STEEL)
+    model.tie("low.z+", "top.z-", tolerance=0.2)
+    c, U = model.supports.constraints, rigid_modes(mesh.points)
+    follow = np.zeros((len(c), 6))
+    np.add.at(follow, c.owner, c.weights[:, None] * U[c.independents])
+    assert np.abs(follow - U[c.dependents]).max() < 1e-12
+
+
 def test_a_thick_cylinder_of_two_unlike_rings():
     """Lamé: u_r of a cylinder under inner pressure with plane strain, through the tie."""
     a = kl.annulus(0.5, 1.0, 0.1, cells=(2, 16, 1), element="20N")
