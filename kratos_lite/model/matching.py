@@ -120,9 +120,9 @@ class Cut(PartTie):
 
     def __init__(self, mesh: Mesh, a: Where, b: Where, length: float | None = None) -> None:
         super().__init__(mesh, a, b)
-        self.length, self.equations = length, length is None
         below, self.above = self.nodes_of
         self.below = opposite(mesh, below, self.above, np.zeros(3))
+        self.length, self.equations = length, (length is None, self.below.tobytes())
         areas = [area_vectors(f.known_shape, mesh.points[f.nodes]) for f in faces_of(mesh, a, self.below)]
         normal = np.sum([area.sum(axis=(0, 1)) for area in areas], axis=0)
         self.normal = normal / np.linalg.norm(normal)
@@ -133,10 +133,12 @@ class Cut(PartTie):
         how = "free along its normal" if self.length is None else f"{self.length:g} m shorter"
         return f"cut from {super().__str__()}, {how}"
 
-    def is_pulled_by(self, load: Load) -> bool:
-        """Return whether a load, or what an amplitude scales, is a force on these sides."""
-        force = getattr(load, "load", load)
-        return isinstance(force, BoltForce) and self.place == Cut(self.mesh, force.a, force.b).place
+    def is_pulled_by(self, load: object) -> bool:
+        """Return whether a load is the force of this cut, whichever side it names first."""
+        if not isinstance(load, BoltForce):
+            return False
+        sides = [self.mesh.nodes(where) for where in (load.a, load.b)]
+        return any(all(map(np.array_equal, sides, both)) for both in (self.nodes_of, self.nodes_of[::-1]))
 
     def _check(self, groups: Sequence[ElementGroup], motion: object) -> list[str]:
         """Warn where displacements are large, with which the normal does not turn."""

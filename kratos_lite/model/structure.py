@@ -34,7 +34,7 @@ from kratos_lite.model.matching import BoltForce, Cut, Periodic
 from kratos_lite.model.remote_point import RemotePoint
 from kratos_lite.model.spurious_modes import check_rules, check_spurious_modes
 from kratos_lite.model.supports import DirichletCondition, Supports, axis_numbers
-from kratos_lite.model.ties import Tie
+from kratos_lite.model.ties import Tie, name_of
 from kratos_lite.quadrature import Rule
 from kratos_lite.solvers.constraints import rigid_modes
 from kratos_lite.tabular import Tabular
@@ -614,7 +614,7 @@ class Structure(Tabular):
         force: float | None = None,
         length: float | None = None,
         amplitude: Factor | None = None,
-        name: str = "pretension",
+        name: str | None = None,
     ) -> None:
         """Pull the two sides of a cut together, as a nut tightens a bolt: by a force, or by a length.
 
@@ -627,7 +627,7 @@ class Structure(Tabular):
         force : N, tension in the bolt: a load by `name`; in load cases without it the bolt is loose.
         length : m, by which the bolt becomes shorter.
         amplitude : of the force, as for `add`.
-        name : of the load.
+        name : of the load; if not given "pretension", or "pretension of a" beside that of another bolt.
 
         Raises
         ------
@@ -658,15 +658,15 @@ class Structure(Tabular):
             raise InputError("a pretension is a force in N or a length in m; give one of them")
         length = None if length is None else number(length, "the length of a pretension", least=-np.inf)
         load = None if force is None else BoltForce(a, b, force)
-        cut, other = Cut(self.mesh, a, b, length), self.named_loads.get(name)
-        pulling = [old for old in self.loads if cut.is_pulled_by(old)]
-        if load is not None and not (other is None or other in pulling):
-            raise ModelError(
-                f"{name!r} is another load, {other!r}; give each cut a name of its own, name=..."
-            )
+        cut = Cut(self.mesh, a, b, length)
+        kept = [other for other in self.loads if not cut.is_pulled_by(getattr(other, "load", other))]
+        taken = [key for key, other in self.named_loads.items() if any(other is one for one in kept)]
+        if name is None:
+            name = f"pretension of {name_of(a, cut.nodes_of[0])}" if "pretension" in taken else "pretension"
+        if load is not None and name in taken:
+            raise ModelError(f"another load has the name {name!r}; give the pretension a name of its own")
         self.supports.add_tie(cut)
-        for old in pulling:
-            self.remove(old)
+        self.loads[:] = kept
         if load is not None:
             self.add(load, amplitude=amplitude, name=name)
 

@@ -13,6 +13,7 @@ from kratos_lite.errors import ModelError
 from kratos_lite.mesh import NO_ROWS, Block, Mesh, Where
 from kratos_lite.model.mortar import NEAR, Cells, Mortar, mortar
 from kratos_lite.solvers.constraints import Constraints
+from kratos_lite.tabular import in_units
 from kratos_lite.typing import Array, Csr, Ints, Mask
 from kratos_lite.validation import number
 
@@ -65,7 +66,7 @@ class PartTie(Coupling):
     def __init__(self, mesh: Mesh, a: Where, b: Where) -> None:
         self.mesh, self.a, self.b = mesh, a, b
         self.nodes_of = [mesh.nodes(where) for where in (a, b)]
-        self.place = type(self), *(nodes.tobytes() for nodes in self.nodes_of)
+        self.place = type(self), frozenset(nodes.tobytes() for nodes in self.nodes_of)
         both = np.intersect1d(self.nodes_of[0], self.nodes_of[1])
         if len(both):
             raise ModelError(
@@ -154,6 +155,7 @@ def _checked(tie: Tie) -> Mortar:
     gap = min(x.gap for x in found)
     limit = f"{NEAR:g} of the size of a face" if tie.tolerance is None else f"{tie.tolerance:g} m"
     why = f": some are {gap:.3g} m apart, farther than {limit}" * bool(np.isfinite(gap))
+    why = in_units(why, mesh.units)
     raise ModelError(
         f"cannot tie {names}: neither covers the other{why}; tie parts of which one lies on the other, or "
         "give the distance that is to be closed, as in tolerance=1e-3"

@@ -107,6 +107,49 @@ def test_an_amplitude_scales_the_force():
     assert abs(bolt_force(model.solve()) / (0.5 * FORCE) - 1) < 1e-9
 
 
+def two_bolts():
+    """Two bars, each cut in half and held at both ends."""
+    bars = {
+        name: kl.split(kl.box((1, 1, 2), (1, 1, 2), origin=(x, 0, 0)), lambda X: X[:, 2] == 1)
+        for name, x in (("one", 0.0), ("other", 3.0))
+    }
+    model = kl.Model(kl.join(bars), kl.Isotropic3D(E=1e9, nu=0.0))
+    model.fix("z-")
+    model.fix("z+")
+    return model
+
+
+def pulls(model):
+    result = model.solve()
+    return [-result.reaction(f"{name}.z-")[:, 2].sum().round(6) for name in ("one", "other")]
+
+
+def test_each_bolt_keeps_its_force():
+    model = two_bolts()
+    model.pretension("one.cut-", "one.cut+", force=1e3)
+    model.pretension("other.cut-", "other.cut+", force=2e3)
+    assert sorted(model.named_loads) == ["pretension", "pretension of other.cut-"]
+    assert pulls(model) == [1e3, 2e3]
+    model.pretension("one.cut-", "one.cut+", length=0.0)
+    assert pulls(model) == [0, 2e3]
+    model.pretension("other.cut-", "other.cut+", force=3e3, amplitude=2.0)
+    assert pulls(model) == [0, 6e3]
+    with pytest.raises(kl.ModelError, match="another load has the name"):
+        model.pretension("one.cut-", "one.cut+", force=1e3, name=next(iter(model.named_loads)))
+    assert pulls(model) == [0, 6e3]
+
+
+def test_the_sides_of_a_cut_may_be_named_in_either_order():
+    model = two_bolts()
+    model.pretension("one.cut+", "one.cut-", force=1e3)
+    model.pretension("other.cut-", "other.cut+", force=1e3)
+    assert pulls(model) == [1e3, 1e3]
+    model.pretension("one.cut-", "one.cut+", force=2e3)
+    model.pretension("other.cut+", "other.cut-", length=2e-6)
+    assert len(model.loads) == 1
+    assert pulls(model) == [2e3, 1e3]
+
+
 def test_a_locked_cut_without_length_is_none():
     """Frequencies of the bolt are those of one that was never cut."""
     whole = kl.Model(kl.box((0.1, 0.1, LENGTH), (2, 1, 4), "8N"), BOLT)
