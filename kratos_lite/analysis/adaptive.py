@@ -33,6 +33,7 @@ from kratos_lite.mesh.refined_mesh import RefinedMesh
 from kratos_lite.mesh.refinement import quadratic, raised, refine
 from kratos_lite.model.refined import refined
 from kratos_lite.model.structure import Structure
+from kratos_lite.tabular import in_units
 from kratos_lite.typing import Array, Ints, Progress
 from kratos_lite.validation import number, short, whole_number
 
@@ -107,7 +108,7 @@ def solve_to(
             f"the error requested, {aim:.3g}, was not reached: it may be {level.reported:.3g}; {missed}"
         ]
     if top := peak(result):
-        warnings.append(f"the largest von Mises stress lies{top}")
+        warnings.append(in_units(f"the largest von Mises stress lies{top}", result.units))
     report, (first, last) = result.report, (history[0].kinds, history[-1].kinds)
     report.history, report.error, report.error_asked = history, level.reported, aim
     report.error_of = "the energy norm" if quantity is None else str(quantity)

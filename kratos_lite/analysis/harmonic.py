@@ -23,7 +23,7 @@ from kratos_lite.model.loads import Load, ScaledLoad, TimeDependentLoad
 from kratos_lite.model.loads.temperature import Temperature
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.plan import FALLBACK_LIMIT
-from kratos_lite.tabular import Tabular
+from kratos_lite.tabular import Tabular, in_units, unit_name
 from kratos_lite.typing import Array, ArrayLike, Complexes, Progress
 from kratos_lite.validation import choice, finite, instance, number, short, whole_number
 
@@ -69,6 +69,11 @@ class HarmonicResponse(Tabular):
     ) -> None:
         self.mesh, self.frequencies, self.natural = mesh, frequencies, natural
         self._groups, self._basis, self._factors = groups, basis, factors  # (b, n, 3) m and (f, b)
+
+    @property
+    def units(self) -> str:  # type: ignore[override]
+        """Set of units of the mesh, which all numbers are in."""
+        return self.mesh.units
 
     def displacement(self, number: int) -> Complexes:
         """Return the complex displacement at one frequency.
@@ -151,7 +156,7 @@ class HarmonicResponse(Tabular):
         made = {"frequency [rad/s]": self.frequencies}
         for i, axis in enumerate("xyz"):
             made |= {f"amplitude {axis} [m]": np.abs(u[:, i]), f"phase {axis} [rad]": np.angle(u[:, i])}
-        return made
+        return {in_units(name, self.units): values for name, values in made.items()}
 
     def plot(self, point: ArrayLike, axis: str = "z", path: str | Path | None = None) -> Any:
         """Draw the amplitude of a point against the frequency, on logarithmic scales.
@@ -169,8 +174,10 @@ class HarmonicResponse(Tabular):
         from kratos_lite.view.canvas import save
         from kratos_lite.view.curves import response_figure
 
-        amplitude = self.columns(point)[f"amplitude {choice(axis, 'axis', tuple('xyz'))} [m]"]
-        figure = response_figure(self.frequencies, amplitude, f"amplitude of u{axis}")
+        component = "xyz".index(choice(axis, "axis", tuple("xyz")))
+        amplitude = np.abs(self.at(finite(point, "a point", (3,)))[:, component])
+        unit = unit_name("m", self.units)
+        figure = response_figure(self.frequencies, amplitude, unit, f"amplitude of u{axis}")
         if path is not None:
             save(figure, path)
         return figure

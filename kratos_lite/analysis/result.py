@@ -18,7 +18,7 @@ from kratos_lite.mesh import Mesh, Where
 from kratos_lite.model.loads import Load
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.linear_solver import Solution
-from kratos_lite.tabular import Tabular
+from kratos_lite.tabular import Tabular, in_units
 from kratos_lite.typing import Array, ArrayLike, Numbers
 from kratos_lite.validation import finite, flag, instance, whole_number
 
@@ -80,6 +80,9 @@ class Result(ElementFields, Tabular):
             array.setflags(write=False)  # others are made of them later
         self.report = report
         report.units = mesh.units
+        report.warnings, report.notes = (
+            [in_units(text, mesh.units) for text in texts] for texts in (report.warnings, report.notes)
+        )
         self._analysis = analysis
         self._version = analysis.model.version if analysis else None
         self._acting: Sequence[Load] = ()  # loads of a static analysis

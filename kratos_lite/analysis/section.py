@@ -21,7 +21,7 @@ from kratos_lite.mesh.locate import Located
 from kratos_lite.mesh.topology import faces_of
 from kratos_lite.quadrature import rule_for
 from kratos_lite.shapes.faces import FACE_SHAPES, Triangle3
-from kratos_lite.tabular import Tabular
+from kratos_lite.tabular import Tabular, in_units
 from kratos_lite.typing import Array, ArrayLike, Ints, Mask, Numbers
 from kratos_lite.validation import finite
 from kratos_lite.view.plane import Plane, cut_cells, plane_of
@@ -175,11 +175,12 @@ def _by_plane(mesh: Mesh, plane: Plane) -> tuple[str, Array, Pieces]:
     used = d[mesh.used_nodes()]
     low, high = float(used.min()), float(used.max())
     axis = "xyz"[int(n.argmax())] if n.max() == 1 else f"({', '.join(f'{c:.4g}' for c in n)})·X"
-    name = f"{axis} = {offset:g} m"
+    name, spans = (
+        in_units(text, mesh.units)
+        for text in (f"{axis} = {offset:g} m", f"{offset + low:g} … {offset + high:g} m")
+    )
     if low > 0 or high < 0:
-        raise MeshError(
-            f"the section {name} misses the body, which spans {offset + low:g} … {offset + high:g} m there"
-        )
+        raise MeshError(f"the section {name} misses the body, which spans {spans} there")
     weights = np.heaviside(d, 0.0 if low == 0 else 1.0 if high == 0 else 0.5)
     return name, weights, _polygons(mesh, -d if high == 0 else d, n)
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from kratos_lite.cli.options import only, read_values
 from kratos_lite.errors import InputError, ModelError, SolveError
+from kratos_lite.tabular import in_units
 
 if TYPE_CHECKING:
     from kratos_lite.io.case import Case
@@ -192,7 +193,8 @@ def check(options: Namespace) -> int:
             lines.append(f"extent   {extent}")
         lines += [f"error    {text}" for text in needs]
         lines += [f"note     {text}" for text in warnings]
-        _print([] if options.quiet else lines)
+        units = case.model.units if case.is_of_model else "SI"
+        _print([] if options.quiet else [in_units(line, units) for line in lines])
         return EXIT_UNSOLVABLE if needs else 0
 
 

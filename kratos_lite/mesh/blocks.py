@@ -163,6 +163,7 @@ class Cells(Protocol):
     blocks: tuple[Block, ...]
     source: str
     whole: bool
+    units: str
 
     @property
     def element_ids(self) -> Ints:

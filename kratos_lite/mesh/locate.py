@@ -14,6 +14,7 @@ from kratos_lite.mesh.blocks import NO_ROWS, Cells, with_rows
 from kratos_lite.mesh.boxes import BoxTree, cell_boxes, curvature, is_solid, nearest_element
 from kratos_lite.shapes import Shape
 from kratos_lite.shapes.inverse import inverse_map, outside_by
+from kratos_lite.tabular import in_units
 from kratos_lite.typing import Array, ArrayLike, Csr, Ints, Mask, Rows
 from kratos_lite.validation import finite
 
@@ -63,10 +64,9 @@ class Located:
         x = self.points[i]
         which = "the point" if not i else f"point {', '.join(map(str, i))}"
         more = f" (and {len(outside) - 1} more of {self.rows.size})" if len(outside) > 1 else ""
-        raise MeshError(
-            f"{which} at {x.tolist()} m{more} lies outside the mesh, {nearest_element(self.mesh, x)}; "
-            "move it into the mesh, or choose those inside by the mask mesh.locate(points).inside"
-        )
+        text = f"{which} at {x.tolist()} m{more} lies outside the mesh, {nearest_element(self.mesh, x)}"
+        cure = "move it into the mesh, or choose those inside by the mask mesh.locate(points).inside"
+        raise MeshError(f"{in_units(text, self.mesh.units)}; {cure}")
 
     # ---- values ------------------------------------------------------------------------------
 

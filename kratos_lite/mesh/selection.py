@@ -9,6 +9,7 @@ import numpy as np
 
 from kratos_lite.errors import MeshError, nearest
 from kratos_lite.mesh.blocks import NO_ROWS, Cells, Part, distinct, without_repeats
+from kratos_lite.tabular import in_units
 from kratos_lite.typing import Array, ArrayLike, Ints
 from kratos_lite.validation import finite, whole_numbers
 
@@ -56,10 +57,9 @@ def find_nodes(where: Callable[[Array], ArrayLike] | ArrayLike, mesh: Cells) -> 
     if (point := point_of(where)) is not None:
         rows, nearby = nodes_at(point, points)
         if mesh.whole and not len(rows):
-            raise MeshError(
-                f"there is no node at {point.tolist()} m; {nearby}; choose that one, or read values anywhere "
-                "in the mesh by result.at(points)"
-            )
+            text = f"there is no node at {point.tolist()} m; {nearby}"
+            cure = "choose that one, or read values anywhere in the mesh by result.at(points)"
+            raise MeshError(f"{in_units(text, mesh.units)}; {cure}")
         return rows
     n, chosen = len(points), where(points.copy()) if callable(where) else where
     if _is_mask(chosen):

@@ -38,11 +38,11 @@ def study_figure(
     return figure
 
 
-def response_figure(frequencies: Array, amplitudes: Array, of: str) -> Any:
-    """Return a figure of amplitudes (f,) in m against frequencies (f,) in rad/s."""
-    figure, axes = new_plot((6, 4), "rad/s", "m", log=True)
+def response_figure(frequencies: Array, amplitudes: Array, unit: str, of: str) -> Any:
+    """Return a figure of amplitudes (f,), in a unit, against frequencies (f,) in rad/s."""
+    figure, axes = new_plot((6, 4), "", unit, log=True)
     axes.plot(frequencies, amplitudes, color=BLUE, lw=1.8)
-    label(axes, "frequency", of, "")
+    label(axes, "frequency in rad/s", of, "")
     return figure
 
 

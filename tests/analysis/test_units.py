@@ -1,6 +1,7 @@
 """Models said to be in other units than those of SI: the same numbers with the right words everywhere."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -125,6 +126,52 @@ def test_pictures_in_mm(tmp_path):
     axes = result.along((0, 10, 5), (100, 10, 5)).plot(values="sxx").axes[0]
     assert axes.yaxis.get_major_formatter()(10, 0) == "10 MPa"
     assert axes.xaxis.get_major_formatter()(5000, 0) == "5000 mm"
+
+
+def test_harmonic_response_in_mm(tmp_path):
+    pytest.importorskip("matplotlib")
+    model, dense = bracket(MM), SIZES[MM][2]
+    model.assign(kl.Isotropic3D(E=210e3, nu=0.3, density=7850.0 * dense))
+    response, point = model.harmonic([0.0, 10.0], damping=0.02), (100.0, 10.0, 5.0)
+    assert " mm at " in str(response)
+    assert "amplitude z [mm]" in response.columns(point)
+    axes = response.plot(point, "z", tmp_path / "h.png").axes[0]
+    assert axes.yaxis.get_major_formatter()(0.5, 0) == "0.5 mm"
+    assert axes.get_xlabel() == "frequency in rad/s"
+
+
+def test_warnings_and_places_in_errors_are_in_mm():
+    model = bracket(MM)
+    model.add(kl.Traction("x+", (0, 0, -1e3)))
+    (text,) = model.solve().report.warnings
+    assert re.search(r"differ by \S+ mm, ", text)
+    model.assign(kl.Isotropic3D(E=210e9, nu=0.3, density=7850.0))
+    report = model.solve().report
+    assert "to 1.2e+06 MPa (diamond)" in " ".join(report.notes)
+    assert "2.26e-08 t/mm³ (osmium)" in " ".join(report.notes)
+    model.assign(kl.Isotropic3D(E=210e9, nu=0.3, density=7.85e-9))
+    assert "2.5e+07 mm/s" in " ".join(model.solve().report.warnings)
+    result = bracket(MM).solve()
+    for act, words in (
+        (
+            lambda: result.at((300.0, 0, 0)),
+            r"0.0\] mm lies outside the mesh, about 200 mm from",
+        ),
+        (lambda: model.fix((300.0, 0, 0)), "200 mm away"),
+        (lambda: result.section(("x", 300.0)), "x = 300 mm misses the body, which spans 0 … 100 mm there"),
+    ):
+        with pytest.raises(kl.MeshError, match=words):
+            act()
+    assert result.section(("x", 50.0)).where == "x = 50 mm"
+    finer = bracket(MM).solve(error=0.5).report.warnings
+    assert not [text for text in finer if " Pa" in text]
+
+
+def test_a_check_on_the_command_line_is_in_mm(tmp_path, run, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    kl.write("bar.vtu", kl.box((100, 20, 10), (5, 1, 1)))
+    words = ["--units", MM, "--material", "E=210e3,nu=0.3", "--fix", "x-:xyz", "--traction", "x+:0,0,-1"]
+    assert "[0, 100] × [0, 20] × [0, 10] mm" in run("check", "bar.vtu", *words).out
 
 
 def test_units_go_along_to_finer_meshes_and_studies():
