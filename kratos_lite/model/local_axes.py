@@ -12,9 +12,16 @@ from kratos_lite.errors import InputError, ModelError
 from kratos_lite.typing import Array, ArrayLike
 from kratos_lite.validation import finite
 
+BESIDE = 1e-9
+"""Way off the axis, of the size of the places, at which results on the axis take their directions."""
+
 
 class LocalAxes(ABC):
-    """Three orthogonal directions at each place, each with a letter."""
+    """Three orthogonal directions at each place, each with a letter.
+
+    On the axis or at the center, where r has none, supports and loads are refused; components of results are
+    those beside it, along the coordinate axis that is farthest from it.
+    """
 
     letters: ClassVar[str]
 
@@ -48,7 +55,7 @@ class LocalAxes(ABC):
         -------
         (..., 3)
         """
-        values, R = self._both(values, 3, points)
+        values, R = self._both(values, 3, self._beside(points))
         return (R @ values[..., None])[..., 0]
 
     def globally(self, values: ArrayLike, points: ArrayLike) -> Array:
@@ -78,8 +85,12 @@ class LocalAxes(ABC):
         -------
         (..., 6)
         """
-        values, R = self._both(values, 6, points)
+        values, R = self._both(values, 6, self._beside(points))
         return voigt.vector(R @ voigt.tensor(values) @ np.swapaxes(R, -1, -2))
+
+    def _beside(self, points: ArrayLike) -> Array:
+        """Return places (..., 3), those without directions moved to where there are some."""
+        return _places(points)
 
     def _both(self, values: ArrayLike, size: int, points: ArrayLike) -> tuple[Array, Array]:
         """Return values (..., size) and the axes (..., 3, 3) there; InputError if they do not fit."""
@@ -172,6 +183,10 @@ class Cylindrical(LocalAxes):
         r = _unit(out - (out @ z)[..., None] * z)
         return np.stack([r, np.cross(z, r), np.broadcast_to(z, r.shape)], axis=-2)
 
+    def _beside(self, points: ArrayLike) -> Array:
+        """Return places (..., 3), those on the axis moved off it."""
+        return _off_axis(_places(points), self.center, self.axis)
+
 
 class Spherical(LocalAxes):
     """Axes r, t (away from the axis) and p (around it).
@@ -199,10 +214,23 @@ class Spherical(LocalAxes):
         p = _unit(np.cross(self.axis, r))
         return np.stack([r, np.cross(p, r), p], axis=-2)
 
+    def _beside(self, points: ArrayLike) -> Array:
+        """Return places (..., 3), those on the axis moved off it."""
+        return _off_axis(_places(points), self.center, self.axis)
+
 
 def _places(points: ArrayLike) -> Array:
     """Return places (..., 3) in m."""
     return finite(points, "places of local axes", ("...", 3))
+
+
+def _off_axis(points: Array, center: Array, axis: Array) -> Array:
+    """Return places (..., 3), those on an axis moved off it along the coordinate axis farthest from it."""
+    z, out = _unit(axis), points - center
+    across = np.eye(3)[int(np.abs(z).argmin())]
+    size = float(np.abs(out).max(initial=0.0)) or 1.0
+    there = np.linalg.norm(np.cross(z, out), axis=-1, keepdims=True) <= 1e-3 * BESIDE * size
+    return np.where(there, points + BESIDE * size * across, points)
 
 
 def _unit(v: Array) -> Array:

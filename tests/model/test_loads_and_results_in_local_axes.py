@@ -91,6 +91,26 @@ def test_lames_tube_by_a_sector_on_inclined_rollers_with_its_components_by_name(
     assert any("stress rr" in text for one in axes for text in (one.get_title(), one.get_ylabel()))
 
 
+@pytest.mark.parametrize("axes", [kl.Cylindrical, kl.Spherical])
+def test_results_on_the_axis_have_the_components_beside_it(axes):
+    """A solid bar under a uniform stress: at its axis r is along x."""
+    mesh = kl.box((1, 1, 1), (2, 2, 2), origin=(-0.5, -0.5, 0))
+    model, around = kl.Model(mesh, kl.Isotropic3D(E=1e9, nu=0.0)), axes()
+    model.symmetry("x-")
+    model.symmetry("y-")
+    model.symmetry("z-")
+    model.add(kl.Traction("x+", (1e6, 0, 0)))
+    result = model.solve()
+    stress = result.stress("node", around)
+    at = np.flatnonzero(np.isclose(mesh.points[:, :2], 0).all(axis=1))
+    i = 0 if axes is kl.Cylindrical else 1
+    top = at[mesh.points[at, 2] > 0]
+    assert np.abs(stress[top, i] - 1e6).max() < 1
+    assert np.abs(np.delete(stress[top], i, axis=1)).max() < 1
+    assert np.isfinite(result.field("displacement", "node", around)).all()
+    assert {"stress rr [Pa]", "displacement r [m]"} <= set(result.columns(around))
+
+
 @pytest.mark.parametrize("at", ["node", "averaged", "element"])
 def test_components_are_those_of_turned_tensors(at):
     mesh, _ = tube(2, 2, 1)
