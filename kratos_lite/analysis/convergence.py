@@ -64,6 +64,11 @@ class ConvergenceStudy(Tabular):
         """Lowest and highest exact value by the band."""
         return float(self.values[-1] - self.band), float(self.values[-1] + self.band)
 
+    @property
+    def _limit(self) -> str:
+        """What the extrapolated value is, in words."""
+        return "last value" if self.warning else "extrapolated"
+
     def table(self) -> list[tuple[str, str]]:
         """Return a row for each mesh and the value with its band."""
         rows = [("quantity", self.of)]
@@ -73,9 +78,7 @@ class ConvergenceStudy(Tabular):
             words += f", change {change:+.3e}" if np.isfinite(change) else ""
             rows.append((f"{n:g} unknowns", words + (f", order {p:.2f}" if np.isfinite(p) else "")))
         low, high = self.interval
-        rows.append(
-            ("extrapolated", f"{self.extrapolated:.8g}, between {low:.8g} and {high:.8g} {self.unit}")
-        )
+        rows.append((self._limit, f"{self.extrapolated:.8g}, between {low:.8g} and {high:.8g} {self.unit}"))
         return rows + ([("warning", self.warning)] if self.warning else [])
 
     def plot(self, path: str | Path | None = None, *, size: tuple[float, float] = (6, 4)) -> Any:
@@ -93,10 +96,8 @@ class ConvergenceStudy(Tabular):
         from kratos_lite.view.canvas import checked_size, save  # pictures alone need these
         from kratos_lite.view.curves import study_figure
 
-        ends = self.extrapolated, *self.interval
-        figure = study_figure(
-            self.unknowns, self.values, ends, self.unit, self.of, checked_size(size) or size
-        )
+        ends, labels = (self.extrapolated, *self.interval), (self._limit, self.of)
+        figure = study_figure(self.unknowns, self.values, ends, self.unit, labels, checked_size(size) or size)
         if path is not None:
             save(figure, path)
         return figure

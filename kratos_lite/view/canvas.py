@@ -70,17 +70,20 @@ def axes_for_curves(figure: Any, place: Any, size: Any) -> Any:
     return axes
 
 
-def new_plot(size: tuple[float, float], *units: str, log: bool = False) -> tuple[Any, Any]:
-    """Return a figure with axes for curves alone, numbers with prefixes of their units, if any."""
+def new_plot(size: tuple[float, float], *units: str, log: str = "") -> tuple[Any, Any]:
+    """Return a figure with axes for curves alone, numbers with prefixes of their units, if any.
+
+    `log` names the axes with a logarithmic scale, such as ``"xy"``.
+    """
     figure = empty(size)
     from matplotlib.ticker import EngFormatter, LogLocator
 
-    scale = "log" if log else "linear"
-    axes = figure.add_subplot(xscale=scale, yscale=scale)
+    scales = ["log" if name in log else "linear" for name in "xy"]
+    axes = figure.add_subplot(xscale=scales[0], yscale=scales[1])
     axes.spines[["top", "right"]].set_visible(False)
-    for axis, unit in zip((axes.xaxis, axes.yaxis), units, strict=True):
+    for axis, unit, scale in zip((axes.xaxis, axes.yaxis), units, scales, strict=True):
         axis.set_major_formatter(EngFormatter(unit) if unit in PREFIXED else f"{{x:g}} {unit}".rstrip())
-        if log:
+        if scale == "log":
             axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
             axis.set_minor_formatter("")
     return figure, axes

@@ -26,21 +26,28 @@ def line_figure(
 
 
 def study_figure(
-    x: Array, values: Array, ends: tuple[float, float, float], unit: str, of: str, size: tuple[float, float]
+    x: Array,
+    values: Array,
+    ends: tuple[float, float, float],
+    unit: str,
+    labels: tuple[str, str],
+    size: tuple[float, float],
 ) -> Any:
-    """Return a figure of values (k,) against unknowns (k,), of their limit and the ends of its band."""
-    figure, axes = new_plot(size, "", unit)
+    """Return a figure of values (k,) against unknowns (k,), of their limit and the ends of its band.
+
+    The labels are those of the limit and of the values.
+    """
+    figure, axes = new_plot(size, "", unit, log="x")
     axes.plot(x, values, "o-", color=BLUE, lw=1.8, ms=5, label="values")
-    axes.axhline(ends[0], color=RED, lw=1.2, ls=(0, (4, 3)), label="extrapolated", zorder=1)
+    axes.axhline(ends[0], color=RED, lw=1.2, ls=(0, (4, 3)), label=labels[0], zorder=1)
     axes.axhspan(*ends[1:], color=RED, alpha=0.1, lw=0, zorder=0)
-    axes.set_xscale("log")
-    label(axes, "unknowns", of, "")
+    label(axes, "unknowns", labels[1], "")
     return figure
 
 
 def response_figure(frequencies: Array, amplitudes: Array, unit: str, of: str) -> Any:
     """Return a figure of amplitudes (f,), in a unit, against frequencies (f,) in rad/s."""
-    figure, axes = new_plot((6, 4), "", unit, log=True)
+    figure, axes = new_plot((6, 4), "", unit, log="xy")
     axes.plot(frequencies, amplitudes, color=BLUE, lw=1.8)
     label(axes, "frequency in rad/s", of, "")
     return figure
@@ -50,7 +57,7 @@ def convergence_figure(
     unknowns: Array, errors: Array, goal: float | None, of: str, title: str, size: tuple[float, float]
 ) -> Any:
     """Return a figure of relative errors (k,) of a quantity against unknowns (k,), and of its goal."""
-    figure, axes = new_plot(size, "", "", log=True)
+    figure, axes = new_plot(size, "", "", log="xy")
     unknowns, percent = unknowns[errors > 0], 100 * errors[errors > 0]
     axes.plot(unknowns, percent, "o-", color=BLUE, lw=1.8, ms=5, label="reported")
     if goal is not None:

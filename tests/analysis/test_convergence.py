@@ -152,7 +152,7 @@ def test_the_table_and_the_picture(tmp_path):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"meshes": 2}, "meshes of a model that is refined must be a whole number ≥ 3; got 2"),
+        ({"meshes": 2}, "meshes of a model that is refined must be a whole number from 3 to 20; got 2"),
         ({"model": lambda h: beam(), "meshes": 3}, "must have shape"),
         ({"model": lambda h: beam(), "meshes": [1.0, 0.5]}, "three or more sizes > 0 that fall"),
         ({"model": lambda h: beam(), "meshes": [1.0, 0.5, 0.7]}, "three or more sizes > 0 that fall"),
@@ -180,3 +180,11 @@ def test_a_model_with_a_motion_is_not_refined():
     wheel.add(kl.ale.Rotation("z", rate=10.0))
     with pytest.raises(KratosLiteError, match="cannot be carried over to a finer one"):
         kl.converge(wheel, kl.MeanDisplacement("outer", "z"))
+
+
+def test_the_last_value_is_not_called_extrapolated():
+    values = iter((1.0, 2.0, 1.5))
+    study = kl.converge(lambda h: beam(), lambda result: next(values), (3, 2, 1))
+    assert study.warning
+    assert "last value" in str(study)
+    assert "extrapolated" not in str(study)
