@@ -15,7 +15,7 @@ from kratos_lite.analysis.report import vector
 from kratos_lite.assembly.nonlinear_assembly import internal_forces
 from kratos_lite.elements.surface import area_vectors, face_rule
 from kratos_lite.elements.tables import tabulate
-from kratos_lite.errors import MeshError
+from kratos_lite.errors import InputError, MeshError
 from kratos_lite.mesh import Mesh, with_rows
 from kratos_lite.mesh.locate import Located
 from kratos_lite.mesh.topology import faces_of
@@ -164,6 +164,8 @@ def cut_of(mesh: Mesh, where: Any) -> tuple[str, Array, Pieces]:
         and isinstance(where[0], (str, tuple, list, np.ndarray))
     ):
         return _by_plane(mesh, plane_of(where, np.zeros(3), "a section"))
+    if isinstance(where, str) and "=" in where and where not in mesh.parts:
+        raise InputError(f"a section by a plane is a pair such as ('x', 0.5); got {where!r}")
     return _around(mesh, where)
 
 
@@ -241,6 +243,9 @@ def _located(mesh: Mesh, pieces: Pieces, name: str) -> tuple[Located, Array]:
     block, cell, points, xi, area = (np.concatenate(part) for part in zip(*flat, strict=True))
     kept = area.any(axis=1)
     if not kept.any():
-        raise MeshError(f"the section {name} cuts no element and meets no face between two elements")
+        raise MeshError(
+            f"the section {name} cuts no element and meets no face between two elements; the force in a tie "
+            "or in a bolt is that of one of its sides, result.reaction('part.z-')"
+        )
     located = Located(mesh, points, starts[block] + cell, block, cell, xi)
     return located[kept], area[kept]

@@ -125,7 +125,10 @@ def find_elements(where: WhereElements, part: Part | None, mesh: Cells) -> Ints:
     if part is not None:
         rows = part.elements if len(part.elements) else elements_among(part.nodes, mesh)
         if mesh.whole and not len(rows):
-            raise MeshError(f"part {where!r} has no elements")
+            raise MeshError(
+                f"part {where!r} has no elements, as none has all its nodes there; name a part of the body, "
+                "not of its surface, or give rows of elements"
+            )
         return rows
     m = sum(map(len, mesh.blocks))
     if _is_mask(where):

@@ -40,7 +40,8 @@ def opposite(mesh: Mesh, a: Ints, b: Ints, shift: Array | None = None) -> Ints:
             return np.asarray(a[at])
     raise ModelError(
         "periodic boundaries and cuts need nodes that lie opposite one another; "
-        f"there are {len(a)} and {len(b)}, not in the same places"
+        f"there are {len(a)} and {len(b)}, not in the same places: mesh both faces alike, in Gmsh by "
+        "Periodic Surface, in a box with bricks, as its tetrahedra may differ from face to face"
     )
 
 

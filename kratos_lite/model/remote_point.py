@@ -87,6 +87,7 @@ class RemotePoint(Coupling):
         if not len(self.mesh.nodes(where)):
             raise ModelError(f"a remote point needs nodes, and there is none in {short(where)}")
         arms = self.mesh.points[self.mesh.nodes(where)] - self.point
+        self.moves_all = (self.mesh.nodes(where),) if rigid else ()
         self._sizes = np.repeat([1.0, float(np.abs(arms).max()) or 1.0], 3)  # m, that a rotation moves nodes
         if not rigid:
             self._weights(self.mesh)
@@ -147,7 +148,7 @@ class RemotePoint(Coupling):
         self.fixed[:], self.values[:] = False, 0.0
         self._supports.changed()
 
-    def load(self, force: ArrayLike, moment: ArrayLike = (0.0, 0.0, 0.0)) -> Resultant:
+    def load(self, force: ArrayLike = (0.0, 0.0, 0.0), moment: ArrayLike = (0.0, 0.0, 0.0)) -> Resultant:
         """Return a load on the point, for `Structure.add` or a load case.
 
         Parameters
@@ -193,7 +194,7 @@ class RemotePoint(Coupling):
         return self._motion(result)[..., 3:]
 
     def reaction(self, result: Any) -> tuple[Array, Array]:
-        """Return force and moment about the point of all that holds the part there.
+        """Return force and moment about the point of all that holds the part there, but for ties of parts.
 
         Parameters
         ----------
@@ -206,7 +207,10 @@ class RemotePoint(Coupling):
         """
         mesh = self._mesh_of(result)
         nodes = mesh.nodes(self.where)
-        both = result.reactions[nodes].ravel() @ rigid_modes(mesh.points[nodes], self.point)
+        analysis = None if mesh is self.mesh else getattr(result, "_analysis", None)
+        supports = analysis.model.supports if analysis else self._supports
+        reactions = supports.past_ties(result.reactions) if mesh is supports.mesh else result.reactions
+        both = reactions[nodes].ravel() @ rigid_modes(mesh.points[nodes], self.point)
         return both[:3], both[3:]
 
     def _motion(self, result: Any) -> Array:

@@ -40,7 +40,7 @@ from kratos_lite.solvers.constraints import rigid_modes
 from kratos_lite.tabular import Tabular
 from kratos_lite.time_series import Factor
 from kratos_lite.typing import Array, ArrayLike
-from kratos_lite.validation import finite, function_or_none, instance, number
+from kratos_lite.validation import finite, function_or_none, instance, number, short
 
 
 class Attachment(ABC):
@@ -600,8 +600,9 @@ class Structure(Tabular):
         E = np.zeros((3, 3)) if old is None else old.strain
         if strain is not None:
             E = finite(strain, "a mean strain")
+            if E.shape not in ((6,), (3, 3)):
+                raise InputError(f"a mean strain is xx yy zz xy yz zx, or (3, 3); got {short(strain)}")
             E = E if E.shape != (6,) else voigt.tensor(E * voigt.HALF_SHEAR)
-            E = finite(E, "a mean strain", (3, 3))
         if old is None or not old.has(a, b):
             old = Periodic(self.mesh, [*(old.parts if old else []), (a, b)], E)
         self.supports.add_tie(old.strained(E))

@@ -12,7 +12,7 @@ from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh, Where
 from kratos_lite.model.loads.base import key_of
 from kratos_lite.model.local_axes import LocalAxes
-from kratos_lite.model.ties import Coupling
+from kratos_lite.model.ties import Coupling, PartTie
 from kratos_lite.solvers.constraints import ConstraintMap, Constraints, constraint_map, eliminate
 from kratos_lite.time_series import function_of
 from kratos_lite.typing import Array, ArrayLike, Csr, Ints, Mask
@@ -97,6 +97,7 @@ class Supports:
         self.conditions: list[DirichletCondition] = []
         self.ties: list[Coupling] = []
         self._every: tuple[int, Constraints] = (-1, Constraints.none())
+        self._of_parts = Constraints.none()  # those of ties of parts
         self.version = self.value_version = 0
         self.springs: Csr | None = None  # (3n, 3n) N/m
         self._dependents: tuple[int, Constraints] = (-1, Constraints.none())
@@ -284,10 +285,16 @@ class Supports:
             return self._constraints + self._inclined if len(self._inclined) else self._constraints
         if self._every[0] != self.value_version:
             every = self._constraints + self._inclined
-            for tie in self.ties:
-                known = self.fixed.copy()
+            held, self._of_parts = self.fixed.copy(), Constraints.none()
+            for tie in sorted(self.ties, key=lambda tie: not tie.moves_all):
+                known = held.copy()
                 known.flat[every.dependents] = True
-                every += tie.constraints(self.fixed, known)
+                new = tie.constraints(self.fixed, known)
+                every += new
+                if isinstance(tie, PartTie):
+                    self._of_parts += new
+                for nodes in tie.moves_all:
+                    held[nodes] = True
             self._every = self.value_version, every
         return self._every[1]
 
@@ -423,6 +430,19 @@ class Supports:
         acts = self.fixed.copy()
         acts.flat[np.concatenate([self.constraints.dependents, self.constraints.independents])] = True
         return np.where(acts, self.on_independents(residual), 0.0)
+
+    def past_ties(self, reactions: Array) -> Array:
+        """Return reactions (n, 3) with the forces in ties of parts passed on to what tied nodes follow."""
+        ties = self._of_parts if len(self.constraints) else Constraints.none()
+        if not len(ties):
+            return reactions
+        out, none = reactions.copy(), np.zeros_like(self.fixed)
+        ties = eliminate(ties, none, np.zeros_like(self.values), self.name)
+        np.add.at(
+            out.reshape(-1), ties.independents, ties.weights * reactions.flat[ties.dependents][ties.owner]
+        )
+        out.flat[ties.dependents] = 0.0
+        return out
 
     def on_independents(self, forces: Array) -> Array:
         """Return nodal forces (n, 3) with those on hanging nodes passed on to their independents."""

@@ -36,12 +36,14 @@ class Coupling(ABC):
     place : type and nodes, or the coupling itself.
     nodes_of : of parts that are tied to one another.
     equations : what K depends on, beside `place`; the constants of constraints do not belong to it.
+    moves_all : parts whose nodes it moves alone, which other ties leave to it.
     """
 
     title = "tie"
     place: Hashable
     nodes_of: Sequence[Ints] = ()
     equations: Hashable = None
+    moves_all: Sequence[Ints] = ()
 
     @abstractmethod
     def constraints(self, fixed: Mask, known: Mask) -> Constraints:

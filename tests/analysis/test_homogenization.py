@@ -226,8 +226,8 @@ def test_what_is_no_cell_is_refused(make, message):
     [
         ("x-", "x-", {}, "one part twice"),
         ("x-", (1.0, 1.0, 1.0), {}, "there are 9 and 1, not in the same places"),
-        ("x-", "y+", {}, "there are 9 and 9, not in the same places"),
-        ("x-", "x+", {"strain": (1, 2, 3)}, "a mean strain"),
+        ("x-", "y+", {}, "there are 9 and 9, not in the same places: mesh both faces alike"),
+        ("x-", "x+", {"strain": (1, 2, 3)}, "a mean strain is xx yy zz xy yz zx, or"),
         ("x-", "x+", {"strain": np.full(6, np.nan)}, "a mean strain"),
         ("x-", "left", {}, "there is no part 'left'"),
     ],

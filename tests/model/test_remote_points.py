@@ -63,6 +63,15 @@ def test_force_and_moment_at_the_point_are_those_in_all(rigid):
     assert np.abs([*(force - FORCE), *(moment - MOMENT)]).max() < 1e-6 * 30
 
 
+def test_a_moment_alone():
+    model = bar()
+    model.fix("x-")
+    point = model.rigid("x+", POINT)
+    model.add(point.load(moment=(0, 50.0, 0)))
+    _, moment = kl.reaction_resultant(model, model.solve(), "x-", center=(0, 0, 0))
+    assert np.abs(moment - [0, -50.0, 0]).max() < 1e-6
+
+
 def test_far_away_rigid_and_spread_are_alike():
     """St. Venant: what differs decays over the depth of the bar; the tip turns alike."""
     stress = []

@@ -49,6 +49,39 @@ def test_constant_stress_passes(pair):
     assert stress_error(pulled(blocks(pair)).solve()) < 1e-10
 
 
+@pytest.mark.parametrize("other", [(2, 3, 2), (1, 1, 2)], ids=["a depends", "b depends"])
+@pytest.mark.parametrize("part", ["a.y-", "b.y-"])
+def test_a_rigid_part_may_hold_nodes_of_a_tied_face(part, other):
+    """Held, it is a support; free, it moves all without stress and carries the load, whatever is tied."""
+    held, model = (tied(blocks("8N 8N", other=other)) for _ in range(2))
+    held.fix(part)
+    hub = model.rigid(part, (0.5, -1, 0.5))
+    hub.fix("xyz")
+    hub.fix_rotation("xyz")
+    for each in (held, model):
+        each.add(kl.Traction("y+", (1e6, 2e6, -1e6)))
+    result = model.solve()
+    assert np.abs(result.u - held.solve().u).max() < 1e-9 * np.abs(result.u).max()
+    force, moment = hub.reaction(result)
+    assert np.abs(force + result.report.total_load).max() < 1e-3
+    arms = model.mesh.points - hub.point
+    assert np.abs(moment + np.cross(arms, result.loads).sum(axis=0)).max() < 1e-3
+    moved = tied(blocks("8N 8N", other=other))
+    hub = moved.rigid(part, (0.5, -1, 0.5))
+    hub.fix("xyz", (1e-3, 2e-3, 0))
+    hub.fix_rotation("xyz", (0, 1e-3, 2e-3))
+    result = moved.solve()
+    assert max(np.abs(stress).max() for stress in result.stress()) < 1e-3
+    assert np.abs(hub.rotation(result) - [0, 1e-3, 2e-3]).max() < 1e-12
+
+
+def test_a_tie_said_again_replaces_the_first_in_either_order():
+    model = pulled(blocks("8N 8N"))
+    model.tie("b.x-", "a.x+", tolerance=0.1)
+    assert sum(name == "tie" for name, _ in model.table()) == 1
+    assert stress_error(model.solve()) < 1e-10
+
+
 @pytest.mark.parametrize("pair", ["8N 8N", "20N 10N", "4N 4N"])
 def test_constant_stress_passes_where_supports_hold_nodes_of_both_sides(pair):
     model = pulled(blocks(pair))
