@@ -178,11 +178,15 @@ def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
 
 
 def _document_of(mesh: Mesh) -> Document:
-    """Return a mesh with names for files of its sides, such as ``z+`` of a box, and hanging nodes tied."""
+    """Return a mesh with names for files of sides, such as ``z+`` of a box, and hanging nodes tied."""
     from kratos_lite.io.formats.document import Document
     from kratos_lite.io.kratos.to_document import constraints_of, kratos_name
     from kratos_lite.mesh import SIDES
     from kratos_lite.model.supports import hanging_constraints
 
-    parts = {kratos_name(name) if name in SIDES else name: p for name, p in mesh.parts.items()}
+    ends = (*SIDES, "cut-", "cut+")
+    parts = {
+        kratos_name(name) if name.rpartition(".")[2] in ends else name: part
+        for name, part in mesh.parts.items()
+    }
     return Document(mesh.replace(parts=parts), constraints=constraints_of(mesh, hanging_constraints(mesh)))

@@ -149,15 +149,16 @@ class FreeMotions:
         if not wrong.any():
             return
         text = f"the supports leave rigid-body modes free: {self.described(wrong)}"
+        fix = f"Fix more nodes or components{', or tie the parts' * (self.blocks.count > 1)}"
         if not off.any():
-            raise ModelError(f"{text}. Fix more nodes or components")
+            raise ModelError(f"{text}. {fix}")
         p = int(off.argmax())
         center, arm = (values[self.of_block == p][0] for values in self.blocks.frames)
         moment = self._by_component(np.cross(points - center, total))[p]
         force, turn = _text(self._by_component(total)[p], roundoff[p]), _text(moment, roundoff[p] * arm)
         raise ModelError(
             f"{text}, and its loads do not balance: together they are {force} N and {turn} N m about "
-            f"{_text(center)}. Fix more nodes or components, or {cure}"
+            f"{_text(center)}. {fix}, or {cure}"
         )
 
     @cached_property
@@ -192,10 +193,21 @@ class FreeMotions:
         ids = self.blocks.mesh.node_ids[self.blocks.node[first]]
         moving = ((b, words) for b in chosen.tolist() if (words := _motions(self.modes[b])))
         return "; ".join(
+            f"{self._in_part(int(self.blocks.node[first[b]])) * (len(ids) > 1)}"
             f"the {'body' if len(ids) == 1 else f'component of node {ids[b]}'} ({count[b]} nodes) can still "
             f"move: {words}{' (it hangs on a node or an edge only)' * bool(several[b] & self._hangs[b])}"
             for b, words in islice(moving, MAX_PROBLEMS)
         )
+
+    def _in_part(self, node: int) -> str:
+        """Return the smallest named part with elements that a node is in, in words; "" without one."""
+        mesh = self.blocks.mesh
+        sizes = {
+            name: len(part.nodes)
+            for name, part in mesh.parts.items()
+            if len(part.elements) and node in part.nodes
+        }
+        return f"in part {min(sizes, key=sizes.__getitem__)!r} " if sizes else ""
 
     def notes(self, strained: Mask) -> list[str]:
         """Return a note of the components (p,) among those strained that are free."""

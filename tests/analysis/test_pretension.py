@@ -139,6 +139,12 @@ def test_each_bolt_keeps_its_force():
     assert pulls(model) == [0, 6e3]
 
 
+def test_a_joined_and_cut_mesh_is_a_file_of_kratos(tmp_path):
+    kl.write(tmp_path / "two.mdpa", two_bolts().mesh)
+    parts = kl.read(tmp_path / "two.mdpa").mesh.parts
+    assert {"one", "one.z_minus", "other.cut_plus"} <= set(parts)
+
+
 def test_the_sides_of_a_cut_may_be_named_in_either_order():
     model = two_bolts()
     model.pretension("one.cut+", "one.cut-", force=1e3)

@@ -75,6 +75,14 @@ def test_a_rigid_part_may_hold_nodes_of_a_tied_face(part, other):
     assert np.abs(hub.rotation(result) - [0, 1e-3, 2e-3]).max() < 1e-12
 
 
+def test_parts_that_are_not_tied_are_named():
+    model = kl.Model(blocks("8N 8N"), STEEL)
+    model.fix("a.x-")
+    model.add(kl.Traction("b.x+", (1e6, 0, 0)))
+    with pytest.raises(kl.ModelError, match=r"in part 'b' the component of .*, or tie the parts, or add"):
+        model.solve()
+
+
 def test_a_tie_said_again_replaces_the_first_in_either_order():
     model = pulled(blocks("8N 8N"))
     model.tie("b.x-", "a.x+", tolerance=0.1)
