@@ -34,7 +34,7 @@ from kratos_lite.model.matching import BoltForce, Cut, Periodic
 from kratos_lite.model.remote_point import RemotePoint
 from kratos_lite.model.spurious_modes import check_rules, check_spurious_modes
 from kratos_lite.model.supports import DirichletCondition, Supports, axis_numbers
-from kratos_lite.model.ties import Tie, name_of
+from kratos_lite.model.ties import Tie
 from kratos_lite.quadrature import Rule
 from kratos_lite.solvers.constraints import rigid_modes
 from kratos_lite.tabular import Tabular
@@ -625,10 +625,10 @@ class Structure(Tabular):
         Parameters
         ----------
         a, b : the sides, parts with faces whose nodes lie at the same places, as of ``kl.split``.
-        force : N, tension in the bolt: a load by `name`; in load cases without it the bolt is loose.
+        force : N, tension in the bolt: a load; in load cases without it the bolt is loose.
         length : m, by which the bolt becomes shorter.
         amplitude : of the force, as for `add`.
-        name : of the load; if not given "pretension", or "pretension of a" beside that of another bolt.
+        name : of the load, as for `add`.
 
         Raises
         ------
@@ -660,16 +660,10 @@ class Structure(Tabular):
         length = None if length is None else number(length, "the length of a pretension", least=-np.inf)
         load = None if force is None else BoltForce(a, b, force)
         cut = Cut(self.mesh, a, b, length)
-        kept = [other for other in self.loads if not cut.is_pulled_by(getattr(other, "load", other))]
-        taken = [key for key, other in self.named_loads.items() if any(other is one for one in kept)]
-        if name is None:
-            name = f"pretension of {name_of(a, cut.nodes_of[0])}" if "pretension" in taken else "pretension"
-        if load is not None and name in taken:
-            raise ModelError(f"another load has the name {name!r}; give the pretension a name of its own")
-        self.supports.add_tie(cut)
-        self.loads[:] = kept
+        self.loads[:] = [other for other in self.loads if not cut.is_pulled_by(getattr(other, "load", other))]
         if load is not None:
             self.add(load, amplitude=amplitude, name=name)
+        self.supports.add_tie(cut)
 
     def rigid(self, where: Where, point: ArrayLike) -> RemotePoint:
         """Let all nodes of a part follow a point rigidly, by small rotations.

@@ -62,6 +62,18 @@ def test_a_bolt_is_tightened_by_a_force_and_locked(turn):
     assert abs(float(worked.reaction("bolt.cut-").sum(axis=0) @ turn[:, 2]) / exact - 1) < 1e-9
 
 
+@pytest.mark.parametrize("name", [None, "M12"])
+@pytest.mark.parametrize("amplitude", [None, lambda t: 1.0])
+def test_a_length_takes_the_place_of_a_force_of_any_name(name, amplitude):
+    model = joint()
+    model.pretension("bolt.cut-", "bolt.cut+", force=2 * FORCE, name=name)
+    model.pretension("bolt.cut-", "bolt.cut+", force=FORCE, name="again", amplitude=amplitude)
+    assert len(model.loads) == 1
+    assert abs(bolt_force(model.solve()) / FORCE - 1) < 1e-9
+    model.pretension("bolt.cut-", "bolt.cut+", length=0.0)
+    assert not model.loads
+
+
 def test_load_cases_take_the_force_or_leave_the_bolt_loose():
     model = joint()
     model.pretension("bolt.cut-", "bolt.cut+", force=FORCE, name="M12")
@@ -69,27 +81,6 @@ def test_load_cases_take_the_force_or_leave_the_bolt_loose():
     cases = model.solve_cases({"tight": [tight], "loose": [further(model)], "both": [tight, further(model)]})
     forces = [bolt_force(cases[name]) for name in ("tight", "loose", "both")]
     assert np.abs(np.array(forces) - [FORCE, 0, FORCE]).max() < 1e-6 * FORCE
-
-
-def test_a_cut_has_one_force_and_cuts_have_names_of_their_own():
-    model = joint()
-    model.pretension("bolt.cut-", "bolt.cut+", force=3 * FORCE, amplitude=2.0, name="first")
-    model.pretension("bolt.cut-", "bolt.cut+", force=FORCE, name="second")
-    assert list(model.named_loads) == ["second"]
-    assert abs(bolt_force(model.solve()) / FORCE - 1) < 1e-9
-    both = kl.join({"one": kl.box(cells=(1, 1, 2)), "two": kl.box(cells=(1, 1, 2), origin=(3, 0, 0))})
-    for name in ("one", "two"):
-        cut = both.parts[name].nodes[both.points[both.parts[name].nodes, 2] == 0.5]
-        both = kl.split(both, cut, (f"{name}-", f"{name}+"))
-    two = kl.Model(both, BOLT)
-    two.fix(lambda X: (X[:, 2] == 0) | (X[:, 2] == 1))
-    two.pretension("one-", "one+", force=1e5)
-    with pytest.raises(kl.ModelError, match="give each cut a name of its own"):
-        two.pretension("two-", "two+", force=2e5)
-    two.pretension("two-", "two+", length=0.0)
-    two.pretension("two-", "two+", force=2e5, name="other")
-    stress = two.solve().stress("element")[:, 2]
-    assert np.abs(stress - [1e5, 1e5, 2e5, 2e5]).max() < 1e-4
 
 
 def test_large_displacements_are_warned_of():
@@ -128,14 +119,14 @@ def test_each_bolt_keeps_its_force():
     model = two_bolts()
     model.pretension("one.cut-", "one.cut+", force=1e3)
     model.pretension("other.cut-", "other.cut+", force=2e3)
-    assert sorted(model.named_loads) == ["pretension", "pretension of other.cut-"]
     assert pulls(model) == [1e3, 2e3]
     model.pretension("one.cut-", "one.cut+", length=0.0)
     assert pulls(model) == [0, 2e3]
     model.pretension("other.cut-", "other.cut+", force=3e3, amplitude=2.0)
     assert pulls(model) == [0, 6e3]
-    with pytest.raises(kl.ModelError, match="another load has the name"):
-        model.pretension("one.cut-", "one.cut+", force=1e3, name=next(iter(model.named_loads)))
+    model.add(kl.Gravity((0, 0, -9.81)), name="weight")
+    with pytest.raises(kl.ModelError, match="another load 'weight'"):
+        model.pretension("one.cut-", "one.cut+", force=1e3, name="weight")
     assert pulls(model) == [0, 6e3]
 
 
