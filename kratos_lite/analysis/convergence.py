@@ -45,7 +45,8 @@ class ConvergenceStudy(Tabular):
     orders : (k,) observed order with the two meshes before; nan for the first two and where there is none.
     extrapolated : Richardson's value f_0; outside the asymptotic range the last value.
     band : the exact value lies by that much beside the last value, on the safe side: the grid convergence
-        index 1.25 |f_0 - f_3|; outside the asymptotic range three times the range of the last three values.
+        index, 1.25 times the distance of f_0 and f_3; outside the asymptotic range three times the range
+        of the last three values.
     warning : why the values are not in the asymptotic range; "" where they are.
     """
 
