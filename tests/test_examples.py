@@ -264,3 +264,40 @@ def test_twisted_rubber_resists_and_pushes(tmp_path, script):
     assert abs(torque[0] / (slope * np.pi / 4) - 1) < 0.05
     assert abs(push[1] / push[0] / 4 - 1) < 0.06  # Poynting: with the square of small angles
     assert (tmp_path / "rubber.png").stat().st_size > 10_000
+
+
+def test_bolts_of_a_tight_flange_feel_little_of_the_moment(tmp_path, script):
+    out = script(EXAMPLES / "bolted_flange.py", tmp_path / "flange.png")
+    bolts = np.array([float(word) for word in re.search(r"bolts: \[(.*?)\]", out).group(1).split()])
+    loose = number(r"loose: up to (\S+) kN", out)
+    assert abs(loose - 4 * 1.0 / (8 * 0.21)) < 0.005  # M = 1 kN m about y
+    added = bolts - 40.0
+    assert np.abs(added + added.max() * np.cos(np.pi / 4 * np.arange(8))).max() < 0.011
+    assert 0.01 * loose < added.max() < 0.1 * loose
+    assert number(r"joint, with the moment: pressure (\S+)", out) > 0  # else the tie would pull
+    assert number(r"above the bolts: (\S+) N m", out) == pytest.approx(1000.0, abs=1e-3)
+    assert (tmp_path / "flange.png").stat().st_size > 10_000
+
+
+def test_a_foundation_block_swings_as_one_mass_up_and_down(tmp_path, script):
+    out = script(EXAMPLES / "foundation_block.py", tmp_path / "block.png")
+    assert number(r"the curve is within (\S+) %", out) < 1.0
+    mass, spring, damping = 9000.0, 1.2e8, 0.05
+    assert number(r"along z: (\S+) µm", out) == pytest.approx(1e9 / spring / (2 * damping), rel=5e-3)
+    assert number(r"along z: .* at (\S+) Hz", out) == pytest.approx(
+        (spring / mass) ** 0.5 / (2 * np.pi), rel=6e-3
+    )
+    # to the side a rigid block slides by u and rocks by w about its middle, 0.5 m above the soil
+    height, rock = 0.5, 2500 * 3.0 * (1 + 4) / 12 + 200 + 1500 * 1.0**2
+    M = np.array([[mass, 1500 * 1.0], [1500 * 1.0, rock]])
+    K = 6e7 * np.array([[1.0, -height], [-height, height**2]]) + np.diag([0, 4e7 * 1.5 * 2**3 / 12])
+    exact = np.sqrt(np.linalg.eigvals(np.linalg.solve(M, K))) / (2 * np.pi)
+    found = [float(word) for word in re.findall(r"along x: .* at (\S+) Hz", out)]
+    assert found == pytest.approx(sorted(exact.real), rel=0.01)
+
+
+def test_an_arch_carries_the_deck(tmp_path, script):
+    out = script(EXAMPLES / "stiffest_arch.py", tmp_path / "arch.png")
+    assert number(r"compliance (\S+) of the first", out) < 0.25
+    assert number(r"volume (\S+)", out) == pytest.approx(0.35, abs=1e-3)
+    assert (tmp_path / "arch.png").stat().st_size > 10_000
