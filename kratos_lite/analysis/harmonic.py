@@ -21,6 +21,7 @@ from kratos_lite.errors import InputError, ModelError, SolveError
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.loads import Load, ScaledLoad, TimeDependentLoad
 from kratos_lite.model.loads.temperature import Temperature
+from kratos_lite.model.matching import Cut
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.plan import FALLBACK_LIMIT
 from kratos_lite.tabular import Tabular, in_units, unit_name
@@ -287,6 +288,12 @@ def _check(model: Structure) -> None:
         raise ModelError("harmonic response takes no motion of the material; take model.transient()")
     if model.supports.motions:
         raise ModelError("a support that is a function of time is no amplitude; prescribe a number")
+    for tie in model.supports.ties:
+        if isinstance(tie, Cut) and tie.length != 0.0:
+            raise ModelError(
+                f"{tie}: a bolt is at rest in the response about its tight state; lock it by "
+                "model.pretension(a, b, length=0.0)"
+            )
 
 
 def _forces(model: Structure, e: EquationsOfMotion, loads: HarmonicLoads | None) -> Complexes:

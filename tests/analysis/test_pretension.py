@@ -157,6 +157,22 @@ def test_a_locked_cut_without_length_is_none():
     assert np.abs(cut.modes(4)[0] / whole.modes(4)[0] - 1).max() < 1e-8
 
 
+def test_a_bolt_is_at_rest_in_a_harmonic_response():
+    whole = kl.Model(kl.box((0.1, 0.1, LENGTH), (2, 1, 4), "8N"), BOLT)
+    cut = kl.Model(kl.split(whole.mesh, lambda X: np.isclose(X[:, 2], LENGTH / 2)), BOLT)
+    for model in (whole, cut):
+        model.fix("z-")
+        model.fix("z+", "z")
+    options = {"loads": [kl.Traction("z+", (1e3, 0, 0))], "damping": 0.02}
+    for how in ({"force": 1e3}, {"length": 1e-5}):
+        cut.pretension("cut-", "cut+", **how)
+        with pytest.raises(kl.ModelError, match="about its tight state; lock it"):
+            cut.harmonic([0.0], **options)
+    cut.pretension("cut-", "cut+", length=0.0)
+    one, other = (m.harmonic([0.0, 100.0], **options).at((0, 0, LENGTH)) for m in (whole, cut))
+    assert np.abs(one - other).max() < 1e-8 * np.abs(one).max()
+
+
 def test_half_a_bolt_on_a_plane_of_symmetry():
     """Supports hold both sides of the cut across its normal."""
     model = kl.Model(kl.split(kl.box((1, 1, 2), (2, 2, 4), "20N"), lambda X: X[:, 2] == 1), SLEEVE)
