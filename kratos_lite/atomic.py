@@ -29,10 +29,7 @@ WAITING: ContextVar[list[tuple[Path, Path]] | None] = ContextVar("waiting", defa
 def read_arrays(
     path: str | Path, names: Sequence[str], what: str, others: bool = False
 ) -> dict[str, Numbers]:
-    """Return arrays of an .npz file by name, and all others there are if wanted.
-
-    InputError if it is damaged or not `what` it should be.
-    """
+    """Return arrays of an .npz file by name, all if wanted; InputError if it is not `what` it should be."""
     try:
         with np.load(io.BytesIO(Path(path).read_bytes()), allow_pickle=False) as file:
             return {name: np.asarray(file[name]) for name in (*names, *(file.files if others else ()))}

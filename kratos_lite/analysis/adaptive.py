@@ -172,10 +172,8 @@ def _next(
 
 
 def _marked(level: Level, aim: float, pieces: int) -> Ints:
-    """Return the fewest elements that hold a fraction θ of the squared error, or that bring it to its aim.
-
-    Source: Dörfler 1996, marking.
-    """
+    """Return the fewest elements that hold a fraction θ of the squared error, or that bring it to its aim."""
+    # Source: Dörfler 1996, marking.
     squares = level.squares
     order = np.argsort(-squares)
     held, total = np.cumsum(squares[order]), squares.sum()

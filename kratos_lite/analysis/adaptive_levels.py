@@ -100,10 +100,8 @@ class Level:
 
     @property
     def is_blind(self) -> bool:
-        """Whether there is no error to be seen because elements are too few or too simple to see one by.
-
-        Linear elements of a twisted bar may have stresses that go on smoothly from one to the next.
-        """
+        """Whether there is no error to be seen because elements are too few or too simple to see one by."""
+        # Linear elements of a twisted bar may have stresses that go on smoothly from one to the next.
         simple = self.model.mesh.n_elements < FEW or (self.order == 1 and self.before is None)
         return simple and self.norm > 0 and self.reported <= NEGLIGIBLE
 

@@ -56,17 +56,11 @@ def adjoint_of(
 
 
 def gradient_of(
-    result: Any,
-    quantity: Quantity,
-    wrt: str,
-    model: Structure,
-    adjoint: Callable[..., Array],
+    result: Any, quantity: Quantity, wrt: str, model: Structure, adjoint: Callable[..., Array]
 ) -> Array:
-    """Return the derivative of a quantity; see `Result.gradient`.
-
-    With residuals r = f - ∫ B^T σ dV and the adjoint z, dQ/dp = ∂Q/∂p + z·∂r/∂p where u stays.
-    Source: Haftka & Gürdal, Elements of Structural Optimization (1992), section 7.2.
-    """
+    """Return the derivative of a quantity; see `Result.gradient`."""
+    # With residuals r = f - ∫ B^T σ dV and the adjoint z, dQ/dp = ∂Q/∂p + z·∂r/∂p where u stays. Source:
+    # Haftka & Gürdal, Elements of Structural Optimization (1992), section 7.2.
     by = "stiffness" if choice(wrt, "wrt", WRT) == "E" else wrt
     E: Array | float = _moduli(result) if wrt == "E" else 1.0
     if by == "coordinates":

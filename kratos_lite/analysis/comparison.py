@@ -20,25 +20,15 @@ from kratos_lite.validation import instance
 
 @dataclass(frozen=True, eq=False)
 class Difference:
-    """Difference of a field at the nodes of the first result.
+    """Difference of a field at the nodes of the first result."""
 
-    Attributes
-    ----------
-    values : (k, 3) or (k, 6), second minus first, at the nodes that are compared.
-    maximum : its largest size: length of a vector, √(σ:σ) of a stress.
-    l2 : root of its mean square over the volume.
-    relative_maximum, relative_l2 : beside the same of the field itself; nan where that is 0.
-    node : id of the node where it is largest.
-    point : (3,) m, the place of this node.
-    """
-
-    values: Array
-    maximum: float
-    l2: float
-    relative_maximum: float
+    values: Array  # (k, 3) or (k, 6), second minus first, at the nodes that are compared
+    maximum: float  # length of a vector, √(σ:σ) of a stress
+    l2: float  # root of the mean square over the volume
+    relative_maximum: float  # beside the same of the field itself; nan where that is 0
     relative_l2: float
-    node: int
-    point: Array
+    node: int  # id of the node where it is largest
+    point: Array  # (3,) m, its place
 
     def row(self, unit: str) -> str:
         """Return its line of the table."""

@@ -36,13 +36,7 @@ class ElementFields:
     u0 : (n, 3) displacements in m without stress; none if not given.
     """
 
-    def __init__(
-        self,
-        mesh: Mesh,
-        groups: Sequence[ElementGroup],
-        u: Array,
-        u0: Array | None = None,
-    ) -> None:
+    def __init__(self, mesh: Mesh, groups: Sequence[ElementGroup], u: Array, u0: Array | None = None) -> None:
         self.mesh = mesh
         self.groups = list(groups)
         self.u = u

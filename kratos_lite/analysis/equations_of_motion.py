@@ -238,10 +238,7 @@ class EquationsOfMotion:
         return A
 
     def solver(self, time: float, m: float, c: float, k: float, h: float) -> Solve:
-        """Return what solves (m M + c C + k K) u = f + reactions, u of a step of h s.
-
-        It is kept as long as the matrix is the same.
-        """
+        """Return what solves (m M + c C + k K) u = f + reactions; it is kept for the same matrix."""
         key = m, c, k, *self.rates(time)
         if self._kept is None or self._kept[0] != key:
             near = None if self.is_symmetric(time, c) else self._elastic(m, c, k)

@@ -72,12 +72,10 @@ WORST = 3  # least number of elements of that hundredth; meshes of less than twe
 def energy_error(
     recovered: Array, averaged: Array, energy: float, groups: Sequence[ElementGroup], mesh: Mesh
 ) -> ErrorEstimate:
-    """Return the estimate of squared differences to recovered and to averaged stresses.
-
-    Both underestimate the error near singular points and in coarse meshes; the recovered ones, polynomials of
-    patches, may overestimate it many times where a few cells make up a curved body.  So both are raised by
-    factors measured on problems with known solutions, and the smaller counts.
-    """
+    """Return the estimate of squared differences to recovered and to averaged stresses."""
+    # Both underestimate the error near singular points and in coarse meshes; the recovered ones, polynomials
+    # of patches, may overestimate it many times where a few cells make up a curved body. So both are raised
+    # by factors measured on problems with known solutions, and the smaller counts.
     squares = {"recovery": recovered, "averaging": averaged}
     sums = {name: float(values.sum()) for name, values in squares.items()}
     method = min(SAFETY, key=lambda name: SAFETY[name] ** 2 * sums[name])
@@ -197,21 +195,17 @@ def error_of(
     strained: Array,
     recovery: Recovery,
 ) -> QuantityError:
-    """Return the estimated error of a quantity of a result.
-
-    Q has the adjoint z, the displacement under the load ∂Q/∂u, with supports at rest. The error e of a
-    solution is orthogonal to all displacements of the mesh, so that Q(e) = a(e, z) = a(e, e_z) with the
-    error e_z of the adjoint solution on the same mesh: the product of both errors, element by element,
-    with recovered stresses in place of the exact ones; near singular points averaged ones show more, and
-    the safe figure is not smaller than what they say. A reaction is the virtual work of a unit
-    displacement of its part; the adjoint has this displacement as its support. The adjoint of a stress at
-    a point is too singular: the error of the mean around the point takes its place, and what recovery
-    shows of the difference is added; the safe figure also has the spread of recovered less own stresses
-    around the point.
-
-    Source: Becker & Rannacher, Acta Numerica 10 (2001) 1-102; Ainsworth & Oden, A Posteriori Error
-    Estimation in Finite Element Analysis (2000), chapter 8.
-    """
+    """Return the estimated error of a quantity of a result."""
+    # Q has the adjoint z, the displacement under the load ∂Q/∂u, with supports at rest. The error e of a
+    # solution is orthogonal to all displacements of the mesh, so that Q(e) = a(e, z) = a(e, e_z) with the
+    # error e_z of the adjoint solution on the same mesh: the product of both errors, element by element, with
+    # recovered stresses in place of the exact ones; near singular points averaged ones show more, and the
+    # safe figure is not smaller than what they say. A reaction is the virtual work of a unit displacement of
+    # its part; the adjoint has this displacement as its support. The adjoint of a stress at a point is too
+    # singular: the error of the mean around the point takes its place, and what recovery shows of the
+    # difference is added; the safe figure also has the spread of recovered less own stresses around the
+    # point. Source: Becker & Rannacher, Acta Numerica 10 (2001) 1-102; Ainsworth & Oden, A Posteriori Error
+    # Estimation in Finite Element Analysis (2000), chapter 8.
     motion, value = quantity.motion(result), quantity.value(result)
     z = adjoint_of(result, quantity, quantity.load(result), adjoint, model.attached, ADJOINT_TOLERANCE)
     warnings = _shared(result, model.supports.fixed, motion != 0) if motion.any() else []

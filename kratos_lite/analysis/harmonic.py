@@ -244,11 +244,9 @@ def _directly(e: EquationsOfMotion, R: Array, s: Complexes, factors: Any, _: Any
 def _by_modes(
     e: EquationsOfMotion, R: Array, s: Complexes, factors: Any, given: Any
 ) -> tuple[Any, Any, Array]:
-    """Return modes with static solutions less their part (b, n, 3), and the factors (f, b) of all.
-
-    What the modes leave of the response is that of K alone.  Source: Craig & Kurdila, Fundamentals of
-    Structural Dynamics (2006), section 11.4 (mode acceleration).
-    """
+    """Return modes with static solutions less their part (b, n, 3), and the factors (f, b) of all."""
+    # What the modes leave of the response is that of K alone. Source: Craig & Kurdila, Fundamentals of
+    # Structural Dynamics (2006), section 11.4 (mode acceleration).
     (k, m), (omega, zeta, count) = factors, given
     natural, shapes = _modes(e, count, ENOUGH * float(omega.max()))
     if zeta.shape not in ((), natural.shape):

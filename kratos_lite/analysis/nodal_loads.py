@@ -69,11 +69,7 @@ class AppliedLoads:
     """The nodal forces of the loads of a structure at a time; what does not change is made once."""
 
     def __init__(
-        self,
-        model: Structure,
-        system: ConstrainedSystem,
-        groups: list[ElementGroup],
-        initial: bool = True,
+        self, model: Structure, system: ConstrainedSystem, groups: list[ElementGroup], initial: bool = True
     ) -> None:
         self.model, self.system, self._groups = model, system, groups
         self._initial = initial  # whether the initial stress is a load, as where stresses are C ε alone

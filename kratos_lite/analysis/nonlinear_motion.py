@@ -74,10 +74,8 @@ class NonlinearMotion(EquationsOfMotion):
         return known.internal
 
     def solver(self, time: float, m: float, c: float, k: float, h: float) -> Solve:
-        """Return what solves m M u + c C u + k (r(u₀ + u) - r(u₀)) = f + reactions, u₀ of the history.
-
-        Tangents are solved with the multigrid of the body at rest.
-        """
+        """Return what solves m M u + c C u + k (r(u₀ + u) - r(u₀)) = f + reactions, u₀ of the history."""
+        # Tangents are solved with the multigrid of the body at rest.
         plan, made = stepped(len(self.system.constraint_map.free)), super().solver
         tangents = Tangents(
             self.system,

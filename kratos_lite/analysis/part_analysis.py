@@ -28,14 +28,7 @@ FREE = 1e-12
 
 
 class PartResult(Result):
-    """The result of one part; what its table and report say holds for all parts together.
-
-    Recovered stresses at nodes between parts are those of the elements of this part.
-
-    Attributes
-    ----------
-    partition : how the parts meet.
-    """
+    """The result of one part; what its table and report say holds for all parts together."""
 
     partition: Partition
 

@@ -191,13 +191,7 @@ class LineValues(PointValues):
         return self.stress - self.linear
 
     def columns(self) -> dict[str, Numbers]:
-        """Return distance, coordinates and fields, with units in the headers.
-
-        Returns
-        -------
-        dict of str to (n,) array
-            ``kl.write("line.csv", values)`` writes them.
-        """
+        """Return distance, coordinates and fields, with units in the headers."""
         return labelled({"distance [m]": self.distance, **super().columns()}, self._fields.mesh.units)
 
     def plot(

@@ -231,13 +231,7 @@ class MeanDisplacement(Quantity):
         return float((self.load(result) * result.u).sum())
 
     def load(self, result: Fields) -> Array:
-        """Return ∫ N dA / A (n, 3) along the axis, or ∫ N dV / V.
-
-        Raises
-        ------
-        ModelError
-            The part has neither a face on the boundary nor an element.
-        """
+        """Return ∫ N dA / A (n, 3) along the axis, or ∫ N dV / V."""
         load = self._over_part(result).forces(result.mesh, result.groups)
         return load / load.sum()
 
@@ -439,10 +433,8 @@ class StressAt(Quantity):
         return out
 
     def spread(self, result: Fields) -> float:
-        """Return the root mean square of recovered less own stresses at Gauss points around the point.
-
-        A component that happens to be recovered without a difference has half of the largest one's.
-        """
+        """Return the root mean square of recovered less own stresses at Gauss points around the point."""
+        # A component that happens to be recovered without a difference has half of the largest one's.
         group, _, smooth, volume = self._recovered(result)
         squares = (smooth - result.stress_in(group)) ** 2 * volume[..., None]
         spread = np.sqrt(squares.sum(axis=(0, 1)) / volume.sum())

@@ -261,10 +261,8 @@ class QuasiStaticAnalysis(ModelInTime):
         return report.iterations
 
     def _balance(self, u: Array, load: Load, dt: float, before: float = np.inf) -> tuple[float, Response]:
-        """Return the relative residual at displacements (3a,), and what is known there.
-
-        After a residual before it that is small, this one is converged, as a rule, and needs no tangent.
-        """
+        """Return the relative residual at displacements (3a,), and what is known there."""
+        # After a residual before it that is small, this one is converged, as a rule, and needs no tangent.
         near = before <= self.tolerance**0.5
         internal, K, states = self.assembly.evaluate(u, self.states, dt, self.heating, tangent=not near)
         force, tangent = load
@@ -281,10 +279,8 @@ class QuasiStaticAnalysis(ModelInTime):
     def _newton(
         self, load: Callable[[Array], Load], field: Array, dt: float
     ) -> tuple[Array, Response, list[float]]:
-        """Return displacements, what the law says there, and residuals under a load and a field.
-
-        The iteration begins on the parabola through the last three states, or else at the last one.
-        """
+        """Return displacements, what the law says there, and residuals under a load and a field."""
+        # The iteration begins on the parabola through the last three states, or else at the last one.
         guess = self.u + dt * (self.rate + (dt + self.last) * self.curvature)
         jump, closer = (field - self.prescribed.part(u) for u in (self.u, guess))
         if np.abs(closer).max(initial=0.0) <= 0.5 * np.abs(jump).max(initial=0.0) and self.last:
@@ -326,10 +322,8 @@ class QuasiStaticAnalysis(ModelInTime):
         return LinearSolver(system.assembled(), *how, groups=system.groups, springs=springs)
 
     def _shortened(self, u: Array, du: Array, r: Array, load: Callable[[Array], Load], dt: float) -> Array:
-        """Return a correction, shortened until the residual does little work over it.
-
-        Source: Crisfield, Non-linear Finite Element Analysis, vol. 1 (1991), section 9.2.
-        """
+        """Return a correction, shortened until the residual does little work over it."""
+        # Source: Crisfield, Non-linear Finite Element Analysis, vol. 1 (1991), section 9.2.
         constraints = self.system.constraint_map
         q, s = du[constraints.free], 1.0
         before = float(q @ r)

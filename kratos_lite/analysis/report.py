@@ -45,18 +45,11 @@ class RefinementStep:
 
 @dataclass(frozen=True)
 class StepReport:
-    """How a step, or a part of one, has converged.
+    """How a step, or a part of one, has converged."""
 
-    Attributes
-    ----------
-    time : s, at its end.
-    residuals : relative residual before each correction and at the end.
-    part : fraction of the step; below 1 where it was cut.
-    """
-
-    time: float
-    residuals: tuple[float, ...]
-    part: float = 1.0
+    time: float  # s, at its end
+    residuals: tuple[float, ...]  # relative, before each correction and at the end
+    part: float = 1.0  # fraction of the step; below 1 where it was cut
 
     @property
     def iterations(self) -> int:

@@ -79,10 +79,8 @@ IN_MM = "are lengths in mm (read with scale=1e-3, or --scale mm) and pressures i
 
 
 def check_deformation(model: Structure, groups: Sequence[ElementGroup], u: Array) -> list[str]:
-    """Warn of displacements u (n, 3) in m, or their strains, too large for linear theory, or next to nothing.
-
-    Those of a model without units, softer than everything there is, are whatever they are.
-    """
+    """Warn of displacements u (n, 3) in m, or strains, too large for linear theory, or next to nothing."""
+    # Those of a model without units, softer than everything there is, are whatever they are.
     mesh, start, prescribed = model.mesh, model.initial_displacement, model.supports.values
     moved = u if start is None else u - start
     if not moved.any():
@@ -112,10 +110,8 @@ def check_deformation(model: Structure, groups: Sequence[ElementGroup], u: Array
 
 
 def largest_elongation(mesh: Mesh, u: Array) -> float:
-    """Return the largest change of length of the lines between corners of elements, relative.
-
-    It is a lower bound of the largest principal strain; of a large mesh, of `SAMPLE` elements.
-    """
+    """Return the largest change of length of the lines between corners of elements, relative."""
+    # It is a lower bound of the largest principal strain; of a large mesh, of `SAMPLE` elements.
     found = 0.0
     for block in mesh.blocks:
         if block.shape is None or not len(block):

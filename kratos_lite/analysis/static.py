@@ -19,12 +19,7 @@ from kratos_lite.analysis.prepared import (
     system_of,
 )
 from kratos_lite.analysis.result import Result, result_of
-from kratos_lite.analysis.solution_checks import (
-    Phases,
-    check_arguments,
-    check_deformation,
-    check_solution,
-)
+from kratos_lite.analysis.solution_checks import Phases, check_arguments, check_deformation, check_solution
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model import checks
 from kratos_lite.model.loads import Load

@@ -8,12 +8,7 @@ from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.modal import critical_rates
 from kratos_lite.analysis.nodal_loads import at_temperature, initial_loads, stress_load
 from kratos_lite.analysis.result import Result, result_of
-from kratos_lite.analysis.solution_checks import (
-    Phases,
-    check_arguments,
-    check_deformation,
-    check_solution,
-)
+from kratos_lite.analysis.solution_checks import Phases, check_arguments, check_deformation, check_solution
 from kratos_lite.model.checks import check_loads, equilibrium
 from kratos_lite.model.loads.base import equal_loads
 from kratos_lite.model.structure import Structure

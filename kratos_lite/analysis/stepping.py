@@ -224,11 +224,9 @@ class BodyStepper(Stepper):
         body.clock.time = begin
 
     def _part(self, h: float) -> Array:
-        """Advance by h s; return the load on the body, reactions included, at the middle.
-
-        Loads that depend on the velocity see the old one first; then the step is taken again with the mean
-        of old and new, so that they too are of second order.
-        """
+        """Advance by h s; return the load on the body, reactions included, at the middle."""
+        # Loads that depend on the velocity see the old one first; then the step is taken again with the mean
+        # of old and new, so that they too are of second order.
         body, q, u = self.body, self.body.q, self.body.u
         load: Array = self.integrator.step(body, h, u)
         if any(load.follows_velocity for load in body.loads):

@@ -95,11 +95,9 @@ class ElementGroup:
 
     @property
     def has_dilatations(self) -> bool:
-        """Whether the dilatations of the elements are known.
-
-        Those of the library's B-bar elements are their projected ones, those of enhanced elements their
-        means: the modes take up the others.  Factors of the stiffness are not split into pressures.
-        """
+        """Whether the dilatations of the elements are known."""
+        # Those of the library's B-bar elements are their projected ones, those of enhanced elements their
+        # means: the modes take up the others. Factors of the stiffness are not split into pressures.
         return self.factors is None and not self.element.custom and self.strain_tables() is not None
 
     def tables(self, rule: Rule | None = None) -> tuple[Rows, Array, Array, Array]:

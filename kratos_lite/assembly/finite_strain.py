@@ -145,12 +145,10 @@ def nodal_gradients(points: Array, groups: Sequence[ElementGroup]) -> tuple[Arra
 def highest_frequency(
     points: Array, groups: Sequence[ElementGroup], q: Array | None = None, lumped: bool = False
 ) -> float:
-    """Return an upper bound of the largest angular frequency in 1/s: the largest of any element alone.
-
-    Source: Irons & Treharne, Proc. 3rd Conf. Matrix Methods in Struct. Mech., Wright-Patterson (1971).
-    It takes one dense eigenproblem (3k, 3k) for each element, some 0.1 ms with eight nodes; without q,
-    elements that are translations of each other take one together.
-    """
+    """Return an upper bound of the largest angular frequency in 1/s: the largest of any element alone."""
+    # Source: Irons & Treharne, Proc. 3rd Conf. Matrix Methods in Struct. Mech., Wright-Patterson (1971). It
+    # takes one dense eigenproblem (3k, 3k) for each element, some 0.1 ms with eight nodes; without q,
+    # elements that are translations of each other take one together.
     largest = 0.0
     for group in groups:
         if not group.material.density > 0:

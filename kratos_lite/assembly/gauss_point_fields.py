@@ -45,11 +45,9 @@ def displaced(points: Array, group: ElementGroup, u: Array, stress: bool = True)
 def clearly_positive(
     points: Array, nodes: Ints | Rows, element: type[KinematicLinear], dN: Array, g: int
 ) -> Mask:
-    """Return a mask (m,) of the elements whose det J is so clearly > 0 that none needs a closer look.
-
-    At every point of `dN` (g', k, 3) it is above 1e-9 of its mean at the first `g`, and above a thousand
-    times what rounding of the coordinates makes of it.  Without kernels every element needs the closer look.
-    """
+    """Return a mask (m,) of the elements whose det J is so clearly > 0 that none needs a closer look."""
+    # At every point of `dN` (g', k, 3) it is above 1e-9 of its mean at the first `g`, and above a thousand
+    # times what rounding of the coordinates makes of it. Without kernels every element needs the closer look.
     module = compiled("gauss")
     if module is None:
         return np.zeros(len(nodes), dtype=bool)
@@ -185,10 +183,7 @@ def virtual_work(X: Array, group: ElementGroup, u: Array, v: Array) -> Array:
 
 
 def work_by_coordinates(points: Array, group: ElementGroup, u: Array, v: Array) -> Array:
-    """Return the derivative (n, 3) in N of v·∫ B^T σ dV of a group by the nodes, u and v (n, 3) in m.
-
-    By central differences of each element.
-    """
+    """Return the derivative (n, 3) in N of v·∫ B^T σ dV of a group by the nodes, by central differences."""
     total, nodes = np.zeros_like(points), group.nodes
     X, u, v = (values[nodes] for values in (points, u, v))
     X = X - X.mean(axis=1, keepdims=True)

@@ -26,11 +26,7 @@ REST = np.zeros((3, 4))
 
 
 def inertia_matrices(
-    points: Array,
-    groups: Sequence[ElementGroup],
-    pattern: Pattern,
-    names: str,
-    velocity: Array = REST,
+    points: Array, groups: Sequence[ElementGroup], pattern: Pattern, names: str, velocity: Array = REST
 ) -> dict[str, Array]:
     """Return matrices by name, each as data (nnz,) on the pattern: M in kg, G in kg/s, H in kg/s²."""
     data = {name: np.zeros(len(pattern.indices)) for name in names}

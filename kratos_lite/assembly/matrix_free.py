@@ -90,11 +90,9 @@ def _tables(group: ElementGroup) -> tuple[Any, ...]:
 
 @remembered
 def factors(shape: type[Shape], rule: Rule) -> tuple[Ints, Array, Array, Array] | None:
-    """Return how the gradients of a shape at the points of a rule fall apart into factors, if they do.
-
-    They do where the points are a grid of n along each axis, n = 2 or 3, and the shape functions have no
-    higher degree than n - 1 in any coordinate.
-    """
+    """Return how the gradients of a shape at the points of a rule fall apart into factors, if they do."""
+    # They do where the points are a grid of n along each axis, n = 2 or 3, and the shape functions have no
+    # higher degree than n - 1 in any coordinate.
     n = round(len(rule.weights) ** (1 / 3))
     order: Ints = np.lexsort(np.round(rule.points, 12).T).astype(np.int64)
     axis = rule.points[order[:n], 0]

@@ -20,11 +20,9 @@ from kratos_lite.typing import Array, Ints
 
 @remembered
 def extrapolation(element: type[KinematicLinear], rule: Rule) -> Array:
-    """Return the matrix (n, g) from values at Gauss points to values at nodes.
-
-    The values are fitted by least squares with the functions of the corner cell (trilinear in a
-    hexahedron), where stresses of displacement elements are most accurate, and read off at the nodes.
-    """
+    """Return the matrix (n, g) from values at Gauss points to values at nodes."""
+    # The values are fitted by least squares with the functions of the corner cell (trilinear in a
+    # hexahedron), where stresses of displacement elements are most accurate, and read off at the nodes.
     corner = element.shape.linear()
     if corner is None:
         return np.full((len(element.nodes), len(rule)), 1 / len(rule))

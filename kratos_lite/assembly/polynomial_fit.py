@@ -113,11 +113,9 @@ class Polynomials:
 
 
 def fit(samples: Samples, patches: Lists, weights: Array, degree: Ints, means: Ints) -> Polynomials:
-    """Return the polynomial of each patch.
-
-    A monomial that the points of a patch cannot tell from those before it is left out.  What means cannot
-    tell, as across a single layer, is then fitted to the residuals of all samples.
-    """
+    """Return the polynomial of each patch."""
+    # A monomial that the points of a patch cannot tell from those before it is left out. What means cannot
+    # tell, as across a single layer, is then fitted to the residuals of all samples.
     if module := kernels("recovery"):
         numbers = (as_rows(samples.offset), as_rows(patches.start), as_rows(patches.entries))
         tables = (as_double(weights), as_rows(degree), as_rows(means))

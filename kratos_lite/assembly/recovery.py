@@ -50,14 +50,12 @@ class Sampling:
 
 @remembered
 def sampling(element: type[KinematicLinear], rule: Rule) -> Sampling:
-    """Return how the values of an element class are sampled.
-
-    Hexahedra of degree 2 have their most accurate stresses at 2 x 2 x 2 points (Barlow, Int. J. Numer. Meth.
-    Eng. 10 (1976) 243-251): trilinear functions are fitted to those at more Gauss points.  In linear
-    hexahedra and wedges they lie at the center.  One degree above that of the element is fitted elsewhere,
-    but not in tetrahedra, which have no such points; in these half of the residual belongs to the nodes, and
-    nothing of it in linear ones and linear pyramids.
-    """
+    """Return how the values of an element class are sampled."""
+    # Hexahedra of degree 2 have their most accurate stresses at 2 x 2 x 2 points (Barlow, Int. J. Numer.
+    # Meth. Eng. 10 (1976) 243-251): trilinear functions are fitted to those at more Gauss points. In linear
+    # hexahedra and wedges they lie at the center. One degree above that of the element is fitted elsewhere,
+    # but not in tetrahedra, which have no such points; in these half of the residual belongs to the nodes,
+    # and nothing of it in linear ones and linear pyramids.
     shape, T, points = element.shape, None, rule.points
     corner = shape.linear() or shape
     means = shape.degree == 1 and shape.cell in ("hexahedron", "wedge")
@@ -206,11 +204,9 @@ class Recovery:
             self._last = u, nodal
 
     def products(self, u: Array, z: Array, n_elements: int) -> tuple[Array, Array]:
-        """Return ∫ (σ* - σ) : C⁻¹ : (σ* - σ)' dV of each element, (m,) in J, of two displacements (n, 3).
-
-        With recovered and with averaged σ*.  Prestress is given and no part of the error.  σ* is kept for the
-        first of them alone.
-        """
+        """Return ∫ (σ* - σ) : C⁻¹ : (σ* - σ)' dV of each element, (m,) in J, of two displacements (n, 3)."""
+        # With recovered and with averaged σ*. Prestress is given and no part of the error. σ* is kept for the
+        # first of them alone.
         energies, of_u = np.zeros((2, n_elements)), self._recovered(u)
         of_z = of_u if z is u else self._recovered(z, keep=False)
         for region, (values, nodal), (others, other_nodal) in zip(self.regions, of_u, of_z, strict=True):

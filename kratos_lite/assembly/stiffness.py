@@ -21,10 +21,7 @@ SCATTER_BYTES = 64_000_000
 
 
 def assemble_stiffness(
-    points: Array,
-    groups: Sequence[ElementGroup],
-    pattern: Pattern,
-    progress: Progress | None = None,
+    points: Array, groups: Sequence[ElementGroup], pattern: Pattern, progress: Progress | None = None
 ) -> BlockMatrix:
     """Return the stiffness matrix as 3x3 blocks, (3n, 3n) in N/m."""
     data = np.zeros((len(pattern.indices), 3, 3))
@@ -66,10 +63,7 @@ def add_in_parts(
 
 
 def stress_stiffness(
-    points: Array,
-    groups: Sequence[ElementGroup],
-    pattern: Pattern,
-    stress: Callable[[ElementGroup], Array],
+    points: Array, groups: Sequence[ElementGroup], pattern: Pattern, stress: Callable[[ElementGroup], Array]
 ) -> Array:
     """Return ∫ grad N_i·σ grad N_j dV, data (nnz,) in N/m, of the stresses (m, g, 6) in Pa of each group."""
     data = np.zeros(len(pattern.indices))

@@ -54,10 +54,8 @@ class Iterated:
         return np.stack(x, axis=1).reshape(b.shape)
 
     def correction(self, b: Array) -> Array:
-        """Return about x of one b (n,).
-
-        Source: Eisenstat & Walker, SIAM J. Sci. Comput. 17 (1996) 16-32 (inexact Newton methods).
-        """
+        """Return about x of one b (n,)."""
+        # Source: Eisenstat & Walker, SIAM J. Sci. Comput. 17 (1996) 16-32 (inexact Newton methods).
         return self.equations.solve(b, CORRECTED, start=np.zeros_like(b)).x
 
 

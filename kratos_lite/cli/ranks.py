@@ -42,13 +42,7 @@ def launched(environment: Mapping[str, str] | None = None) -> tuple[int, int, in
 
 
 def share(words: Sequence[str]) -> bool:
-    """Let ranks that were started with ``--backend petsc`` share a command; return whether this one runs it.
-
-    Raises
-    ------
-    InputError
-        Copies of a command were started that would all write the same files; or what ranks need is missing.
-    """
+    """Let ranks of ``--backend petsc`` share a command; return whether this one runs it."""
     rank, size, local = launched()
     if size == 1 or not words or words[0] not in COMMANDS:
         return True

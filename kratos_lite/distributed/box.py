@@ -9,14 +9,7 @@ import numpy as np
 from kratos_lite.distributed.communicator import Alone, world
 from kratos_lite.distributed.partition import Partition
 from kratos_lite.mesh import SIDES, Block, Mesh
-from kratos_lite.mesh.generators import (
-    Counts,
-    corner_and_lengths,
-    counts_of,
-    kind_of,
-    sides_of,
-    unit_cells,
-)
+from kratos_lite.mesh.generators import Counts, corner_and_lengths, counts_of, kind_of, sides_of, unit_cells
 from kratos_lite.typing import Array, Ints
 
 STEPS = 4

@@ -22,18 +22,11 @@ LEAST_GAIN = 0.9
 
 @dataclass(eq=False)
 class Rows:
-    """Rows of blocks of a sparse matrix, with columns by number over all ranks.
+    """Rows of blocks of a sparse matrix, with columns by number over all ranks."""
 
-    Attributes
-    ----------
-    indptr : (m + 1,) int, where each row starts.
-    columns : (nnz,) int.
-    data : (nnz, k), the blocks.
-    """
-
-    indptr: Ints
-    columns: Ints
-    data: Array
+    indptr: Ints  # (m + 1,), where each row starts
+    columns: Ints  # (nnz,)
+    data: Array  # (nnz, k)
 
     def __len__(self) -> int:
         return len(self.indptr) - 1

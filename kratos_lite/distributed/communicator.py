@@ -71,17 +71,10 @@ class Alone:
         yield
 
     def run(self, task: Callable[..., T], *arguments: Any, each: Callable[[int], Any] | None = None) -> T:
-        """Call task(ranks, *arguments) on all ranks, and return what it returns on rank 0, which calls this.
-
-        A task sends and receives on all ranks alike.  It raises a KratosLiteError on all ranks, or before
-        it sends anything inside `agree_on_errors`; whatever else one rank raises ends all of them.
-
-        Parameters
-        ----------
-        task : a function of a module.
-        arguments : the same for all ranks.
-        each : called with the number of a rank, gives one more argument for that rank alone.
-        """
+        """Call task(ranks, *arguments) on all ranks; return what it returns on rank 0, which calls this."""
+        # A task sends and receives on all ranks alike.  It raises a KratosLiteError on all ranks, or before
+        # it sends anything inside `agree_on_errors`; whatever else one rank raises ends all of them.
+        # `each` gives one more argument for the rank of a number.
         return task(self, *arguments, *([] if each is None else [each(0)]))
 
 
@@ -89,12 +82,7 @@ ALONE = Alone()
 
 
 class Ranks(Alone):
-    """The ranks of an MPI communicator.
-
-    Parameters
-    ----------
-    comm : mpi4py communicator.
-    """
+    """The ranks of a communicator of mpi4py."""
 
     def __init__(self, comm: Any) -> None:
         self.comm, self._MPI = comm, _mpi()
@@ -222,12 +210,7 @@ class Ranks(Alone):
 
 
 def world(launched: int = 1) -> Alone:
-    """Return the ranks that mpirun has started, or the single process.
-
-    Parameters
-    ----------
-    launched : processes that a launcher says it has started.
-    """
+    """Return the ranks that mpirun has started, or the single process."""
     comm = _mpi().COMM_WORLD
     if launched > comm.Get_size():
         raise InputError(

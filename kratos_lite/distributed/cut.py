@@ -26,38 +26,19 @@ TILT = 1e-3
 
 @dataclass(eq=False)
 class Part:
-    """The equations of one rank: all elements at its own nodes, and the nodes of these.
+    """The equations of one rank: all elements at its own nodes, and the nodes of these."""
 
-    Attributes
-    ----------
-    points : (n, 3) m.
-    groups : the elements, by indices of the points, without initial stress.
-    own : (m,) int, indices of the own nodes, those whose rows of K this rank has, ascending in `number`.
-    number : (n,) int, number of each node among those with equations of all ranks, from 0, ascending by rank;
-        -1 for the others.
-    free, held : (n, 3) bool, what is free, and what is prescribed; the rest depends on free ones.
-    dependents : of own nodes: equations (3 · number + axis), others on which they depend, and their weights.
-    """
-
-    points: Array
-    groups: list[ElementGroup]
-    own: Ints
-    number: Ints
-    free: Mask
-    held: Mask
-    dependents: Dependents
+    points: Array  # (n, 3) m
+    groups: list[ElementGroup]  # by indices of the points, without initial stress
+    own: Ints  # (m,), the nodes whose rows of K this rank has, ascending in `number`
+    number: Ints  # (n,) among the nodes with equations of all ranks, ascending by rank; -1 for the others
+    free: Mask  # (n, 3); what is neither free nor held depends on free ones
+    held: Mask  # (n, 3)
+    dependents: Dependents  # of own nodes: 3 · number + axis, others on which they depend, and weights
 
 
 class Cut:
-    """A system of equations cut in parts, one for each rank, by the process that has all of it.
-
-    Parameters
-    ----------
-    points : (n, 3) m.
-    groups : the elements, without initial stress.
-    constraints : the map from the free degrees of freedom to all 3n.
-    size : number of ranks.
-    """
+    """A system of equations cut in parts, one for each rank, by the process that has all of it."""
 
     def __init__(
         self, points: Array, groups: Sequence[ElementGroup], constraints: ConstraintMap, size: int
@@ -120,10 +101,8 @@ def dependents_of(constraints: ConstraintMap) -> Dependents:
 
 
 def parts_of(points: Array, groups: Sequence[ElementGroup], size: int) -> Ints:
-    """Return the part, 0 … size - 1, of each element: by METIS where `pymetis` is installed, else by halves.
-
-    The work of an element is taken as the square of its number of nodes.
-    """
+    """Return the part, 0 … size - 1, of each element: by METIS if `pymetis` is installed, else by halves."""
+    # The work of an element is taken as the square of its number of nodes.
     work = np.concatenate([np.full(len(group), group.nodes.shape[1] ** 2) for group in groups])
     if len(work) >= FEW * size and find_spec("pymetis") is not None:
         return metis(groups, work, size)
@@ -150,10 +129,8 @@ def _halve(centers: Array, work: Ints, cells: Ints, first: int, size: int, parts
 
 
 def metis(groups: Sequence[ElementGroup], work: Ints, size: int) -> Ints:
-    """Return the part of each element, by METIS; elements that share a face are neighbors.
-
-    Source: Karypis & Kumar, SIAM J. Sci. Comput. 20 (1998) 359-392.
-    """
+    """Return the part of each element, by METIS; elements that share a face are neighbors."""
+    # Source: Karypis & Kumar, SIAM J. Sci. Comput. 20 (1998) 359-392.
     import pymetis
 
     blocks = [

@@ -29,20 +29,12 @@ CURE_OF_FACTORS = "look for nearly free parts or a large stiffness contrast, or 
 
 @dataclass(frozen=True)
 class Method:
-    """How equations are solved.
+    """How equations are solved."""
 
-    Attributes
-    ----------
-    name : ``direct`` or ``amg``.
-    options : of PETSc, by the user.
-    constrained : whether any rank has dependent degrees of freedom.
-    most : iterations.
-    """
-
-    name: str
-    options: Mapping[str, str | None]
-    constrained: bool
-    most: int
+    name: str  # direct or amg
+    options: Mapping[str, str | None]  # of PETSc, by the user
+    constrained: bool  # whether any rank has dependent degrees of freedom
+    most: int  # iterations
 
     @property
     def takes_own_multigrid(self) -> bool:
@@ -52,18 +44,13 @@ class Method:
 
 
 class Outcome(NamedTuple):
-    """How equations were solved: by what, in how many iterations, how well, or why not.
-
-    Attributes
-    ----------
-    unused : options of the user that PETSc has not asked for.
-    """
+    """How equations were solved: by what, in how many iterations, how well, or why not."""
 
     name: str
     iterations: int
     error: float
     failure: str
-    unused: list[str]
+    unused: list[str]  # options that PETSc has not asked for
 
     def solution(self, x: Array, plan: Plan) -> tuple[Solution, list[str]]:
         """Return the solution x and what is to be said of it; SolveError if it was not found."""
@@ -75,19 +62,7 @@ class Outcome(NamedTuple):
 
 
 class Equations:
-    """The equations of a part; all ranks make them and call each method.
-
-    Parameters
-    ----------
-    ranks : that share the equations.
-    part : of this one.
-    method : of solution.
-    progress : called with the phase and the fraction done, on rank 0.
-
-    Attributes
-    ----------
-    norm : the largest row sum of |K| at nodes with equations.
-    """
+    """The equations of a part; all ranks make them and call each method."""
 
     def __init__(self, ranks: Alone, part: Part, method: Method, progress: Progress | None = None) -> None:
         self.ranks, self._progress = ranks, progress
@@ -96,7 +71,7 @@ class Equations:
         LIVE.add(self)
         own = method.takes_own_multigrid
         K = SharedStiffness(ranks, part, progress, own_rows=not own)
-        self.norm = K.norm()
+        self.norm = K.norm()  # largest row sum of |K| at nodes with equations
         options = options_of(method.name, method.options, not own)
         with plain_errors():
             self._A = self._product(K) if own else self._matrix(K, part)

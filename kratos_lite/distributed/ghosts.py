@@ -12,19 +12,12 @@ from kratos_lite.typing import Ints
 
 
 class Ghosts:
-    """The ghosts of a rank: rows `own`, `own` + 1, … of its nodal arrays, after those of its own nodes.
-
-    All ranks call each method.
-
-    Parameters
-    ----------
-    ranks : the communicator.
-    offsets : (size + 1,) int, the first number of the nodes of each rank.
-    numbers : (g,) int, ascending, the numbers of the ghosts.
-    """
+    """The ghosts of a rank, after its own nodes in nodal arrays; all ranks call each method."""
 
     def __init__(self, ranks: Alone, offsets: Ints, numbers: Ints) -> None:
-        self.ranks, self.offsets, self.numbers = ranks, offsets, numbers
+        self.ranks = ranks
+        self.offsets = offsets  # (size + 1,), the first number of the nodes of each rank
+        self.numbers = numbers  # (g,) of the ghosts, ascending
         self.own = int(offsets[ranks.rank + 1] - offsets[ranks.rank])
         at = np.searchsorted(numbers, offsets)
         self.starts = self.own + at  # the ghosts of each owner follow one another

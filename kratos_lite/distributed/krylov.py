@@ -81,20 +81,7 @@ def options_of(method: str, given: Mapping[str, str | None], multigrid: bool) ->
 
 
 class Krylov:
-    """A solver of PETSc for one matrix, prepared when it is first needed and kept.
-
-    Parameters
-    ----------
-    A : matrix of PETSc.
-    chosen : options that we choose; its own prefix keeps them from other solvers.
-    given : options of the user, which win.
-    most : iterations.
-
-    Attributes
-    ----------
-    ksp : the solver of PETSc.
-    prefix : of its options.
-    """
+    """A solver of PETSc for one matrix, prepared when it is first needed and kept."""
 
     def __init__(
         self,

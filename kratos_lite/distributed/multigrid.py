@@ -24,16 +24,10 @@ FULL_LIMIT = 3000
 
 
 class Level:
-    """One level on this rank: what its kernel calls between steps, with memory of its vectors (all, b).
-
-    Parameters
-    ----------
-    ghosts : copies of nodes of other ranks, behind the own ones; others stand behind them.
-    b : unknowns of a node.
-    """
+    """One level on this rank: what its kernel calls between steps, with memory of its vectors (all, b)."""
 
     def __init__(self, ghosts: Ghosts, b: int) -> None:
-        self.ghosts, self.b, self.ranks = ghosts, b, ghosts.ranks
+        self.ghosts, self.b, self.ranks = ghosts, b, ghosts.ranks  # b unknowns of a node
         self.sum, self.max = ghosts.ranks.sum, ghosts.ranks.max
         self.inverse: Any = None
 
@@ -75,18 +69,11 @@ class Level:
 
 
 class Multigrid:
-    """V-cycles over ranks.  It needs the compiled kernels.
-
-    All ranks call each method.  Levels are added from the finest on; `coarsen` adds the others.
-
-    Attributes
-    ----------
-    levels : from the finest to the coarsest.
-    """
+    """V-cycles over ranks, with compiled kernels alone; all ranks call each method."""
 
     def __init__(self, rank: int) -> None:
         self._kernel = kernels("multigrid").RankMultigrid(DEGREE, RATIO, STRENGTH, rank)
-        self.levels: list[Level] = []
+        self.levels: list[Level] = []  # from the finest to the coarsest
 
     def add_product(self, product: Any, ghosts: Ghosts, fixed: Mask) -> None:
         """Add the finest level, of elements; `fixed` (all, 3) as in `add`."""
@@ -94,14 +81,7 @@ class Multigrid:
         self._kernel.add_product(product, ghosts.own, fixed.ravel().astype(np.uint8), self.levels[-1])
 
     def add(self, A: Any, ghosts: Ghosts, fixed: Mask, P: Any = None) -> None:
-        """Add a level of own rows of blocks, and the way to it from that above.
-
-        Parameters
-        ----------
-        A, P : (indptr, indices, data), the matrix and the prolongator, by place.
-        ghosts : of the level.
-        fixed : (all, b) bool, of own nodes, ghosts, and others behind them.
-        """
+        """Add a level of own rows of blocks A, P the prolongator to the one above; `fixed` is (all, b)."""
         self.levels.append(Level(ghosts, fixed.shape[1]))
         self._kernel.add_matrix(A, fixed.ravel().astype(np.uint8), self.levels[-1], P)
 

@@ -20,27 +20,7 @@ from kratos_lite.typing import Array, Ints, Mask, Numbers
 
 
 class Partition:
-    """What a rank knows of the nodes of its part, which is an ordinary mesh; all ranks make it and call it.
-
-    Each element is in one part, each node in every part that uses it; the lowest of these owns it.
-
-    Parameters
-    ----------
-    ranks : with a part each.
-    mesh : the part of this one.
-
-    Attributes
-    ----------
-    rank, size, sum, max, gather, agree_on_errors : those of the ranks.
-    owner : (n,) int, rank that owns each node.
-    own : (n,) bool, whether this one does.
-    number : (n,) int, number of each node among those of all ranks, from 0, ascending by owner.
-
-    Raises
-    ------
-    MeshError
-        Two parts have the same element, or a node at different places.
-    """
+    """What a rank knows of the nodes of its part, an ordinary mesh; all ranks make it and call it."""
 
     def __init__(self, ranks: Alone, mesh: Mesh) -> None:
         self.ranks, self.rank, self.size = ranks, ranks.rank, ranks.size
@@ -49,12 +29,12 @@ class Partition:
         for block in mesh.blocks:
             self._check_once(block.ids)
         order = np.argsort(mesh.node_ids, kind="stable")
-        self.owner = np.empty(mesh.n_nodes, dtype=np.int64)
+        self.owner = np.empty(mesh.n_nodes, dtype=np.int64)  # rank that owns each node, the lowest of those
         self.owner[order] = _owners(ranks, mesh.node_ids[order], mesh.points[order])
         self.own: Mask = self.owner == ranks.rank
         rows = np.flatnonzero(self.own)
         self.offsets = np.concatenate([[0], np.cumsum(ranks.gather(len(rows)))])
-        self.number = np.full(mesh.n_nodes, -1)
+        self.number = np.full(mesh.n_nodes, -1)  # among the nodes of all ranks, ascending by owner
         self.number[rows] = self.offsets[ranks.rank] + np.arange(len(rows))
         ids = mesh.node_ids[rows]
         by_id = np.argsort(ids, kind="stable")
@@ -104,14 +84,7 @@ class Partition:
     # ---- equations ---------------------------------------------------------------------------------
 
     def equations(self, points: Array, groups: Sequence[ElementGroup], held: Mask) -> Part:
-        """Return the equations of this rank, with all elements at own nodes.
-
-        Parameters
-        ----------
-        points : (n, 3) m.
-        groups : the elements of the part, without initial stress.
-        held : (n, 3) bool, what is prescribed, the same on all ranks that have a node.
-        """
+        """Return the equations of this rank, with all elements at own nodes; `held` (n, 3) is prescribed."""
         has = np.zeros(len(points), dtype=bool)
         for group in groups:
             has[group.nodes] = True

@@ -67,10 +67,8 @@ LIVE: WeakSet[Any] = WeakSet()
 
 
 def _keep_all() -> None:
-    """Keep PETSc from destroying what is left: it ends after Python, which its objects may call.
-
-    To destroy them here would wait for other ranks, which may have ended in another way.
-    """
+    """Keep PETSc from destroying what is left: it ends after Python, which its objects may call."""
+    # To destroy them here would wait for other ranks, which may have ended in another way.
     for one in list(LIVE):
         one.keep()
 

@@ -22,12 +22,10 @@ def communicator(ranks: Alone) -> Any:
 
 
 def petsc_matrix(K: SharedStiffness) -> Any:
-    """Return own rows without what is held as a matrix in single entries (AIJ); those of K change.
-
-    Rows and columns of held degrees of freedom are 0 but for their own diagonal: the matrix stays
-    symmetric and positive definite, and its blocks whole, as multigrid of PETSc needs them.  Multigrid
-    (GAMG) takes no blocks (BAIJ), but single entries with a block size.
-    """
+    """Return own rows without what is held as a matrix in single entries (AIJ); those of K change."""
+    # Rows and columns of held degrees of freedom are 0 but for their own diagonal: the matrix stays symmetric
+    # and positive definite, and its blocks whole, as multigrid of PETSc needs them. Multigrid (GAMG) takes no
+    # blocks (BAIJ), but single entries with a block size.
     PETSc, matrix, own = petsc(), K.K, K.ghosts.own
     assert isinstance(matrix, BlockMatrix)
     A = PETSc.Mat().create(communicator(K.ranks))

@@ -37,16 +37,7 @@ KEPT: dict[int, Equations] = {}
 
 
 class PetscSystem(ConstrainedSystem):
-    """A constrained system that rank 0 has, and of which all ranks assemble and solve a part.
-
-    Parameters
-    ----------
-    points, groups, constraints : as for a `ConstrainedSystem`.
-    ranks : that assemble and solve.
-    options : of PETSc, which win over all others, such as ``-ksp_type cg -pc_type hypre``.
-    solver : ``auto``, ``dense`` and ``direct`` (both MUMPS), or ``amg``.
-    tolerance, progress : as for a `ConstrainedSystem`.
-    """
+    """A constrained system that rank 0 has, and of which all ranks assemble and solve a part."""
 
     def __init__(
         self,
@@ -183,21 +174,7 @@ class PetscSolver:
 
 
 class PartSystem:
-    """K u = f + reactions of a mesh in parts; all ranks make it and call each method.
-
-    Parameters
-    ----------
-    points : (n, 3) m, of the part.
-    groups : its elements.
-    partition : how the parts hang together.
-    held : (n, 3) bool, what is prescribed, the same in all parts that have a node.
-    solver, tolerance, options, progress : as for a `PetscSystem`.
-
-    Attributes
-    ----------
-    unknowns : of all parts.
-    warnings : what is to be said, in words.
-    """
+    """K u = f + reactions of a mesh in parts; all ranks make it and call each method."""
 
     def __init__(
         self,

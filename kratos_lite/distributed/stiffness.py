@@ -29,23 +29,10 @@ from kratos_lite.typing import Array, Ints, Mask, Progress
 
 
 class OneProcess:
-    """The multigrid of one process, on own unknowns.
-
-    Parameters
-    ----------
-    K : of all nodes.
-    free, points : of all nodes, (n, 3).
-    groups : the elements.
-    own : number of own unknowns.
-    """
+    """The multigrid of one process, on own unknowns."""
 
     def __init__(
-        self,
-        K: BlockMatrix | MatrixFree,
-        free: Mask,
-        points: Array,
-        groups: Sequence[ElementGroup],
-        own: int,
+        self, K: BlockMatrix | MatrixFree, free: Mask, points: Array, groups: Sequence[ElementGroup], own: int
     ) -> None:
         self._multigrid = multigrid(K, free.ravel(), points, p_coarse_level(points, groups))
         self._all, self._own = 3 * len(points), own
@@ -58,28 +45,10 @@ class OneProcess:
 
 
 class SharedStiffness:
-    """K of the own nodes of a rank: its rows in blocks, or, of quadratic elements, its product alone.
-
-    All ranks call each method.
-
-    Parameters
-    ----------
-    ranks : the communicator.
-    part : nodes and elements of this rank.
-    progress : called with the phase and the fraction done.
-    own_rows : whether only a matrix of own rows is wanted, for PETSc.
-
-    Attributes
-    ----------
-    points, groups, free, held, number : those of the part in the new order of nodes.
-    """
+    """K of the own nodes of a rank, in blocks or, of quadratic elements, as a product alone."""
 
     def __init__(
-        self,
-        ranks: Alone,
-        part: Part,
-        progress: Progress | None = None,
-        own_rows: bool = False,
+        self, ranks: Alone, part: Part, progress: Progress | None = None, own_rows: bool = False
     ) -> None:
         self.ranks, number = ranks, part.number
         offsets = np.concatenate([[0], np.cumsum(ranks.gather(len(part.own)))])

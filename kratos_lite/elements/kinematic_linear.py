@@ -30,11 +30,7 @@ if TYPE_CHECKING:
 ELEMENTS: Registry[type[KinematicLinear]] = Registry("element")
 """Every element by its class name and by the names that mean the same in files."""
 
-SAME_ELEMENT = (
-    "SmallDisplacementElement",
-    "TotalLagrangian",
-    "Element",
-)
+SAME_ELEMENT = ("SmallDisplacementElement", "TotalLagrangian", "Element")
 """Prefixes of element names in files that are solved as KinematicLinear."""
 UNNAMED = "Element3D"
 """Start of the names that say the number of nodes alone; see `elements.formulations`."""

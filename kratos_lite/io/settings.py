@@ -174,11 +174,9 @@ def inside(folder: Path, name: str, allow_outside: bool = False) -> Path:
 def find_file(
     settings: Settings, key: str, folder: Path, *, outside: bool = False, ending: str = ""
 ) -> tuple[Path, str]:
-    """Return the path of the file that a key names, and a note if it stands somewhere else.
-
-    The path counts from the folder of the run file; older files of Kratos count from another
-    folder, so the last word of the path is looked for beside the run file too.
-    """
+    """Return the path of the file that a key names, and a note if it stands somewhere else."""
+    # The path counts from the folder of the run file; older files of Kratos count from another folder, so the
+    # last word of the path is looked for beside the run file too.
     name = settings.text(key) + ending
     if isdir(name) or isdir(folder / name):  # where the methods of Path refuse names that are too long
         raise settings.error(key, f"{name} is a folder; name a file in it")

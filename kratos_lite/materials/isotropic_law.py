@@ -32,10 +32,9 @@ class IsotropicLaw(Material, family=True):
 
 
 class VonMises(IsotropicLaw, family=True):
-    """Plastic flow along the deviator s of the elastic trial stress, seen from a center.
+    """Plastic flow along the deviator s of the elastic trial stress, seen from a center."""
 
-    Source: Simo & Hughes, Computational Inelasticity (1998), section 3.3.
-    """
+    # Source: Simo & Hughes, Computational Inelasticity (1998), section 3.3.
 
     keeps_volume: ClassVar[bool] = True
 

@@ -20,10 +20,8 @@ def is_solid(block: Block) -> bool:
 
 
 def cell_boxes(points: Array, block: Block) -> tuple[Array, Array]:
-    """Return lowest and highest coordinates (m, 3) that enclose the cells of a block of solids.
-
-    A curved cell deviates from the straight one by at most Σ |N_a| |D_a|, D_a being the distance of node a.
-    """
+    """Return lowest and highest coordinates (m, 3) that enclose the cells of a block of solids."""
+    # A curved cell deviates from the straight one by at most Σ |N_a| |D_a|, D_a being the distance of node a.
     shape = block.known_shape
     low = high = points[block.nodes[:, 0]]
     for a in range(1, shape.corners):  # one after the other: faster than along an axis

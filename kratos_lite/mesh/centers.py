@@ -31,10 +31,8 @@ def mixed(x: Keys) -> Keys:
 
 
 def keys_of(corners: Ints | Rows) -> Keys:
-    """Return a number for each set of nodes (..., k), the same in whatever order they stand.
-
-    It is the sum of the mixed numbers of the nodes, of 64 bits: two sets share it by accident alone.
-    """
+    """Return a number for each set of nodes (..., k), the same in whatever order they stand."""
+    # It is the sum of the mixed numbers of the nodes, of 64 bits: two sets share it by accident alone.
     return mixed(np.asarray(corners).astype(np.uint64)).sum(axis=-1, dtype=np.uint64)
 
 

@@ -140,11 +140,7 @@ def corner_and_lengths(size: Sequence[float], origin: Sequence[float]) -> tuple[
 
 
 def annulus(
-    inner: float,
-    outer: float,
-    width: float,
-    cells: Sequence[int] = (2, 16, 1),
-    element: str = "Element3D20N",
+    inner: float, outer: float, width: float, cells: Sequence[int] = (2, 16, 1), element: str = "Element3D20N"
 ) -> Mesh:
     """Return a hollow cylinder about z with parts ``inner outer z- z+``.
 

@@ -107,10 +107,8 @@ class Located:
 
 
 def locate(mesh: Cells, points: ArrayLike, search: Search) -> Located:
-    """Return the elements that contain points (..., 3), by the inverse isoparametric map.
-
-    A tree of bounding boxes gives the candidates of each point, which are tried nearest first.
-    """
+    """Return the elements that contain points (..., 3), by the inverse isoparametric map."""
+    # A tree of bounding boxes gives the candidates of each point, which are tried nearest first.
     x = finite(points, "points to locate")
     if x.shape[-1:] != (3,):
         raise InputError(f"points to locate must have shape (m, 3) or (3,); got {x.shape}")

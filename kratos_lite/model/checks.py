@@ -79,12 +79,10 @@ def check_geometry(mesh: Mesh, formulation: str | None = None) -> list[str]:
 
 
 def check_jacobians(mesh: Mesh, elements: Sequence[type[KinematicLinear]]) -> list[str]:
-    """Raise MeshError for elements with det J ≤ 0 at a Gauss point or clearly < 0 at a node.
-
-    `elements` holds the class of each block.  det J = 0 at a corner node alone (quarter-point
-    elements) is allowed and noted; so is a slight fold at a node, at most FOLD of the mean det J,
-    which badly shaped but useful elements have.
-    """
+    """Raise MeshError for elements with det J ≤ 0 at a Gauss point or clearly < 0 at a node."""
+    # `elements` holds the class of each block. det J = 0 at a corner node alone (quarter-point elements) is
+    # allowed and noted; so is a slight fold at a node, at most FOLD of the mean det J, which badly shaped but
+    # useful elements have.
     problems = Problems(kind=MeshError)
     flat = folded = 0
     for block, element in zip(mesh.blocks, elements, strict=True):
@@ -234,11 +232,9 @@ def work_of(u: Array, inner: Array, loads: Array, reactions: Array) -> Array:
 
 
 def check_energy(work: Array, rounding: float = 0.0) -> list[str]:
-    """Warn where loads and reactions do another work than twice the strain energy, `work` as of `work_of`.
-
-    Raises SolveError where 5 % are missing.  In thin bodies rounding of K, which no residual shows, makes the
-    body stiffer or softer; strains, and what stresses do, are as exact as the displacements.
-    """
+    """Warn where loads and reactions do another work than twice the strain energy, `work` as of `work_of`."""
+    # Raises SolveError where 5 % are missing. In thin bodies rounding of K, which no residual shows, makes
+    # the body stiffer or softer; strains, and what stresses do, are as exact as the displacements.
     twice, missing = np.abs(work).tolist()
     if missing <= max(1e-3 * twice, rounding):
         return []
@@ -285,17 +281,11 @@ def check_carried(mesh: Mesh, forces: Array, used: Mask) -> None:
 
 
 def equilibrium(
-    points: Array,
-    loads: Array,
-    reactions: Array,
-    internal: Array,
-    roundoff: float = 0.0,
+    points: Array, loads: Array, reactions: Array, internal: Array, roundoff: float = 0.0
 ) -> tuple[float, float]:
-    """Return what forces and moments miss to equilibrium, relative to the sizes of loads and reactions.
-
-    The larger of the sum over all nodes and of what nodes miss one by one, beside the internal load of
-    the stresses.  Forces that are together below `roundoff` in N are rounding, and in balance.
-    """
+    """Return what forces and moments miss to equilibrium, relative to the sizes of loads and reactions."""
+    # The larger of the sum over all nodes and of what nodes miss one by one, beside the internal load of the
+    # stresses. Forces that are together below `roundoff` in N are rounding, and in balance.
     total = loads + reactions
     X = points - points.mean(axis=0)
     size = float(np.abs(loads).sum() + np.abs(reactions).sum())

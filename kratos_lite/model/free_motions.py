@@ -57,10 +57,8 @@ class FreeMotions:
 
     @cached_property
     def _pair(self) -> tuple[Array, Array]:
-        """The motions R of nodes with their components and ∫ N R dV, both (n, 3, k).
-
-        They are orthonormal over the volume of each component.
-        """
+        """The motions R of nodes with their components and ∫ N R dV, both (n, 3, k)."""
+        # They are orthonormal over the volume of each component.
         from kratos_lite.model.loads.body import BodyForce  # rarely needed
 
         mesh, block, (center, size) = self.blocks.mesh, self.blocks.of_node, self.blocks.frames
@@ -105,10 +103,8 @@ class FreeMotions:
 
     @cached_property
     def constrained(self) -> Mask:
-        """Components (n, 3), one for each free motion, that hold these firmly.
-
-        Gram-Schmidt on the rows of R: each is that along which what remains of the motions goes farthest.
-        """
+        """Components (n, 3), one for each free motion, that hold these firmly."""
+        # Gram-Schmidt on the rows of R: each is that along which what remains of the motions goes farthest.
         chosen, component = np.zeros_like(self.supports.fixed), self.component
         if not self.any:
             return chosen

@@ -36,10 +36,8 @@ def check_locking(mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
 
 
 def _in_constant_volume(groups: Sequence[ElementGroup]) -> list[str]:
-    """Warn of plain elements with ν near ½, and of linear ones whose plastic flow keeps the volume.
-
-    Ten-node tetrahedra have sound displacements.
-    """
+    """Warn of plain elements with ν near ½, and of linear ones whose plastic flow keeps the volume."""
+    # Ten-node tetrahedra have sound displacements.
     replacements: dict[str, dict[str, str]] = {}
     for element, law in ((group.element, group.material) for group in groups):
         linear = len(element.nodes) == element.shape.corners

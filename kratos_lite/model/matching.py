@@ -46,11 +46,10 @@ def opposite(mesh: Mesh, a: Ints, b: Ints, shift: Array | None = None) -> Ints:
 
 
 class Periodic(PartTie):
-    """Opposite nodes differ by a mean strain: u_b - u_a = E (x_b - x_a), for all pairs of parts together.
+    """Opposite nodes differ by a mean strain: u_b - u_a = E (x_b - x_a), for all pairs of parts together."""
 
-    Nodes of edges and corners are in several pairs: one node of each class stands for all, which is one that
-    supports hold if there is any.
-    """
+    # Nodes of edges and corners are in several pairs: one node of each class stands for all, which is one
+    # that supports hold if there is any.
 
     def __init__(self, mesh: Mesh, parts: Sequence[tuple[Where, Where]], strain: Array) -> None:
         self.mesh, self.parts, self.strain = mesh, list(parts), strain

@@ -294,10 +294,8 @@ class RemotePoint(Coupling):
         return self._of_rigid() if self.is_rigid else self._of_mean(known.ravel())
 
     def _of_rigid(self) -> Constraints:
-        """Return u = R q of all nodes, by as many of their components as q has free ones.
-
-        What is prescribed, of the point and of nodes, are equations A q = b, by which q = A⁺ b + Z s.
-        """
+        """Return u = R q of all nodes, by as many of their components as q has free ones."""
+        # What is prescribed, of the point and of nodes, are equations A q = b, by which q = A⁺ b + Z s.
         dofs, R = self._modes(self.mesh)
         held, p = self._supports.fixed.flat[dofs], int(self.fixed.sum())
         A = np.vstack([np.eye(6)[self.fixed], R[held]])

@@ -127,11 +127,9 @@ def free_modes(mesh: Mesh, supports: Supports) -> tuple[RigidBlocks, Ints, Ints,
 
 
 def _equations(blocks: RigidBlocks, supports: Supports) -> tuple[Ints, Ints, Array]:
-    """Return fixed components, constraints, and the equal motion of blocks where they are joined.
-
-    They are entries: the equation, the block, and what its six modes are in it, 1 at most in each equation.
-    A rotation is scaled with the size of its block, so that all modes move points about as far.
-    """
+    """Return fixed components, constraints, and the equal motion of blocks where they are joined."""
+    # They are entries: the equation, the block, and what its six modes are in it, 1 at most in each equation.
+    # A rotation is scaled with the size of its block, so that all modes move points about as far.
     row, dof, weight = supports.constraint_rows()
     block, first = blocks.of_node[dof // 3], int(row.max(initial=-1)) + 1
     joins = np.ones(first, dtype=bool)  # hanging nodes that hang within a block hold in each of its motions
@@ -174,10 +172,8 @@ def _free_modes(members: Ints, row: Ints, block: Ints, value: Array) -> Array:
 
 
 def _free_modes_of_many(entries: tuple[Array, tuple[Ints, Ints]], shape: tuple[int, int]) -> Array:
-    """Return motions (n, k) that span the free ones under equations (c, n), in sparse entries.
-
-    Motions at random lose what the equations C resist by (C^T C + s)^-1 s, s small, again and again.
-    """
+    """Return motions (n, k) that span the free ones under equations (c, n), in sparse entries."""
+    # Motions at random lose what the equations C resist by (C^T C + s)^-1 s, s small, again and again.
     from scipy.sparse import csr_array, eye_array
 
     C, n = csr_array(entries, shape=shape), shape[1]

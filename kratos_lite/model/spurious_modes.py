@@ -42,10 +42,8 @@ DISTORTION = 0.04
 
 @remembered
 def hourglass_modes(element: type[KinematicLinear], rule: Rule) -> int:
-    """Return how many modes without energy beside the six rigid ones an element has with a rule.
-
-    The larger number of the reference cell and of a slightly distorted one.
-    """
+    """Return how many modes without energy beside the six rigid ones an element has with a rule."""
+    # The larger number of the reference cell and of a slightly distorted one.
     X, C = element.shape.nodes, Isotropic3D(E=1.0, nu=0.3).C
     size = DISTORTION * float(np.ptp(X, axis=0).max())
     cells = (X, X + np.random.default_rng(3).uniform(-size, size, X.shape))

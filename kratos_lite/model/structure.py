@@ -62,19 +62,7 @@ class Attachment(ABC):
 
 
 class Structure(Tabular):
-    """What is analyzed: a mesh with materials, supports, loads and motion; `Model` adds the analyses.
-
-    Parameters
-    ----------
-    mesh, material, formulation, units : as for a `Model`, with the same errors.
-
-    Attributes
-    ----------
-    supports : what is prescribed; see `fix`, `release` and `constrain`.
-    attachments, attached : springs and added masses, and their matrices, or None.
-    loads : those added; the list may be changed.
-    notes : what readers of files remarked, for the report.
-    """
+    """What is analyzed: a mesh with materials, supports, loads and motion; `Model` adds the analyses."""
 
     def __init__(
         self,
@@ -96,12 +84,12 @@ class Structure(Tabular):
         self._changes = 0
         self.formulation = formulation
         self.supports = Supports(mesh)
-        self.attachments: list[MatrixAttachment] = []
-        self.attached: Attached | None = None
-        self.loads: list[Load] = []
+        self.attachments: list[MatrixAttachment] = []  # springs and added masses
+        self.attached: Attached | None = None  # their matrices
+        self.loads: list[Load] = []  # the list may be changed
         self._named: dict[str, Load] = {}
         self._motion: Attachment | None = None
-        self.notes: list[str] = []
+        self.notes: list[str] = []  # what readers of files remarked, for the report
         self.patterns = PatternCache()
         if isinstance(material, Mapping):
             for where, assigned in material.items():

@@ -67,18 +67,7 @@ class DirichletCondition:
 
 
 class Supports:
-    """What supports a structure: Dirichlet conditions, constant or functions of time, and constraints.
-
-    Attributes
-    ----------
-    fixed : (n, 3) bool, read-only, which degrees of freedom are prescribed.
-    values : (n, 3) float, read-only, their displacements in m, at the time 0 where they move.
-    conditions : the Dirichlet conditions that these came from, in order.
-    ties : of parts, and remote points, in order.
-    hanging : the constraints of hanging nodes, the first of all.
-    version : counts the changes of what is prescribed, but for values and functions of time.
-    value_version : counts all changes.
-    """
+    """What supports a structure: Dirichlet conditions, constant or functions of time, and constraints."""
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh
@@ -86,7 +75,7 @@ class Supports:
         self._values: Array = np.zeros(mesh.points.shape)
         self._function = np.full(mesh.points.shape, CONSTANT, dtype=np.int32)
         self._functions: list[tuple[object, Callable[[float], float]]] = []
-        self.fixed, self.values = self._fixed.view(), self._values.view()
+        self.fixed, self.values = self._fixed.view(), self._values.view()  # values at the time 0, in m
         self.fixed.flags.writeable = self.values.flags.writeable = False
         self.hanging = self._constraints = hanging_constraints(mesh)
         self._inclined = Constraints.none()  # of conditions in local axes
@@ -98,7 +87,7 @@ class Supports:
         self.ties: list[Coupling] = []
         self._every: tuple[int, Constraints] = (-1, Constraints.none())
         self._of_parts = Constraints.none()  # those of ties of parts
-        self.version = self.value_version = 0
+        self.version = self.value_version = 0  # changes but for values and functions of time; all changes
         self.springs: Csr | None = None  # (3n, 3n) N/m
         self._dependents: tuple[int, Constraints] = (-1, Constraints.none())
 
@@ -449,10 +438,7 @@ class Supports:
         return forces if self.mesh.hanging is None else self.mesh.hanging.gather(forces)
 
     def constraint_rows(self) -> tuple[Ints, Ints, Array]:
-        """Return all that is prescribed, but its values, and what springs resist, as equations.
-
-        They are sparse rows: (row, dof, weight).
-        """
+        """Return all that is prescribed, and what springs resist, as sparse rows: (row, dof, weight)."""
         fixed, every = np.flatnonzero(self.fixed), self.constraints
         rows = len(fixed) + np.arange(len(every))
         row, dof, weight = self._spring_rows()

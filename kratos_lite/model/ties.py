@@ -28,22 +28,13 @@ WHOLE = 1 - 1e-6
 
 
 class Coupling(ABC):
-    """Constraints of parts, made anew when supports or the mesh change; one with its `place` replaces it.
+    """Constraints of parts, made anew when supports or the mesh change; one with its `place` replaces it."""
 
-    Attributes
-    ----------
-    title : what it is, for the summary.
-    place : type and nodes, or the coupling itself.
-    nodes_of : of parts that are tied to one another.
-    equations : what K depends on, beside `place`; the constants of constraints do not belong to it.
-    moves_all : parts whose nodes it moves alone, which other ties leave to it.
-    """
-
-    title = "tie"
-    place: Hashable
-    nodes_of: Sequence[Ints] = ()
-    equations: Hashable = None
-    moves_all: Sequence[Ints] = ()
+    title = "tie"  # for the summary
+    place: Hashable  # type and nodes, or the coupling itself
+    nodes_of: Sequence[Ints] = ()  # of parts that are tied to one another
+    equations: Hashable = None  # what K depends on beside `place`, without constants of constraints
+    moves_all: Sequence[Ints] = ()  # parts whose nodes it moves alone, which other ties leave to it
 
     @abstractmethod
     def constraints(self, fixed: Mask, known: Mask) -> Constraints:
@@ -102,11 +93,9 @@ class Tie(PartTie):
         return Tie(finer.mesh, finer.where(self.a), finer.where(self.b), self.tolerance)
 
     def constraints(self, fixed: Mask, known: Mask) -> Constraints:
-        """Return them; multipliers of what is known go to neighbors, so that they still add up to 1.
-
-        With R these sums it is R D (S u_a - W u) = 0, S the inverse of T, in which all that is free besides
-        S u_a of its own nodes goes to the right side.
-        """
+        """Return them; multipliers of what is known go to neighbors, so that they still add up to 1."""
+        # With R these sums it is R D (S u_a - W u) = 0, S the inverse of T, in which all that is free besides
+        # S u_a of its own nodes goes to the right side.
         from scipy.sparse import csr_array, diags_array, kron
 
         x, one, size = self.integrals, np.eye(3), self.mesh.points.size
@@ -173,10 +162,8 @@ def faces_of(mesh: Mesh, where: Where, nodes: Ints) -> list[Block]:
 
 
 def _without_gaps(x: Mortar, points: Array) -> Csr:
-    """Return W (3d, 3n): where surfaces are apart, a rotation of the nodes of b, by least squares, adds.
-
-    Then rigid motions of both leave no force behind.
-    """
+    """Return W (3d, 3n): where surfaces are apart, a rotation of the nodes of b, by least squares, adds."""
+    # Then rigid motions of both leave no force behind.
     from scipy.sparse import bsr_array, csr_array, kron
 
     W, X = x.W, points - points.mean(axis=0)

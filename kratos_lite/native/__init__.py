@@ -26,21 +26,7 @@ from kratos_lite.errors import InputError
 
 @cache
 def kernels(name: str) -> Any:
-    """Return a compiled module.
-
-    Parameters
-    ----------
-    name : of the module, without the underscore.
-
-    Returns
-    -------
-    The module, or None if it is not there or not wanted.
-
-    Raises
-    ------
-    InputError
-        An environment variable has an unknown value.
-    """
+    """Return a compiled module by its name without the underscore; None if it is missing or not wanted."""
     if _chosen("KRATOS_LITE_KERNELS", "numpy", "compiled") == "numpy":
         return None
     _chosen("KRATOS_LITE_ISA", "base", "avx2", "avx512")
@@ -96,13 +82,7 @@ def _cure() -> str:
 
 
 def threads() -> int:
-    """Return the number of threads that kernels use.
-
-    Raises
-    ------
-    InputError
-        KRATOS_LITE_THREADS is no positive whole number.
-    """
+    """Return the number of threads that kernels use; InputError for a KRATOS_LITE_THREADS that is none."""
     affinity = getattr(os, "sched_getaffinity", None)
     cores = len(affinity(0)) if affinity else os.cpu_count() or 1
     wanted = os.environ.get("KRATOS_LITE_THREADS", "")

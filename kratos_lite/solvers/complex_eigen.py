@@ -85,10 +85,8 @@ class Pencil:
         return values, Q @ vectors
 
     def _nearest(self, count: int) -> tuple[Complexes, Complexes]:
-        """Return eigenvalues nearest to 0, from a space that grows by what the residuals miss.
-
-        It begins with real modes, two for each pair of complex ones.
-        """
+        """Return eigenvalues nearest to 0, from a space that grows by what the residuals miss."""
+        # It begins with real modes, two for each pair of complex ones.
         V = self._independent(self.start(count), np.zeros((0, self.K.shape[0])))
         roundoff = 10 * EPS * float(abs(self.K).sum(axis=0).max())
         for _ in range(EXPANSIONS):

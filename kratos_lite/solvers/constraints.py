@@ -84,10 +84,8 @@ class Constraints:
 def eliminate(
     constraints: Constraints, fixed: Mask, values: Array, name: Callable[[int], str]
 ) -> Constraints:
-    """Express every dependent dof by free ones; ModelError for circles and dofs constrained twice.
-
-    With u_d = W u + P u_d + k, each pass doubles the length of the chains of dependents that W and k hold.
-    """
+    """Express every dependent dof by free ones; ModelError for circles and dofs constrained twice."""
+    # With u_d = W u + P u_d + k, each pass doubles the length of the chains of dependents that W and k hold.
     dependents, count = constraints.dependents, len(constraints)
     if not count:
         return constraints
@@ -184,11 +182,9 @@ class ConstraintMap:
 
 
 def constraint_map(fixed: Mask, values: Array, dependents: Constraints | None = None) -> ConstraintMap:
-    """Return the map of nodes with prescribed displacements and dependents.
-
-    Where all supports displace the nodes alike along an axis, c carries the free ones along: what remains to
-    be solved for is the strain alone, and its error does not grow with the displacement.
-    """
+    """Return the map of nodes with prescribed displacements and dependents."""
+    # Where all supports displace the nodes alike along an axis, c carries the free ones along: what remains
+    # to be solved for is the strain alone, and its error does not grow with the displacement.
     constrained, c = fixed.ravel(), values.ravel() * fixed.ravel()
     if dependents is None:
         for axis in range(3):

@@ -67,10 +67,7 @@ class SplitMatrix:
 
 
 def assemble(
-    points: Array,
-    groups: Sequence[ElementGroup],
-    pattern: Pattern,
-    progress: Progress | None = None,
+    points: Array, groups: Sequence[ElementGroup], pattern: Pattern, progress: Progress | None = None
 ) -> SplitMatrix:
     """Return the stiffness matrix of elements some of which are nearly incompressible."""
     elastic, soft, at_once, parts = list(groups), list(groups), list(groups), {}

@@ -41,10 +41,8 @@ class Factorization:
         self.method, self.A, self.apply = method, A, apply
 
     def solve(self, b: Array) -> Array:
-        """Return x (n,) of A x = b, refined once.
-
-        Source: Higham, Accuracy and Stability of Numerical Algorithms (2002), chapter 12.
-        """
+        """Return x (n,) of A x = b, refined once."""
+        # Source: Higham, Accuracy and Stability of Numerical Algorithms (2002), chapter 12.
         x = self.apply(b)
         return x + self.apply(b - self.A @ x)
 
@@ -73,11 +71,9 @@ def factorize(A: Csr, symmetric: bool = True) -> Factorization:
 
 
 def pardiso(A: Csr, symmetric: bool) -> Callable[[Array], Array]:
-    """Factorize with MKL PARDISO: Cholesky with nested dissection, or LU for a matrix that is not symmetric.
-
-    Where a pivot is not positive (Cholesky) or had to be replaced (LU), SuperLU has to say whether A is
-    singular.
-    """
+    """Factorize with MKL PARDISO: Cholesky with nested dissection, or LU if it is not symmetric."""
+    # Where a pivot is not positive (Cholesky) or had to be replaced (LU), SuperLU has to say whether A is
+    # singular.
     try:
         solvers = import_module("pypardiso.pardiso_wrapper")
     except ImportError:
@@ -270,10 +266,8 @@ def _controller(of_scipy: bool) -> Any:
 
 
 def one_thread() -> AbstractContextManager[Any]:
-    """Keep dense algebra to one thread within a ``with`` block, where threadpoolctl is installed.
-
-    Threads that wait for the next small product take time from others, and their sums may differ each time.
-    """
+    """Keep dense algebra to one thread within a ``with`` block, where threadpoolctl is installed."""
+    # Threads that wait for the next small product take time from others, and their sums may differ each time.
     controller = _controller("scipy.linalg" in sys.modules)  # libraries that come later do not heed it
     if controller is None:
         return nullcontext()

@@ -65,11 +65,9 @@ def modes(K: Csr, M: Csr, count: int, progress: Progress | None = None) -> tuple
 
 
 def modes_near(K: Csr, M: Csr, count: int, near: float) -> tuple[Array, Array]:
-    """Return the ω (count,) nearest to one in rad/s, ascending, and their shapes (n, count).
-
-    Lanczos' method with factors of K - σ M finds what lies nearest in ω² to σ.  Then it looks beside the
-    modes known, from another vector at random, until all that it finds is farther in ω than those chosen.
-    """
+    """Return the ω (count,) nearest to one in rad/s, ascending, and their shapes (n, count)."""
+    # Lanczos' method with factors of K - σ M finds what lies nearest in ω² to σ. Then it looks beside the
+    # modes known, from another vector at random, until all that it finds is farther in ω than those chosen.
     from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
     n = K.shape[0]
@@ -122,10 +120,8 @@ def is_small(n: int, count: int) -> bool:
 
 
 def dense_modes(K: Array, M: Array, count: int) -> tuple[Array, Array]:
-    """Return the lowest ω (count,) and shapes (n, count) by LAPACK.
-
-    It finds none where the mass is not positive in its rounding.
-    """
+    """Return the lowest ω (count,) and shapes (n, count) by LAPACK."""
+    # It finds none where the mass is not positive in its rounding.
     from scipy.linalg import LinAlgError, eigh
 
     try:
@@ -158,10 +154,8 @@ class Problem:
     power: int = 1  # of λ in its error; 2 where `precondition` is about M⁻¹
 
     def lowest(self, count: int) -> tuple[Array, Array]:
-        """Return the lowest λ (count,) beside the known ones, ascending, and x (count, n) with x M x^T = 1.
-
-        After them a few vectors at random look for one that was missed.
-        """
+        """Return the lowest λ (count,) beside the known ones, ascending, and x (count, n), x M x^T = 1."""
+        # After them a few vectors at random look for one that was missed.
         smallest = 1.0
 
         def converged(squares: Array, errors: Array) -> bool:

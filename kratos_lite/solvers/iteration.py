@@ -20,12 +20,11 @@ GoOn: TypeAlias = Callable[[float], bool]
 
 
 class Monitor:
-    """Follows an iteration by its residuals, as fractions of the first: progress, and whether to go on.
+    """Follows an iteration by its residuals, as fractions of the first: progress, and whether to go on."""
 
-    Progress never falls.  With `may_stop` an iteration ends that is slow: whose rate, after
-    `plan.PATIENCE_FROM` iterations, promises more than `plan.PATIENCE` in all.  The rate is that between the
-    last two quarters, each the mean of its logarithms: residuals grow at first and jump.
-    """
+    # Progress never falls. With `may_stop` an iteration ends that is slow: whose rate, after
+    # `plan.PATIENCE_FROM` iterations, promises more than `plan.PATIENCE` in all. The rate is that between the
+    # last two quarters, each the mean of its logarithms: residuals grow at first and jump.
 
     def __init__(self, tolerance: float, progress: Progress | None = None, may_stop: bool = False) -> None:
         self.progress, self.may_stop, self.is_slow, self.done = progress, may_stop, False, 0.0
@@ -60,13 +59,10 @@ def conjugate_gradients(
     norm_A: float,
     each: GoOn | None = None,
 ) -> tuple[Array, int, bool]:
-    """Solve A x = b with symmetric positive definite A, given by its product; return x, iterations, success.
-
-    It stops when |r| ≤ tolerance |b|, or when |r| reaches what round-off allows,
-    2 eps (|A| |x| + |b|); and gives up when `STALLED` iterations bring no new smallest residual, or when
-    `each`, called with |r| / |b|, returns False.
-    Source: Saad, Iterative Methods for Sparse Linear Systems (2003), algorithm 9.1.
-    """
+    """Solve A x = b, A positive definite and given by its product; return x, iterations, success."""
+    # It stops when |r| ≤ tolerance |b|, or when |r| reaches what round-off allows, 2 eps (|A| |x| + |b|); and
+    # gives up when `STALLED` iterations bring no new smallest residual, or when `each`, called with |r| /
+    # |b|, returns False. Source: Saad, Iterative Methods for Sparse Linear Systems (2003), algorithm 9.1.
     x, r = np.zeros_like(b), b.copy()
     norm_b = float(np.linalg.norm(b))
     if norm_b == 0:

@@ -40,10 +40,7 @@ class Solution:
 
 @dataclass(eq=False)
 class LinearSolver:
-    """K u = f + reactions with u = T q + c, solved as T^T K T q = T^T (f - K c).
-
-    What a method prepares (the reduced matrix, its factors, the multigrid hierarchy) is made once and kept.
-    """
+    """K u = f + reactions with u = T q + c, solved as T^T K T q = T^T (f - K c); what it prepares is kept."""
 
     K: Any  # full for ``dense``, split for ``displacement-pressure``, else blocks or a product; (3n, 3n) N/m
     constraint_map: ConstraintMap  # the supports
@@ -111,11 +108,9 @@ class LinearSolver:
         return self._multigrid.precondition(forces)[self.constraint_map.free]
 
     def _fraction(self, f: Array, c: Array, size: float) -> float:
-        """Return the fraction of |b|, a `size`, that tolerances refer to.
-
-        Where prescribed displacements of nearly incompressible bodies are large forces in K, these are no
-        measure of what has to be in equilibrium: the bulk modulus does not count.
-        """
+        """Return the fraction of |b|, a `size`, that tolerances refer to."""
+        # Where prescribed displacements of nearly incompressible bodies are large forces in K, these are no
+        # measure of what has to be in equilibrium: the bulk modulus does not count.
         soft = getattr(self.K, "A", None)
         if soft is None or not c.any():
             return 1.0
@@ -241,11 +236,9 @@ class LinearSolver:
 
 
 def constrained(K: BlockMatrix, T: Any, free: Ints) -> BlockMatrix:
-    """Return T^T K T in the numbering of all components, in 3x3 blocks; u = T q with q = u[free].
-
-    With dependents u_d = W u it is K + W^T K_d + K_d^T W + W^T K_dd W: only rows near dependents change.
-    Rows and columns of components that are not free mean nothing.
-    """
+    """Return T^T K T in the numbering of all components, in 3x3 blocks; u = T q with q = u[free]."""
+    # With dependents u_d = W u it is K + W^T K_d + K_d^T W + W^T K_dd W: only rows near dependents change.
+    # Rows and columns of components that are not free mean nothing.
     from scipy.sparse import bsr_array, csr_array
 
     full = on_all(T, free)

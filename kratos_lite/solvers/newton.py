@@ -53,10 +53,8 @@ def newton(
 
 
 def forcing(residuals: list[float], tolerance: float) -> float:
-    """Return the relative residual to which a correction is worth being solved.
-
-    Source: Eisenstat & Walker, SIAM J. Sci. Comput. 17 (1996) 16-32.
-    """
+    """Return the relative residual to which a correction is worth being solved."""
+    # Source: Eisenstat & Walker, SIAM J. Sci. Comput. 17 (1996) 16-32.
     ratio = residuals[-1] / residuals[-2] if len(residuals) > 1 and residuals[-2] else 1.0
     return max(min(FORCING, ratio**2), 0.1 * tolerance / max(residuals[-1], tolerance))
 

@@ -17,13 +17,12 @@ VERY_THIN = 0.004
 
 @dataclass(eq=False)
 class PlateLevel:
-    """Lines of nodes as the coarse level of a thin body, flat or curved.
+    """Lines of nodes as the coarse level of a thin body, flat or curved."""
 
-    A line has the displacement of its center, two slopes and a stretch, which give the displacements
-    u - z s1 e1 - z s2 e2 + z e n of its nodes at heights z.  A node between lines takes the mean of theirs
-    and, along n, half of what their slopes say at its place: what bends without shear at the lines then
-    bends so between them (Hermite interpolation, Kirchhoff's hypothesis).
-    """
+    # A line has the displacement of its center, two slopes and a stretch, which give the displacements u - z
+    # s1 e1 - z s2 e2 + z e n of its nodes at heights z. A node between lines takes the mean of theirs and,
+    # along n, half of what their slopes say at its place: what bends without shear at the lines then bends so
+    # between them (Hermite interpolation, Kirchhoff's hypothesis).
 
     indptr: Rows  # interpolation from m lines to n nodes in rows, blocks (k, 3, 6)
     indices: Rows

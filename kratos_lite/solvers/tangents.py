@@ -22,11 +22,10 @@ WORN = 6.0
 
 
 class Tangents:
-    """What solves (K - changes) du = f with the tangents K of a step.
+    """What solves (K - changes) du = f with the tangents K of a step."""
 
-    Where multigrid solves them, a step begins with that of the body at rest, not with the last one of the
-    step before, which a restart does not know, and keeps it while it serves.
-    """
+    # Where multigrid solves them, a step begins with that of the body at rest, not with the last one of the
+    # step before, which a restart does not know, and keeps it while it serves.
 
     def __init__(
         self, system: ConstrainedSystem, plan: Plan, symmetric: bool, rest: Callable[[], LinearSolver]

@@ -19,15 +19,7 @@ from kratos_lite.verification import (
 from kratos_lite.verification.meshes import element, kind_of
 from kratos_lite.verification.problem import ELEMENTS, Problem, Row, solved
 
-FAMILIES = (
-    single_element,
-    patch,
-    macneal_harder,
-    pressure,
-    concentrations,
-    nafems,
-    orders,
-)
+FAMILIES = (single_element, patch, macneal_harder, pressure, concentrations, nafems, orders)
 """Modules with problems, in the order of the table; a new one is a module with a list PROBLEMS."""
 PROBLEMS: dict[str, Problem] = {problem.name: problem for family in FAMILIES for problem in family.PROBLEMS}
 """Every problem by its name."""

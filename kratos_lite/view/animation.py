@@ -25,10 +25,7 @@ FACETS = 5000
 
 
 def check_animation(path: str | Path) -> None:
-    """Raise, before any work is done, for a film that cannot be written.
-
-    Raises InputError for another ending, KratosLiteError where matplotlib or ffmpeg is missing.
-    """
+    """Raise, before any work is done, for a film that cannot be written."""
     ending = path_of(path).suffix.lower()
     if ending not in ENDINGS:
         raise InputError(f"{path}: animations are written as {' or '.join(ENDINGS)}; got {ending!r}")

@@ -62,11 +62,9 @@ def _rows(towards: Array, flat: Array | None = None) -> Array:
 
 
 def _side_of(sides: Array) -> Array:
-    """Return the direction from which a body of these side lengths is well seen.
-
-    It is isometric, but a long and thin body along x or y is seen more from its side, so that it lies across
-    the picture.
-    """
+    """Return the direction from which a body of these side lengths is well seen."""
+    # It is isometric, but a long and thin body along x or y is seen more from its side, so that it lies
+    # across the picture.
     x, y, z = sides
     across = max(min(x, y), z)
     slenderness = max(x, y) / across if across > 0 else np.inf

@@ -173,10 +173,7 @@ def file_types() -> list[str]:
 
 
 def check_picture(path: str | Path) -> str:
-    """Return the type of a picture, before any work is done.
-
-    Raises InputError for a type that cannot be written, KratosLiteError where matplotlib is missing.
-    """
+    """Return the type of a picture; raise, before any work is done, for one that cannot be written."""
     kind, known = path_of(path).suffix[1:].lower(), file_types()
     if not kind:
         raise InputError(f"{path}: give the picture an ending that says its format, such as .png")

@@ -88,11 +88,9 @@ def plane_of(clip: Any, towards: Array, what: str = "clip") -> Plane:
 
 
 def _parts(d: Array, field: Array, simplices: Ints, corners_of: Corners) -> tuple[Ints, Array]:
-    """Return cells (p,) and corners (p, k, *) of parts of simplices, where d is linear in each.
-
-    `corners_of` says by the number of points with d ≤ 0, which count first, between which points d = 0 is the
-    corner of a part; (i, i) is the point itself.
-    """
+    """Return cells (p,) and corners (p, k, *) of parts of simplices, where d is linear in each."""
+    # `corners_of` says by the number of points with d ≤ 0, which count first, between which points d = 0 is
+    # the corner of a part; (i, i) is the point itself.
     inside = d[:, simplices] <= 0
     count = inside.sum(axis=2)
     cells, parts = [], []

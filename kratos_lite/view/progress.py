@@ -25,10 +25,8 @@ SWITCH = "KRATOS_LITE_PROGRESS"
 
 @contextmanager
 def watched(progress: Progress | None, phase: str = "") -> Iterator[Progress | None]:
-    """Give what shows the progress of some work: what the caller has, a line in a notebook, or None.
-
-    Nothing is imported, and nothing shown in a script: whoever works in a notebook has IPython already.
-    """
+    """Give what shows the progress of some work: what the caller has, a line in a notebook, or None."""
+    # Nothing is imported, and nothing shown in a script: whoever works in a notebook has IPython already.
     if progress is not None or "IPython" not in sys.modules or os.environ.get(SWITCH) == "off":
         yield progress
         return

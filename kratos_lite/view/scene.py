@@ -114,10 +114,8 @@ def drawn_points(scene: Scene, subject: Subject) -> Array:
 
 
 def factor_of(subjects: Sequence[Subject], wanted: float | None) -> float:
-    """Return the factor on displacements: by default 1, 2 or 5 times a power of ten, at least 1.
-
-    With it the largest displacement is at most a tenth of the body.
-    """
+    """Return the factor on displacements: by default 1, 2 or 5 times a power of ten, at least 1."""
+    # With it the largest displacement is at most a tenth of the body.
     if wanted is not None:
         return wanted
     moved = [(s.mesh.points, s.u) for s in subjects if s.u is not None and s.u.any()]

@@ -56,10 +56,7 @@ class ModelIntegrator(ABC):
 
     @abstractmethod
     def step(self, e: EquationsOfMotion, now: Kinematics, start: float, h: float) -> Kinematics:
-        """Return displacement, velocity and acceleration (3a,) at the end of a step from those at its start.
-
-        It starts at the time `start` and takes `h`, in s.
-        """
+        """Return displacement, velocity and acceleration (3a,) h s after those at the time `start` in s."""
 
     def __str__(self) -> str:
         numbers = [f"{getattr(self, name):g}" for name in names_of(type(self))]
@@ -100,10 +97,7 @@ class BodyIntegrator(ABC, Generic[B]):
 
     @abstractmethod
     def step(self, body: B, h: float, v: Array) -> Array:
-        """Advance a body by h s, loaded as by the velocity v.
-
-        Returns the generalized load (..., dofs) at the middle, reactions included.
-        """
+        """Advance a body by h s, loaded as by the velocity v; return the load (..., dofs) at the middle."""
 
     def finish(self, body: B) -> None:
         """Bring the end of a step to what the body can represent."""

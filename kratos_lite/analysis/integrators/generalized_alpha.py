@@ -37,12 +37,7 @@ class _Implicit(ModelIntegrator):
 
     @abstractmethod
     def numbers(self) -> NewmarkNumbers:
-        """Return the four numbers of the method.
-
-        Returns
-        -------
-        β, γ, αm and αf.
-        """
+        """Return β, γ, αm and αf."""
 
     @property
     def balanced(self) -> bool:

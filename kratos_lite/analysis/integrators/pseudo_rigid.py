@@ -129,12 +129,10 @@ def _linear_step(
 def _energy_momentum(
     F: Array, U: Array, f: Array, euler: Array, V: Array, C: Array, eta: Array, h: float, tolerance: float
 ) -> tuple[Array, Mask]:
-    """Return the change (..., 9) of the rate of F that conserves energy and momentum; where none was found.
-
-    The strain of the end is that of the start and an increment, so that stiff bodies do not lose digits.
-    Newton's method has the stress S as a second unknown, eliminated: its matrix takes S as linearized in the
-    former iteration.
-    """
+    """Return the change (..., 9) of F's rate that conserves energy and momentum; where none was found."""
+    # The strain of the end is that of the start and an increment, so that stiff bodies do not lose digits.
+    # Newton's method has the stress S as a second unknown, eliminated: its matrix takes S as linearized in
+    # the former iteration.
     E, M = green_strain(F), by_rows(euler)
     S, share = apply(C, E), 0.5 + eta / h
     change = np.zeros(U.shape)

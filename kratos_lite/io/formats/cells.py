@@ -46,12 +46,7 @@ def repeated_nodes(ids: Ints, points: Array, lines: NDArray[np.int32]) -> Iterat
 
 
 def wrong_nodes(ids: Ints, rows: Ints) -> Iterator[tuple[int, str]]:
-    """Yield cell and message for each node that is missing (row -1) or that a cell names twice.
-
-    Parameters
-    ----------
-    ids, rows : (m, k) ids of the nodes of each cell, and their rows in the mesh.
-    """
+    """Yield cell and message for each node of `ids` (m, k) that is missing (row -1), or twice in a cell."""
     if not rows.size:
         return
     for i, k in np.argwhere(rows < 0)[:MOST] if rows.min() < 0 else ():

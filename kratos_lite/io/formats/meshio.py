@@ -225,11 +225,9 @@ class _Reading:
         return np.ones(len(self.rows[b]), dtype=np.int64)
 
     def _with_oriented_wedges(self, block: Block) -> Block:
-        """Undo the exchange of wedge nodes where a VTK file did not follow the order meshio expects.
-
-        VTK's text inverts its linear wedge, VTK's formulas (and most writers) do not; the sign of
-        the volume tells which was meant.
-        """
+        """Undo the exchange of wedge nodes where a VTK file did not follow the order meshio expects."""
+        # VTK's text inverts its linear wedge, VTK's formulas (and most writers) do not; the sign of the
+        # volume tells which was meant.
         if block.name != "Element3D6N" or self.path.suffix.lower() not in {".vtk", ".vtu"}:
             return block
         X = self.found.points[block.nodes]

@@ -19,13 +19,7 @@ FOLDER = "_partitioned"
 
 
 def part_files(path: Path) -> dict[int, Path]:
-    """Return the part files that an input stands for, by rank; none if it is an ordinary file.
-
-    Parameters
-    ----------
-    path : ``name.mdpa``, where there is no such file but its parts, beside it or in ``name_partitioned``; or
-        that folder.
-    """
+    """Return the part files that an input, their common name or folder, stands for; none for a file."""
     if path.is_file():
         return {}
     stem = path.name.removesuffix(FOLDER) if path.is_dir() else path.name.removesuffix(".mdpa")

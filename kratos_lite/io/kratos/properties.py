@@ -65,10 +65,8 @@ def _apply_rule(model: Model, properties: Properties) -> None:
 
 
 def _apply_prestress(model: Model, properties: Properties) -> None:
-    """Add the initial stress -PRESTRESS_FACTOR · PRESTRESS; INSITU_STRESS is another name of the same stress.
-
-    Source: Isotropic3D of KratosStructuralApplication, σ = C ε - PRESTRESS_FACTOR · PRESTRESS.
-    """
+    """Add the initial stress -PRESTRESS_FACTOR · PRESTRESS; INSITU_STRESS is the same stress."""
+    # Source: Isotropic3D of KratosStructuralApplication, σ = C ε - PRESTRESS_FACTOR · PRESTRESS.
     factor = float(_numbers(properties, "PRESTRESS_FACTOR", 1.0, (), "one number"))
     names = [name for name in PRESTRESS if name in properties.values]
     what = "six components xx yy zz xy yz xz"
@@ -90,10 +88,9 @@ def expanding(document: Document, materials: bool) -> list[Properties]:
 
 
 def reference_temperature(properties: Properties, source: str) -> float:
-    """Return the temperature without thermal strain of elements with these properties in a file.
-
-    Source: `THERMAL_LAW`, σ = C (B u - THERMAL_EXPANSION_COEFFICIENT (TEMPERATURE - REFERENCE_TEMPERATURE)).
-    """
+    """Return the temperature without thermal strain of elements with these properties in a file."""
+    # Source: `THERMAL_LAW`, σ = C (B u - THERMAL_EXPANSION_COEFFICIENT (TEMPERATURE -
+    # REFERENCE_TEMPERATURE)).
     law, name = str(properties.values.get("CONSTITUTIVE_LAW") or "Isotropic3D"), "REFERENCE_TEMPERATURE"
     text = f"nodes have a TEMPERATURE; give a {name}, one number, at which it strains nothing"
     if law not in list(MATERIALS) and "Thermal" not in law:

@@ -23,12 +23,7 @@ from kratos_lite.io.kratos.laws import is_nonlinear, make_linear, notes_on_stres
 from kratos_lite.io.kratos.motion import add_motion
 from kratos_lite.io.kratos.processes import PROCESSES, Action, actions_of, run
 from kratos_lite.io.kratos.properties import NO_EXPANSION, expanding, use_materials
-from kratos_lite.io.kratos.time_dependent import (
-    DYNAMIC,
-    DYNAMIC_KEYS,
-    ProcessesInTime,
-    time_integration_of,
-)
+from kratos_lite.io.kratos.time_dependent import DYNAMIC, DYNAMIC_KEYS, ProcessesInTime, time_integration_of
 from kratos_lite.io.kratos.to_model import model_from
 from kratos_lite.io.kratos.variables import TEMPERATURE
 from kratos_lite.io.settings import Settings, find_file, read_settings

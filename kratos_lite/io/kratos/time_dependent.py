@@ -188,10 +188,7 @@ class ProcessesInTime:
 
 
 def _load_in_time(
-    actions: Sequence[Action],
-    times: Sequence[float],
-    base: Variables,
-    load_of: LoadOf,
+    actions: Sequence[Action], times: Sequence[float], base: Variables, load_of: LoadOf
 ) -> Callable[[float], Load | None]:
     """Return the load of some actions as a function of the time; the same object while nothing changes."""
     places = places_of(base.mesh)

@@ -139,11 +139,9 @@ def _check_temperatures(values: Variables, document: Document, model: Model) -> 
 
 
 def _activate(model: Model, u0: Array) -> None:
-    """Make elements free of stress at the displacement that a file gives to nodes that it does not fix.
-
-    Source: KinematicLinear::Initialize of KratosStructuralApplication.  The present elements of Kratos take
-    it for a guess, which linear statics does not need.
-    """
+    """Make elements free of stress at the displacement that a file gives to nodes that it does not fix."""
+    # Source: KinematicLinear::Initialize of KratosStructuralApplication. The present elements of Kratos take
+    # it for a guess, which linear statics does not need.
     u0 = np.where(model.supports.fixed, 0.0, u0)
     mesh = model.mesh
     count = int(u0.any(axis=1).sum())

@@ -160,11 +160,9 @@ class Variables:
         return ConditionLoads(force, nodal_force, pressure, nodal_pressure) if is_loaded else None
 
     def note_idle(self, notes: list[str], *, follows: bool = False) -> None:
-        """Note loads where nothing carries them, and pressures that follow the deformed faces in Kratos only.
-
-        Kratos adds the stiffness of such a pressure to K even in a linear analysis; its small-displacement
-        conditions do not.
-        """
+        """Note loads where nothing carries them, and pressures that follow deformed faces in Kratos only."""
+        # Kratos adds the stiffness of such a pressure to K even in a linear analysis; its small-displacement
+        # conditions do not.
         self._note_uncarried(notes)
         loads = self.condition_loads()
         if not follows and loads is not None and (loads.pressure.any() or loads.nodal_pressure.any()):

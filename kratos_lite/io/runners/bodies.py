@@ -68,11 +68,9 @@ class _Summary:
             self.kept.append(state)
 
     def rows(self, seconds: float) -> list[tuple[str, str]]:
-        """Return the rows of the table.
-
-        What kinetic and internal energy gain beyond the external work is an error of the integrator, unless
-        damping takes it; potential energy stays out of this, as its loss is external work already.
-        """
+        """Return the rows of the table."""
+        # What kinetic and internal energy gain beyond the external work is an error of the integrator, unless
+        # damping takes it; potential energy stays out of this, as its loss is external work already.
         start, end = self.start, _Totals(self.body)
         steps = end.step - start.step
         gained = end.kinetic - start.kinetic + end.internal - start.internal - (end.work - start.work)

@@ -90,22 +90,7 @@ class Load(ABC):
         yield from ()
 
     def by_coordinates(self, mesh: Mesh, groups: Sequence[ElementGroup], v: Array) -> Array:
-        """Return the derivative of the work v·f of the forces by the coordinates of nodes.
-
-        Parameters
-        ----------
-        mesh, groups : as for `forces`.
-        v : (n, 3) m, displacements.
-
-        Returns
-        -------
-        (n, 3) in N.
-
-        Raises
-        ------
-        ModelError
-            The class does not know it.
-        """
+        """Return the derivative (n, 3) in N of the work v·f of the forces, v (n, 3) in m, by the nodes."""
         raise self.without_derivative("its class defines no by_coordinates(mesh, groups, v)")
 
     def without_derivative(self, why: str) -> ModelError:
@@ -279,13 +264,7 @@ class TimeDependentLoad(Load):
 
 
 class ScaledLoad(TimeDependentLoad):
-    """A load times an amplitude, as ``model.add(load, amplitude=...)`` makes it.
-
-    Parameters
-    ----------
-    load : any constant load.
-    amplitude : number, `TimeSeries`, or function of time.
-    """
+    """A load times an amplitude, as ``model.add(load, amplitude=...)`` makes it."""
 
     def __init__(self, load: Load, amplitude: Factor) -> None:
         if not isinstance(load, Load) or isinstance(load, TimeDependentLoad):

@@ -133,11 +133,7 @@ class Pressure(FaceLoad):
     nodal = "pressure", 1
 
     def __init__(
-        self,
-        where: Where,
-        pressure: ArrayLike | OfPlace,
-        normal: str = "outward",
-        follower: bool = False,
+        self, where: Where, pressure: ArrayLike | OfPlace, normal: str = "outward", follower: bool = False
     ) -> None:
         if normal not in ("outward", "nodes"):
             raise InputError(f"normal must be 'outward' or 'nodes'; got {normal!r}")
@@ -270,18 +266,7 @@ class Resultant(FaceLoad):
 
 
 class ConditionLoads(Load):
-    """Loads on the conditions of the mesh, as a file states them.
-
-    The load on a condition is its own value plus the one interpolated from its nodes.
-
-    Parameters
-    ----------
-    force : (c, 3) per condition; Pa on faces, N/m on lines, N on points.
-    nodal_force : (n, 3) per node, by the cell of the conditions that carry it.
-    pressure : (c,) per condition, Pa, positive against the normal about which the nodes of the
-        condition run counter-clockwise.
-    nodal_pressure : (n,) per node, Pa.
-    """
+    """Loads on the conditions of the mesh, as a file states them: own values and those of nodes."""
 
     following: ClassVar[tuple[str, ...]] = ("SurfaceLoadCondition", "LineLoadCondition")
     """Starts of the names of conditions whose loads act on deformed faces and lines, as in Kratos."""
@@ -289,8 +274,10 @@ class ConditionLoads(Load):
     def __init__(
         self, force: Array, nodal_force: dict[str, Array], pressure: Array, nodal_pressure: Array
     ) -> None:
-        self.force, self.nodal_force = force, nodal_force
-        self.pressure, self.nodal_pressure = pressure, nodal_pressure
+        self.force = force  # (c, 3) of conditions; Pa on faces, N/m on lines, N on points
+        self.nodal_force = nodal_force  # (n, 3) by the cell of the conditions that carry it
+        self.pressure = pressure  # (c,) Pa, against the normal by the right hand about the nodes
+        self.nodal_pressure = nodal_pressure  # (n,) Pa
 
     def follow(self, mesh: Mesh, x: Array) -> Iterator[tuple[Rows, Array, Array]]:
         """Yield what deformed faces and lines change; a force per area keeps its direction."""

@@ -64,10 +64,8 @@ def _read_nodes(source: Source, frames: list[Frame]) -> Mesh:
 
 
 def read_blocks(source: Source, frames: list[Frame], mesh: Mesh) -> list[Block]:
-    """Return the blocks of elements, conditions or geometries; their nodes must be in the mesh.
-
-    Empty blocks, of which some programs write one for each kind they know, say nothing and are left out.
-    """
+    """Return the blocks of elements, conditions or geometries; their nodes must be in the mesh."""
+    # Empty blocks, of which some programs write one for each kind they know, say nothing and are left out.
     blocks = [block for frame in frames if len(block := _read_block(source, frame, mesh))]
     if blocks:
         lines = np.concatenate([block.lines for block in blocks if block.lines is not None])

@@ -201,10 +201,8 @@ def _constraints(constraints: list[Constraint]) -> Lines:
 
 
 def _header(constraint: Constraint) -> tuple[int | str, ...]:
-    """Return the number of independent nodes, the name and the variables of the header.
-
-    Kratos misreads a header with more than the dependent node's variable where one is enough.
-    """
+    """Return the number of independent nodes, the name and the variables of the header."""
+    # Kratos misreads a header with more than the dependent node's variable where one is enough.
     variables = [constraint.dependent[1], *(variable for _, variable in constraint.independents)]
     shown = variables[:1] if len(set(variables)) == 1 else variables
     return (len(constraint.independents), constraint.name, *shown)

@@ -13,13 +13,7 @@ THREE = "/**\n * @license\n * Copyright 2010", "THREE.TrackballControls=Trackbal
 
 
 def library() -> str:
-    """Return three.js and its trackball, which trimesh embeds in pages of its own.
-
-    Raises
-    ------
-    KratosLiteError
-        trimesh is missing, or does not hold it.
-    """
+    """Return three.js and its trackball, which trimesh embeds in pages of its own."""
     spec = find_spec("trimesh")
     if spec is None or spec.origin is None:
         raise KratosLiteError("pages for the browser need three.js: pip install kratos-lite[page]")
