@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -68,9 +69,7 @@ def gradient_of(
     if by != "stiffness":
         _check_held(model.free_motions(result.groups), wrt)
 
-    def of_loads(v: Array) -> Array:
-        return _of_loads(model, result, by, v)
-
+    of_loads = partial(_of_loads, model, result, by)
     if isinstance(quantity, Compliance) and _is_own_adjoint(result, model):
         z = result.u
     else:
@@ -112,11 +111,8 @@ def _of_stresses(result: Any, by: str, z: Array) -> Array | float:
 
 def _is_own_adjoint(result: Any, model: Structure) -> bool:
     """Return whether nothing but loads strains the body."""
-    moved = model.supports.values.any() or model.supports.dependents().constants.any()
-    initial = model.initial_displacement is not None or any(
-        not (group.prestress is None and group.heating is None) for group in result.groups
-    )
-    return not (moved or initial)
+    warm = any(group.prestress is not None or group.heating is not None for group in result.groups)
+    return not (model.supports.displaced or warm or model.initial_displacement is not None)
 
 
 def _moduli(result: Any) -> Array:
@@ -153,7 +149,5 @@ def _check_supports(model: Structure) -> None:
 def _check_held(free: FreeMotions, wrt: str) -> None:
     """Raise ModelError where supports leave rigid motions free, as loads would balance no more."""
     if free.any:
-        raise ModelError(
-            f"a derivative by {wrt} needs supports that hold the body: its loads would not balance; "
-            f"{free.described()}"
-        )
+        text = "needs supports that hold the body: its loads would not balance"
+        raise ModelError(f"a derivative by {wrt} {text}; {free.described()}")

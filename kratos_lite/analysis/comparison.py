@@ -116,9 +116,8 @@ def compare(first: Result, second: Result) -> Comparison:
         instance(result, name, Result, "model.solve()")
     mesh, used = first.mesh, first.mesh.used_nodes()
     if mesh.units != second.mesh.units:
-        raise MeshError(
-            f"one result is in {mesh.units}, the other in {second.mesh.units}; compare like with like"
-        )
+        both = f"one result is in {mesh.units}, the other in {second.mesh.units}"
+        raise MeshError(f"{both}; compare like with like")
     same = mesh is second.mesh or np.array_equal(mesh.points, second.mesh.points)
     if same:
         nodes = np.flatnonzero(used)

@@ -94,14 +94,12 @@ class ConvergenceStudy(Tabular):
         -------
         matplotlib.figure.Figure
         """
-        from kratos_lite.view.canvas import checked_size, save  # pictures alone need these
+        from kratos_lite.view.canvas import checked_size, saved  # pictures alone need these
         from kratos_lite.view.curves import study_figure
 
         ends, labels = (self.extrapolated, *self.interval), (self._limit, self.of)
-        figure = study_figure(self.unknowns, self.values, ends, self.unit, labels, checked_size(size) or size)
-        if path is not None:
-            save(figure, path)
-        return figure
+        x, inches = self.unknowns, checked_size(size) or size
+        return saved(study_figure(x, self.values, ends, self.unit, labels, inches), path)
 
 
 def converge(
@@ -152,19 +150,16 @@ def converge(
     (True, '')
     """
     if not (isinstance(quantity, Quantity) or callable(quantity)):
-        raise InputError(
-            f"a quantity must be one such as kl.DisplacementAt, or a function; got {short(quantity)}"
-        )
+        text = "a quantity must be one such as kl.DisplacementAt, or a function"
+        raise InputError(f"{text}; got {short(quantity)}")
     uniform = isinstance(model, Structure)
     if not (uniform or (callable(model) and geometry is None)):
         raise InputError(
             "a model, with its geometry, or a function of h that returns one, without, is needed"
         )
     if uniform:
-        h = np.asarray(
-            0.5 ** np.arange(whole_number(meshes, "meshes of a model that is refined", least=3, most=20)),
-            float,
-        )
+        count = whole_number(meshes, "meshes of a model that is refined", least=3, most=20)
+        h = np.asarray(0.5 ** np.arange(count), float)
         check_quantity(quantity if isinstance(quantity, Quantity) else None)
         check_geometry(geometry, model.mesh)  # type: ignore[union-attr]
     else:
@@ -181,10 +176,8 @@ def converge(
             last = refined(last, refine(last.mesh).onto(geometry or {}))
         values[i] = number(measure(solve(last) if solve else last.solve()), "the value of the quantity")
         unknowns[i] = (~last.supports.fixed[last.mesh.used_nodes()]).sum() - len(last.supports.dependents())
-    of, unit = (
-        getattr(quantity, "__name__", str(quantity)),
-        unit_name(getattr(quantity, "unit", ""), last.units),
-    )
+    of, unit = getattr(quantity, "__name__", str(quantity)), getattr(quantity, "unit", "")
+    unit = unit_name(unit, last.units)
     return ConvergenceStudy(of, unit, h, unknowns, values, *limit_of(h, values))
 
 
@@ -201,12 +194,8 @@ def limit_of(h: Array, f: Array) -> tuple[Array, float, float, str]:
     elif len(f) > 3 and not abs(orders[-2] - p) <= AGREE * p:
         wrong = "the last two orders differ"
     if wrong:
-        return (
-            orders,
-            float(f[-1]),
-            UNSAFE * spread,
-            f"not in the asymptotic range: {wrong}; take finer meshes",
-        )
+        wrong = f"not in the asymptotic range: {wrong}; take finer meshes"
+        return orders, float(f[-1]), UNSAFE * spread, wrong
     error = float((f[-1] - f[-2]) / ((h[-2] / h[-1]) ** p - 1))
     return orders, float(f[-1]) + error, SAFE * abs(error), ""
 

@@ -6,6 +6,7 @@ u(t) = Re(u e^{iΩt}),   ((1 + iη) K + iΩ (α M + β K) - Ω² M) u = f.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from numbers import Complex
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -42,6 +43,7 @@ TOLERANCE = 1e-12
 """Relative residual of the static solutions."""
 
 
+@dataclass(frozen=True, eq=False, repr=False)
 class HarmonicResponse(Tabular):
     """The steady motion Re(u e^{iΩt}) of a model at some frequencies; `Model.harmonic` makes it.
 
@@ -59,17 +61,12 @@ class HarmonicResponse(Tabular):
     It keeps a few displacements and their factors: all frequencies of a large mesh take no more room.
     """
 
-    def __init__(
-        self,
-        mesh: Mesh,
-        groups: list[ElementGroup],
-        frequencies: Array,
-        basis: Any,
-        factors: Complexes,
-        natural: Array,
-    ) -> None:
-        self.mesh, self.frequencies, self.natural = mesh, frequencies, natural
-        self._groups, self._basis, self._factors = groups, basis, factors  # (b, n, 3) m and (f, b)
+    mesh: Mesh
+    groups: list[ElementGroup]
+    frequencies: Array
+    basis: Any
+    factors: Complexes
+    natural: Array
 
     @property
     def units(self) -> str:  # type: ignore[override]
@@ -89,7 +86,7 @@ class HarmonicResponse(Tabular):
         """
         f = len(self.frequencies)
         at = whole_number(number, "the number of a frequency", least=-f, most=f - 1)
-        return np.tensordot(self._factors[at], self._basis, axes=1)
+        return np.tensordot(self.factors[at], self.basis, axes=1)
 
     def at(self, points: ArrayLike) -> Complexes:
         """Return the complex displacements of points at all frequencies.
@@ -108,9 +105,9 @@ class HarmonicResponse(Tabular):
             A point lies outside the mesh.
         """
         located = self.mesh.locate(points, required=True)
-        parts = np.moveaxis(self._basis, 0, -1)
+        parts = np.moveaxis(self.basis, 0, -1)
         values = np.moveaxis(located.interpolate(parts.real) + 1j * located.interpolate(parts.imag), -1, 0)
-        return np.tensordot(self._factors, values, axes=1)
+        return np.tensordot(self.factors, values, axes=1)
 
     def fields(self, number: int, phase: float = 0.0) -> ElementFields:
         """Return strains and stresses at one frequency and instant, without those at rest.
@@ -125,9 +122,8 @@ class HarmonicResponse(Tabular):
         ElementFields
             Of Re(u e^{i phase}), with `stress`, `von_mises` and others, as results have them.
         """
-        turned = np.exp(1j * finite(phase, "the phase", ()))
-        u = np.real(self.displacement(number) * turned)
-        return ElementFields(self.mesh, self._groups, np.ascontiguousarray(u))
+        u = np.real(self.displacement(number) * np.exp(1j * finite(phase, "the phase", ())))
+        return ElementFields(self.mesh, self.groups, np.ascontiguousarray(u))
 
     def table(self) -> list[tuple[str, str]]:
         """Return the rows of a summary: frequencies, method, and the largest amplitude of all nodes."""
@@ -172,16 +168,13 @@ class HarmonicResponse(Tabular):
         -------
         matplotlib.figure.Figure
         """
-        from kratos_lite.view.canvas import save
+        from kratos_lite.view.canvas import saved
         from kratos_lite.view.curves import response_figure
 
         component = "xyz".index(choice(axis, "axis", tuple("xyz")))
         amplitude = np.abs(self.at(finite(point, "a point", (3,)))[:, component])
         unit = unit_name("m", self.units)
-        figure = response_figure(self.frequencies, amplitude, unit, f"amplitude of u{axis}")
-        if path is not None:
-            save(figure, path)
-        return figure
+        return saved(response_figure(self.frequencies, amplitude, unit, f"amplitude of u{axis}"), path)
 
 
 def harmonic_response(
@@ -258,11 +251,8 @@ def _by_modes(
         raise SolveError(UNDAMPED)
     zero = np.zeros(e.size)
     statics = [e.system.equations.solve(r, TOLERANCE, e.system.progress, zero).x for r in R]
-    rest = [
-        e.system.scatter(u) - np.tensordot(p / natural**2, shapes, axes=1)
-        for u, p in zip(statics, P, strict=True)
-    ]
-    basis = np.concatenate([shapes, np.array(rest).reshape(-1, *shapes.shape[1:])])
+    rest = np.array([e.system.scatter(u) for u in statics]).reshape(-1, *shapes.shape[1:])
+    basis = np.concatenate([shapes, rest - np.tensordot(P / natural**2, shapes, axes=1)])
     return basis, np.hstack([(s @ P) / denominators, s / k[:, None]]), natural
 
 

@@ -81,16 +81,14 @@ class MaterialPath:
         KratosLiteError
             matplotlib is missing.
         """
-        from kratos_lite.view.canvas import checked_size, label, new_plot, save
+        from kratos_lite.view.canvas import checked_size, label, new_plot, saved
         from kratos_lite.view.curves import BLUE
 
         i = COMPONENTS.index(choice(component, "component", COMPONENTS))
         figure, axes = new_plot(checked_size(options.get("size")) or (6, 4), "", "Pa")
         axes.plot(self.strain[:, i], self.stress[:, i], color=BLUE, lw=1.8)
         label(axes, f"strain {component}", f"stress {component}", title or type(self.law).__name__)
-        if path is not None:
-            save(figure, path)
-        return figure
+        return saved(figure, path)
 
 
 def material_point(

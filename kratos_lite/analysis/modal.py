@@ -193,10 +193,8 @@ def buckling(
         try:
             inverse, vectors = _largest(e, K_g, e.system.equations, count, DENSE_MODES)
         except SolveError as error:
-            text = (
-                f"found no {count} factors > 0: loads that only pull do not buckle a body; if some press, the"
-            )
-            raise SolveError(f"{text} iteration failed: {error}") from None
+            text = f"found no {count} factors > 0: loads that only pull do not buckle a body"
+            raise SolveError(f"{text}; if some press, the iteration failed: {error}") from None
     if not inverse[-1] > 1e-9 * K_g.norm() / e.system.norm:  # less is rounding: strains of 1e9
         raise ModelError(f"the loads have less than {count} factors > 0; ask for fewer, or reverse the loads")
     shapes = expanded(e, vectors)

@@ -401,10 +401,9 @@ class Model(Structure):
         """
         from kratos_lite.analysis.harmonic import harmonic_response
 
+        given = frequencies, damping, rayleigh, hysteretic, loads, method, modes
         with watched(progress) as shown:
-            return harmonic_response(
-                self, frequencies, damping, rayleigh, hysteretic, loads, method, modes, shown
-            )
+            return harmonic_response(self, *given, shown)
 
     def complex_modes(
         self, count: int = 6, *, progress: Progress | None = None

@@ -114,9 +114,7 @@ def plot(
         canvas.check_picture(path)
     given = {name: value for name, value in locals().items() if name not in ("thing", "path")}
     figure = _figure(thing, {**given, "size": canvas.checked_size(size)})
-    if path is not None:
-        canvas.save(figure, path)
-    return figure
+    return canvas.saved(figure, path)
 
 
 def animate(

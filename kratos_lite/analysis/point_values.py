@@ -223,7 +223,7 @@ class LineValues(PointValues):
             matplotlib is missing.
         """
         from kratos_lite.analysis.subjects import named_values, names_of_parts  # pictures alone need these
-        from kratos_lite.view.canvas import checked_size, save
+        from kratos_lite.view.canvas import checked_size, saved
         from kratos_lite.view.curves import line_figure
 
         names = names_of_parts(self._known)
@@ -237,7 +237,5 @@ class LineValues(PointValues):
             curves["membrane and bending"] = self.linear[:, i]
             curves["membrane"] = np.full(len(self.distance), self.membrane[i])
         units = [unit_name(unit, self._fields.mesh.units) for unit in ("m", shown.unit)]
-        figure = line_figure(self.distance, curves, units, title, checked_size(size) or (6, 4))
-        if path is not None:
-            save(figure, path)
-        return figure
+        inches = checked_size(size) or (6, 4)
+        return saved(line_figure(self.distance, curves, units, title, inches), path)

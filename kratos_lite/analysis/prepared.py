@@ -188,9 +188,8 @@ def system_of(
         how |= {"patterns": model.patterns, "hanging": model.mesh.hanging, "attached": model.attached}
         return ConstrainedSystem(*what, **how)
     if model.attached:
-        raise ModelError(
-            "springs and added masses are for the own backend; leave backend and PETSc options out"
-        )
+        text = "leave backend and PETSc options out"
+        raise ModelError(f"springs and added masses are for the own backend; {text}")
     from kratos_lite.distributed.communicator import started
     from kratos_lite.distributed.petsc_system import PetscSystem
 

@@ -141,13 +141,9 @@ class Quantity(ABC):
 
 def _text(value: object) -> str:
     """Return a point, an axis or a part as text for messages."""
-    return (
-        repr(value)
-        if isinstance(value, str)
-        else str(value.tolist())
-        if isinstance(value, np.ndarray)
-        else "…"
-    )
+    if isinstance(value, np.ndarray):
+        return str(value.tolist())
+    return repr(value) if isinstance(value, str) else "…"
 
 
 class DisplacementAt(Quantity):
@@ -185,9 +181,8 @@ class DisplacementAt(Quantity):
 
     def value(self, result: Fields) -> float:
         """Return the displacement in m."""
-        return float(
-            result.mesh.locate(self.point, required=True).interpolate(result.u)[AXES.index(self.axis)]
-        )
+        u = result.mesh.locate(self.point, required=True).interpolate(result.u)
+        return float(u[AXES.index(self.axis)])
 
     def load(self, result: Fields) -> Array:
         """Return N (n, 3) of the element that contains the point, along the axis."""

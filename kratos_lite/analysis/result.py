@@ -374,9 +374,8 @@ class Result(ElementFields, Tabular):
         """Return the analysis that solved this; an error where it has none, or its model has changed."""
         analysis = self._analysis
         if analysis is None:
-            raise InputError(
-                f"{what} needs the model and the matrix of a static analysis; this result has none"
-            )
+            text = "needs the model and the matrix of a static analysis"
+            raise InputError(f"{what} {text}; this result has none")
         if self._version != analysis.model.version:
             raise ModelError("the model has changed since this solution; solve it again")
         return analysis

@@ -136,33 +136,21 @@ def section(fields: ElementFields, where: Any, recovered: bool = True) -> Sectio
         sigma = values.deformation_gradient @ voigt.tensor(values.pk2_stress)
     dA, total = np.linalg.norm(area, axis=1), area.sum(axis=0)
     whole, net = float(dA.sum()), float(np.linalg.norm(total))
-    centroid = dA @ points / whole
+    centroid, normal = dA @ points / whole, total / net if net > ON_PLANE * whole else 0 * total
     forces = internal_forces(mesh.points, fields.groups, u)
     forces = forces if mesh.hanging is None else mesh.hanging.gather(forces)
-    return Section(
-        name,
-        total / net if net > ON_PLANE * whole else 0 * total,
-        whole,
-        centroid,
-        weights @ forces,
-        weights @ np.cross(x - centroid, forces),
-        points,
-        dA,
-        values.stress,
-        np.einsum("qij,qj->qi", sigma, area / dA[:, None]),
-        mesh.units,
-    )
+    both = weights @ forces, weights @ np.cross(x - centroid, forces)
+    traction = np.einsum("qij,qj->qi", sigma, area / dA[:, None])
+    of_points = points, dA, values.stress, traction
+    return Section(name, normal, whole, centroid, *both, *of_points, mesh.units)
 
 
 def cut_of(mesh: Mesh, where: Any) -> tuple[str, Array, Pieces]:
     """Return a cut in words, by how much nodes lie beyond it (n,), and its pieces; raise for none."""
     if not mesh.whole:
         raise MeshError("a section needs the whole mesh on one process; solve it from one file")
-    if (
-        isinstance(where, (tuple, list))
-        and len(where) == 2
-        and isinstance(where[0], (str, tuple, list, np.ndarray))
-    ):
+    pair = isinstance(where, (tuple, list)) and len(where) == 2
+    if pair and isinstance(where[0], (str, tuple, list, np.ndarray)):
         return _by_plane(mesh, plane_of(where, np.zeros(3), "a section"))
     if isinstance(where, str) and "=" in where and where not in mesh.parts:
         raise InputError(f"a section by a plane is a pair such as ('x', 0.5); got {where!r}")
@@ -231,15 +219,10 @@ def _faces(mesh: Mesh, inside: Mask) -> Pieces:
 
 def _located(mesh: Mesh, pieces: Pieces, name: str) -> tuple[Located, Array]:
     """Return the points (q,) of a cut in their elements, and normal × area (q, 3) of each."""
-    starts = np.array([at.start for _, at in with_rows(mesh.blocks)])
-    flat = [
-        (
-            np.full(x[..., 0].size, number),
-            np.repeat(cells, x.shape[1]),
-            *(a.reshape(-1, 3) for a in (x, xi, dA)),
-        )
-        for number, cells, x, xi, dA in pieces
-    ]
+    starts, flat = np.array([at.start for _, at in with_rows(mesh.blocks)]), []
+    for number, cells, x, xi, dA in pieces:
+        vectors = (a.reshape(-1, 3) for a in (x, xi, dA))
+        flat.append((np.full(x[..., 0].size, number), np.repeat(cells, x.shape[1]), *vectors))
     block, cell, points, xi, area = (np.concatenate(part) for part in zip(*flat, strict=True))
     kept = area.any(axis=1)
     if not kept.any():

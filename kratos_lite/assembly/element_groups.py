@@ -144,19 +144,10 @@ class ElementGroup:
         """Return the group of the chosen elements, a mask (m,)."""
         if chosen.all():
             return self
-        stress = None if self.prestress is None else self.prestress[chosen]
-        states = self.states and self.states.take(chosen)
-        heating = None if self.heating is None else self.heating[chosen]
-        factors = None if self.factors is None else self.factors[chosen]
-        return replace(
-            self,
-            nodes=self.nodes[chosen],
-            rows=self.rows[chosen],
-            prestress=stress,
-            states=states,
-            heating=heating,
-            factors=factors,
-        )
+        names = ("nodes", "rows", "prestress", "heating", "factors")
+        arrays = {name: getattr(self, name) for name in names}
+        some: dict[str, Any] = {n: None if a is None else a[chosen] for n, a in arrays.items()}
+        return replace(self, states=self.states and self.states.take(chosen), **some)
 
     def chunks(self, memory: int = CHUNK_BYTES, within: slice | None = None) -> Iterator[slice]:
         """Cut the group, or a slice of it, into slices whose matrices take about `memory` bytes each."""

@@ -185,9 +185,8 @@ class ElementRange:
             return PointStates(stress, variables)
         for chunk in group.chunks():
             element, q = group.at(self.points, chunk), self.u[group.nodes[chunk]]
-            nodal, K = element_system(
-                element, group, q, stress[chunk], None if self.data is None else D[chunk]
-            )
+            tangent = None if self.data is None else D[chunk]
+            nodal, K = element_system(element, group, q, stress[chunk], tangent)
             add_nodal(forces, group.nodes[chunk], nodal)
             if K is not None:
                 self._scatter(chunk, K)

@@ -88,9 +88,8 @@ def check_case(case: Case) -> None:
     if case.modes and case.time is not None:
         raise InputError("a case has natural frequencies or a time integration; give one of them")
     if case.buckling and not case.modes:
-        raise InputError(
-            "buckling of a case needs the number of its modes: kl.Case(model, modes=5, buckling=True)"
-        )
+        cure = "kl.Case(model, modes=5, buckling=True)"
+        raise InputError(f"buckling of a case needs the number of its modes: {cure}")
     if case.backend == "petsc":
         if case.analysis in NOT_OF_PETSC:
             what = NOT_OF_PETSC[case.analysis]

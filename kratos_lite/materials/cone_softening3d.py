@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import radians, sin
 from typing import ClassVar
 
-from kratos_lite.errors import MaterialError
+from kratos_lite.materials.isotropic_law import check_angles
 from kratos_lite.materials.j2_softening3d import J2Softening3D
 
 
@@ -79,10 +79,4 @@ class ConeSoftening3D(J2Softening3D):
     def check(self) -> None:
         """Check the angles, too."""
         super().check()
-        if not 0 < self.friction < 90:
-            raise MaterialError(f"{self._name('friction')} {self.friction:g} must lie in 0° … 90°")
-        if not 0 <= self.dilatancy <= self.friction:
-            raise MaterialError(
-                f"{self._name('dilatancy')} {self.dilatancy:g} must lie in 0° … "
-                f"{self.friction:g}°, the friction"
-            )
+        check_angles(self)

@@ -10,8 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from kratos_lite import voigt
-from kratos_lite.errors import MaterialError
-from kratos_lite.materials.isotropic_law import IsotropicLaw
+from kratos_lite.materials.isotropic_law import ELASTIC, IsotropicLaw, check_angles
 from kratos_lite.materials.material import GaussState, Response
 from kratos_lite.typing import Array
 
@@ -60,15 +59,11 @@ class DruckerPrager3D(IsotropicLaw):
 
     positive: ClassVar[Mapping[str, str]] = {"cohesion": "Pa"}
     not_negative: ClassVar[Mapping[str, str]] = {"hardening": "Pa"}
-    variables: ClassVar[dict[str, str]] = {
-        "E": "YOUNG_MODULUS",
-        "nu": "POISSON_RATIO",
+    variables: ClassVar[dict[str, str]] = ELASTIC | {
         "cohesion": "COHESION",
         "friction": "FRICTION_ANGLE",
         "dilatancy": "DILATANCY_ANGLE",
         "hardening": "ISOTROPIC_HARDENING_MODULUS",
-        "density": "DENSITY",
-        "alpha": "THERMAL_EXPANSION_COEFFICIENT",
     }
     internal_variables: ClassVar[Mapping[str, int]] = {"plastic_strain": 6, "accumulated_plastic_strain": 1}
 
@@ -80,13 +75,7 @@ class DruckerPrager3D(IsotropicLaw):
     def check(self) -> None:
         """Check the angles."""
         super().check()
-        if not 0 < self.friction < 90:
-            raise MaterialError(f"{self._name('friction')} {self.friction:g} must lie in 0° … 90°")
-        if not 0 <= self.dilatancy <= self.friction:
-            raise MaterialError(
-                f"{self._name('dilatancy')} {self.dilatancy:g} must lie in 0° … "
-                f"{self.friction:g}°, the friction"
-            )
+        check_angles(self)
 
     def response(self, strain: Array, state: GaussState, dt: float) -> Response:
         """Return stress, consistent tangent and internal variables; see `Material.response`."""

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from kratos_lite.errors import MaterialError
-from kratos_lite.materials.isotropic_law import IsotropicLaw
+from kratos_lite.materials.isotropic_law import ELASTIC, IsotropicLaw
 from kratos_lite.materials.material import GaussState, Response
 from kratos_lite.typing import Array
 
@@ -58,13 +58,9 @@ class IsotropicDamage3D(IsotropicLaw):
     alpha: float = 0.0
 
     positive: ClassVar[Mapping[str, str]] = {"strength": "Pa", "fracture_energy": "J/m²"}
-    variables: ClassVar[dict[str, str]] = {
-        "E": "YOUNG_MODULUS",
-        "nu": "POISSON_RATIO",
+    variables: ClassVar[dict[str, str]] = ELASTIC | {
         "strength": "YIELD_STRESS",
         "fracture_energy": "FRACTURE_ENERGY",
-        "density": "DENSITY",
-        "alpha": "THERMAL_EXPANSION_COEFFICIENT",
     }
     internal_variables: ClassVar[Mapping[str, int]] = {"damage": 1, "threshold": 1, "element_length": 1}
 
@@ -72,9 +68,8 @@ class IsotropicDamage3D(IsotropicLaw):
         """Check that softening is linear or exponential."""
         super().check()
         if self.linear not in (0, 1):
-            raise MaterialError(
-                f"linear is 1 for linear softening or 0 for exponential one; got {self.linear:g}"
-            )
+            text = "linear is 1 for linear softening or 0 for exponential one"
+            raise MaterialError(f"{text}; got {self.linear:g}")
 
     def response(self, strain: Array, state: GaussState, dt: float) -> Response:
         """Return stress, tangent and internal variables; see `Material.response`."""

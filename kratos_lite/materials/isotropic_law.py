@@ -3,14 +3,27 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from kratos_lite import voigt
+from kratos_lite.errors import MaterialError
 from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.materials.material import GaussState, Material
 from kratos_lite.typing import Array
+
+ELASTIC = Isotropic3D.variables
+"""Variables of the constants of Isotropic3D, which other laws have, too."""
+
+
+def check_angles(law: Any) -> None:
+    """Check the angles of friction and dilatancy of a law."""
+    if not 0 < law.friction < 90:
+        raise MaterialError(f"{law._name('friction')} {law.friction:g} must lie in 0° … 90°")
+    if not 0 <= law.dilatancy <= law.friction:
+        text = f"must lie in 0° … {law.friction:g}°, the friction"
+        raise MaterialError(f"{law._name('dilatancy')} {law.dilatancy:g} {text}")
 
 
 class IsotropicLaw(Material, family=True):

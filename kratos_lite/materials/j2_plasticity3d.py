@@ -10,7 +10,7 @@ import numpy as np
 
 from kratos_lite import voigt
 from kratos_lite.errors import MaterialError
-from kratos_lite.materials.isotropic_law import VonMises
+from kratos_lite.materials.isotropic_law import ELASTIC, VonMises
 from kratos_lite.materials.material import GaussState, Response
 from kratos_lite.typing import Array
 
@@ -81,15 +81,11 @@ class J2Plasticity3D(VonMises):
         "SmallStrainJ2Plasticity3D",
         "PlasticityIsotropicKinematicJ2Law",
     )
-    variables: ClassVar[dict[str, str]] = {
-        "E": "YOUNG_MODULUS",
-        "nu": "POISSON_RATIO",
+    variables: ClassVar[dict[str, str]] = ELASTIC | {
         "yield_stress": "YIELD_STRESS",
         "hardening": "ISOTROPIC_HARDENING_MODULUS",
         "saturation_stress": "EXPONENTIAL_SATURATION_YIELD_STRESS",
         "exponent": "HARDENING_EXPONENT",
-        "density": "DENSITY",
-        "alpha": "THERMAL_EXPANSION_COEFFICIENT",
     }
     internal_variables: ClassVar[Mapping[str, int]] = {
         "plastic_strain": 6,

@@ -10,7 +10,7 @@ import numpy as np
 
 from kratos_lite import voigt
 from kratos_lite.errors import MaterialError, SolveError
-from kratos_lite.materials.isotropic_law import VonMises
+from kratos_lite.materials.isotropic_law import ELASTIC, VonMises
 from kratos_lite.materials.material import GaussState, Material, Response
 from kratos_lite.typing import Array
 
@@ -72,15 +72,11 @@ class J2Softening3D(VonMises):
 
     positive: ClassVar[Mapping[str, str]] = {"yield_stress": "Pa", "fracture_energy": "J/m²"}
     aliases: ClassVar[tuple[str, ...]] = ("SmallStrainIsotropicPlasticity3DVonMisesVonMises",)
-    variables: ClassVar[dict[str, str]] = {
-        "E": "YOUNG_MODULUS",
-        "nu": "POISSON_RATIO",
+    variables: ClassVar[dict[str, str]] = ELASTIC | {
         "yield_stress": "YIELD_STRESS_TENSION",
         "fracture_energy": "FRACTURE_ENERGY",
         "curve": "HARDENING_CURVE",
         "compression": "YIELD_STRESS_COMPRESSION",
-        "density": "DENSITY",
-        "alpha": "THERMAL_EXPANSION_COEFFICIENT",
     }
     internal_variables: ClassVar[Mapping[str, int]] = {
         "plastic_strain": 6,
@@ -150,9 +146,8 @@ class J2Softening3D(VonMises):
             "plastic_dissipation": np.clip(kappa + work * per_energy, 0, MOST)[..., None],
             "element_radius": state["element_radius"].copy(),
         }
-        across, along = (
-            3 * K * a * voigt.UNIT + 2**0.5 * G * b * n for a, b in ((mean, root), (mean_flow, root_flow))
-        )
+        of_cones = (3 * K * a * voigt.UNIT + 2**0.5 * G * b * n for a, b in self.cones)
+        across, along = of_cones
         growth = np.where(plastic, 1 / slope, 0.0)[..., None] * (across + (soft * dp)[..., None] * along)
         D = np.einsum("...i,...j->...ij", 2 * G * beta[..., None] * n, n)
         D -= np.einsum("...i,...j->...ij", along, growth)

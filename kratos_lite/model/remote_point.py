@@ -97,9 +97,8 @@ class RemotePoint(Coupling):
         where = self.where if isinstance(self.where, str) else f"{len(self.mesh.nodes(self.where))} nodes"
         at, units, place = np.flatnonzero(self.fixed), ("m", "rad"), ", ".join(f"{x:g}" for x in self.point)
         held = [f"{'uw'[i // 3]} {AXES[i % 3]} = {self.values[i]:g} {units[i // 3]}" for i in at]
-        return (
-            f"{'rigid' if self.is_rigid else 'mean of'} {where} at ({place}) m: {', '.join(held) or 'free'}"
-        )
+        how = "rigid" if self.is_rigid else "mean of"
+        return f"{how} {where} at ({place}) m: {', '.join(held) or 'free'}"
 
     # ---- what is prescribed and applied ------------------------------------------------------------------
 

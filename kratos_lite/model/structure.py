@@ -189,10 +189,8 @@ class Structure(Tabular):
         """
         values, elements = finite(factors, "factors of the stiffness"), self.mesh.elements(where)
         if values.shape not in ((), (len(elements),)) or not (values > 0).all():
-            raise InputError(
-                f"factors of the stiffness are > 0, one or ({len(elements)},); got shape {values.shape} from "
-                f"{values.min(initial=np.inf):g}"
-            )
+            given = f"shape {values.shape} from {values.min(initial=np.inf):g}"
+            raise InputError(f"factors of the stiffness are > 0, one or ({len(elements)},); got {given}")
         every = np.ones(self.mesh.n_elements) if self._factors is None else self._factors.copy()
         every[elements] = values
         every.flags.writeable = False
@@ -838,9 +836,8 @@ class Structure(Tabular):
         """
         if isinstance(load, (Attachment, MatrixAttachment)):
             if amplitude is not None or name is not None:
-                raise InputError(
-                    "a motion (its rate may be a function of time) or a spring takes no amplitude nor name"
-                )
+                text = "a motion (its rate may be a function of time) or a spring"
+                raise InputError(f"{text} takes no amplitude nor name")
             if isinstance(load, MatrixAttachment):
                 self._attach(load)
                 return

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.mesh import Mesh, Where
+from kratos_lite.mesh import NO_ROWS, Mesh, Where
 from kratos_lite.model.loads.base import key_of
 from kratos_lite.model.local_axes import LocalAxes
 from kratos_lite.model.ties import Coupling, PartTie
@@ -225,10 +225,8 @@ class Supports:
         W = np.where(np.abs(W) < AXIAL, 0.0, W)
         c = (u[:, :k] - (W @ u[:, k:, None])[..., 0]).ravel()
         dofs = 3 * nodes[:, None] + order
-        others, weights = (
-            np.broadcast_to(dofs[:, None, k:], W.shape).reshape(len(c), 3 - k),
-            W.reshape(len(c), 3 - k),
-        )
+        others = np.broadcast_to(dofs[:, None, k:], W.shape).reshape(len(c), 3 - k)
+        weights = W.reshape(len(c), 3 - k)
         dependents, alone = dofs[:, :k].ravel(), ~weights.any(axis=1)
         self._fixed.flat[dependents[alone]], self._values.flat[dependents[alone]] = True, c[alone]
         some = ~alone
@@ -372,22 +370,17 @@ class Supports:
     def _check_agreement(self, dependents: Ints, independents: Ints, constants: Array) -> None:
         """Raise ModelError where supports move tied degrees of freedom, and not by `constants` apart."""
         function, values = self._function.flat, self.values.flat
-        timed, apart = (
-            function[dependents] != function[independents],
-            values[dependents] - values[independents],
-        )
+        timed = function[dependents] != function[independents]
+        apart = values[dependents] - values[independents]
         rounding = 1e-9 * max(np.abs(self.values).max(), np.abs(constants).max(initial=0.0))
         for i in np.flatnonzero(timed | (np.abs(apart - constants) > rounding))[:1]:
             one, other = int(dependents[i]), int(independents[i])
             both = f"{self.name(one)} and {self.name(other)} are tied, but"
             if timed[i]:
-                raise ModelError(
-                    f"{both} move differently: give both the same function, or fix only one of them"
-                )
-            raise ModelError(
-                f"{both} prescribed as {values[one]:g} m and {values[other]:g} m: {constants[i]:g} m must be "
-                "between them, or fix one only"
-            )
+                text = "give both the same function, or fix only one of them"
+                raise ModelError(f"{both} move differently: {text}")
+            text = f"{constants[i]:g} m must be between them, or fix one only"
+            raise ModelError(f"{both} prescribed as {values[one]:g} m and {values[other]:g} m: {text}")
 
     def check_used(self, used: Mask) -> list[str]:
         """Raise ModelError for constraints of nodes that no element uses, by the mask (n,) of those used."""
@@ -451,7 +444,7 @@ class Supports:
     def _spring_rows(self) -> tuple[Ints, Ints, Array]:
         """Return likewise K of springs, whose forces are 0 in what they leave free, but for rounding."""
         if self.springs is None:
-            return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0)
+            return NO_ROWS, NO_ROWS, np.zeros(0)
         K = self.springs.tocoo()
         size = np.zeros(K.shape[0])
         np.maximum.at(size, K.row, np.abs(K.data))

@@ -66,13 +66,8 @@ class Constraints:
         """Return those of a mask (c,)."""
         entries = keep[self.owner]
         start = np.concatenate([[0], np.cumsum(np.diff(self.start)[keep])])
-        return Constraints(
-            self.dependents[keep],
-            start,
-            self.independents[entries],
-            self.weights[entries],
-            self.constants[keep],
-        )
+        of_each = self.independents[entries], self.weights[entries]
+        return Constraints(self.dependents[keep], start, *of_each, self.constants[keep])
 
     def renumbered(self, dof_of: Ints) -> Constraints:
         """Return those whose dependents have a new number, by the new numbers of all dofs, or -1."""

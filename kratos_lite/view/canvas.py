@@ -182,11 +182,13 @@ def check_picture(path: str | Path) -> str:
     return kind
 
 
-def save(figure: Any, path: str | Path) -> None:
-    """Write a figure, as a whole or not at all."""
-    kind = check_picture(path)
-    with replacing(path) as temporary:
-        figure.savefig(temporary, format=kind)
+def saved(figure: Any, path: str | Path | None) -> Any:
+    """Return a figure, which is written if there is a path, as a whole or not at all."""
+    if path is not None:
+        kind = check_picture(path)
+        with replacing(path) as temporary:
+            figure.savefig(temporary, format=kind)
+    return figure
 
 
 # ---- colors ----------------------------------------------------------------------------------------

@@ -94,10 +94,8 @@ def reference_temperature(properties: Properties, source: str) -> float:
     law, name = str(properties.values.get("CONSTITUTIVE_LAW") or "Isotropic3D"), "REFERENCE_TEMPERATURE"
     text = f"nodes have a TEMPERATURE; give a {name}, one number, at which it strains nothing"
     if law not in list(MATERIALS) and "Thermal" not in law:
-        text = (
-            f"CONSTITUTIVE_LAW {law} has no thermal strain in Kratos, but nodes have a TEMPERATURE; write "
-            f"{THERMAL_LAW} or {MATERIALS[law].__name__}, or leave the thermal expansion out"
-        )
+        cure = f"write {THERMAL_LAW} or {MATERIALS[law].__name__}, or leave the thermal expansion out"
+        text = f"CONSTITUTIVE_LAW {law} has no thermal strain in Kratos, but nodes have a TEMPERATURE; {cure}"
     elif (value := _array(properties.values.get(name, ()))).shape == ():
         return float(value)
     line = _line_of(properties, text)

@@ -96,12 +96,11 @@ def _temperature(model: Model) -> tuple[Array, Array]:
     for load in reversed(loads):
         own = mesh.elements(load.where)
         references[own] = np.where(np.isfinite(references[own]), load.reference, np.inf)
-    values = [
-        (group.nodes, (0.0 if group.heating is None else group.heating) + references[group.rows, None])
-        for group in heated(mesh, groups, [(1.0, load) for load in loads])
-    ]
-    for at, T in values:
-        nodes[at] = T
+    values = []
+    for group in heated(mesh, groups, [(1.0, load) for load in loads]):
+        heating = 0.0 if group.heating is None else group.heating
+        values.append((group.nodes, heating + references[group.rows, None]))
+        nodes[group.nodes] = values[-1][1]
     if not all(np.allclose(nodes[at], T, rtol=1e-9) for at, T in values):
         raise InputError("temperatures that differ on two sides of a node cannot be written to a file")
     return nodes, references
@@ -171,10 +170,8 @@ def _nodal_data(mesh: Mesh, variable: str, where: Mask, values: Array, fixed: bo
 
 def _parts(mesh: Mesh) -> dict[str, Part]:
     """Return the parts with names that Kratos can read."""
-    return {
-        kratos_name(name): Part(nodes=part.nodes, elements=part.elements, properties=())
-        for name, part in mesh.parts.items()
-    }
+    parts = {kratos_name(name): part for name, part in mesh.parts.items()}
+    return {name: Part(part.nodes, part.elements, properties=()) for name, part in parts.items()}
 
 
 def kratos_name(part: str) -> str:

@@ -101,10 +101,8 @@ def names_of_modes(values: Sequence[complex], buckling: bool = False) -> list[st
     >>> names_of_modes([2 * pi, 4 * pi])
     ['1: 1 Hz', '2: 2 Hz']
     """
-    return [
-        f"{i}: factor {value:.5g}" if buckling else f"{i}: {_name(value)}"
-        for i, value in enumerate(values, 1)
-    ]
+    names = [f"factor {value:.5g}" if buckling else _name(value) for value in values]
+    return [f"{i}: {name}" for i, name in enumerate(names, 1)]
 
 
 def _name(value: complex) -> str:

@@ -95,10 +95,8 @@ class Load(ABC):
 
     def without_derivative(self, why: str) -> ModelError:
         """Return the error for a load that has no derivative by coordinates."""
-        return ModelError(
-            f"{self!r} has no derivative by coordinates: {why}; take constant or nodal tractions, pressures, "
-            "body forces and forces"
-        )
+        cure = "take constant or nodal tractions, pressures, body forces and forces"
+        return ModelError(f"{self!r} has no derivative by coordinates: {why}; {cure}")
 
     def by_density(self, mesh: Mesh, groups: Sequence[ElementGroup], v: Array) -> Array:
         """Return the derivative (m,) of the work v·f, v (n, 3) in m, by the density of each element."""

@@ -255,9 +255,8 @@ class Resultant(FaceLoad):
         moment = moment + np.cross(arm, force)
         turn = np.linalg.pinv(inertia, rcond=1e-12, hermitian=True) @ moment
         if np.abs(inertia @ turn - moment).max() > 1e-9 * np.abs(moment).max():
-            raise ModelError(
-                f"{self!r}: its nodes lie on a line or at one place, and take no moment about it"
-            )
+            text = "its nodes lie on a line or at one place, and take no moment about it"
+            raise ModelError(f"{self!r}: {text}")
 
         def traction(x: Array) -> Array:
             return np.asarray(force / dA.sum() + np.cross(turn, x - center))

@@ -32,9 +32,8 @@ def write_page(path: str | Path, content: Content) -> None:
     """Write a page, as a whole or not at all; InputError for a mesh without a surface."""
     parts = {"library": library(), "title": html.escape(content.title)}
     if content.mesh.units != "SI":
-        raise InputError(
-            f"{path}: pages are in SI, and this mesh is in {content.mesh.units}; write .vtu or a picture"
-        )
+        text = f"pages are in SI, and this mesh is in {content.mesh.units}"
+        raise InputError(f"{path}: {text}; write .vtu or a picture")
     if not content.mesh.boundary:
         raise InputError(f"{path}: there is nothing to show: the mesh has no element of a known shape")
     _refuse_large(path, "coordinates", content.mesh.points)
