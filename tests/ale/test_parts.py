@@ -11,24 +11,6 @@ RUBBER = kl.Isotropic3D(E=2e6, nu=0.3, density=1200.0)
 STEEL = kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0)
 
 
-def joined(**meshes):
-    """Return the meshes side by side in one, each a part by its name with its own parts `name.part`."""
-    points, blocks, parts, first, cells = [], [], {}, 0, 0
-    for name, mesh in meshes.items():
-        own = []
-        for block in mesh.blocks:
-            ids = np.arange(cells, cells + len(block))
-            blocks.append(kl.Block(block.name, block.nodes + first, ids + 1, block.properties, block.shape))
-            own.append(ids)
-            cells += len(block)
-        parts[name] = kl.Part(nodes=np.arange(first, first + mesh.n_nodes), elements=np.concatenate(own))
-        for side in (*mesh.parts, "x-", "x+", "y-", "y+", "z-", "z+"):
-            parts[f"{name}.{side}"] = kl.Part(nodes=mesh.nodes(side) + first)
-        points.append(mesh.points)
-        first += mesh.n_nodes
-    return kl.Mesh(np.vstack(points), blocks, parts=parts)
-
-
 def wheel_mesh(element="8N"):
     return kl.annulus(0.3, 1.0, 0.25, (2, 16, 1), f"KinematicLinear3D{element}")
 
@@ -51,7 +33,7 @@ def loaded(model, name="", prefix=""):
 def two(motion, element="8N"):
     """Return one model of both, and both apart with the motion in the wheel alone."""
     both = kl.Model(
-        joined(wheel=wheel_mesh(element), rail=rail_mesh(element)), {"wheel": STEEL, "rail": RUBBER}
+        kl.join({"wheel": wheel_mesh(element), "rail": rail_mesh(element)}), {"wheel": STEEL, "rail": RUBBER}
     )
     loaded(both, prefix="both").add(motion(part="wheel"))
     wheel = loaded(kl.Model(wheel_mesh(element), STEEL), "wheel")
@@ -127,7 +109,7 @@ def test_the_cut_faces_of_a_strip_are_its_own(boundaries):
     strip = kl.box((4.0, 0.5, 0.2), (8, 1, 1), origin=(-2.0, 0.0, 0.0))
     rest = kl.box((9.0, 2.0, 2.0), (3, 2, 2), origin=(-4.0, 3.0, -5.0))
     motion = {"rate": 12.0, "acceleration": 3.0, "boundaries": boundaries, "damping": 2.0}
-    both = kl.Model(joined(strip=strip, rest=rest), {"strip": RUBBER, "rest": STEEL})
+    both = kl.Model(kl.join({"strip": strip, "rest": rest}), {"strip": RUBBER, "rest": STEEL})
     both.fix("rest.z-")
     both.fix("strip.z-")
     both.add(kl.PointLoad("strip.y+", (1.0, 2.0, -3.0), each=True))
@@ -146,7 +128,7 @@ def test_the_cut_faces_of_a_strip_are_its_own(boundaries):
 def wheel_on_rail(axes):
     """Return a rotor pressed on a rail by its lowest nodes, which are tied to those of the rail below."""
     rail = kl.box((1.0, 0.2, 0.25), (2, 1, 1), origin=(-0.5, -1.2, 0.0))
-    mesh = joined(wheel=wheel_mesh(), rail=rail)
+    mesh = kl.join({"wheel": wheel_mesh(), "rail": rail})
     low = np.flatnonzero(np.abs(mesh.points[:, :2] - (0.0, -1.0)).max(axis=1) < 1e-9)
     model = kl.Model(mesh, {"wheel": STEEL, "rail": RUBBER})
     model.fix("wheel.inner")
@@ -231,7 +213,7 @@ def test_moving_and_resting_elements_share_no_nodes():
 
 
 def test_checks_of_symmetry_and_supports_look_at_the_moving_part_alone():
-    both = kl.Model(joined(wheel=wheel_mesh(), rail=rail_mesh()), {"wheel": STEEL, "rail": RUBBER})
+    both = kl.Model(kl.join({"wheel": wheel_mesh(), "rail": rail_mesh()}), {"wheel": STEEL, "rail": RUBBER})
     both.fix("rail.y-")
     both.assign(
         kl.Orthotropic3D(2e8, 1e8, 1e8, 0.2, 0.2, 0.2, 4e7, 4e7, 4e7, 7620.0), both.mesh.elements("rail")[:2]
@@ -253,7 +235,7 @@ def test_checks_of_symmetry_and_supports_look_at_the_moving_part_alone():
 
 
 def test_fields_of_the_part_at_rest_change_only_in_time():
-    both = kl.Model(joined(wheel=wheel_mesh(), rail=rail_mesh()), {"wheel": STEEL, "rail": RUBBER})
+    both = kl.Model(kl.join({"wheel": wheel_mesh(), "rail": rail_mesh()}), {"wheel": STEEL, "rail": RUBBER})
     both.add(Rotation("z", 5.0, part="wheel"))
     X, rail = both.mesh.points, both.mesh.nodes("rail")
     change = X[:, 2]

@@ -176,7 +176,7 @@ def test_a_cut_along_tied_faces():
 @pytest.mark.parametrize("element", ["KinematicLinear3D8N", "EnhancedStrain3D8N", "BBar3D8N"])
 def test_laws_that_are_not_linear(element):
     law = kl.J2Plasticity3D(E=1e6, nu=0.3, yield_stress=40.0, hardening=1e5)
-    steps = cantilever(element, (3, 1, 1), law).quasi_static(tolerance=1e-12)
+    steps = cantilever(element, (2, 1, 1), law).quasi_static(tolerance=1e-12)
     list(kl.integrate(steps, 1.0, 1))
     cut = steps.result().section(("x", 1.3))
     assert np.abs(cut.force - FORCE).max() < 1e-9 * 7

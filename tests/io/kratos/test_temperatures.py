@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from run_files import CLAMP, box_mdpa, materials, process, run_file, write
+from run_files import CLAMP, CUBE_NODES, box_mdpa, materials, process, run_file, write
 
 import kratos_lite as kl
 from kratos_lite.errors import InputError, KratosLiteError
@@ -17,16 +17,7 @@ YOUNG_MODULUS 2e9
 POISSON_RATIO 0.3
 {properties}
 End Properties
-Begin Nodes
-1 0 0 0
-2 1 0 0
-3 1 1 0
-4 0 1 0
-5 0 0 1
-6 1 0 1
-7 1 1 1
-8 0 1 1
-End Nodes
+{nodes}
 Begin Elements SmallDisplacementElement3D8N
 1 1 1 2 3 4 5 6 7 8
 End Elements
@@ -46,7 +37,7 @@ def imposed(value, part="Structure", **settings):
 def mdpa(tmp_path):
     def read(properties=EXPANDS, temperature=HOT):
         path = tmp_path / "cube.mdpa"
-        path.write_text(MDPA.format(properties=properties, temperature=temperature))
+        path.write_text(MDPA.format(nodes=CUBE_NODES, properties=properties, temperature=temperature))
         return kl.read(path)
 
     return read

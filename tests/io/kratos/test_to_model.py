@@ -6,6 +6,7 @@ import os
 
 import numpy as np
 import pytest
+from run_files import CUBE_NODES
 
 import kratos_lite as kl
 from kratos_lite.io.formats.document import Constraint, Document
@@ -22,16 +23,7 @@ CUBE = """Begin Properties 1
  CONSTITUTIVE_LAW LinearElastic3DLaw
 {properties}
 End Properties
-Begin Nodes
-1 0 0 0
-2 1 0 0
-3 1 1 0
-4 0 1 0
-5 0 0 1
-6 1 0 1
-7 1 1 1
-8 0 1 1
-End Nodes
+{nodes}
 Begin Elements {element}
 1 1 1 2 3 4 5 6 7 8
 End Elements
@@ -52,7 +44,7 @@ End Conditions
 def load(tmp_path):
     def load(properties="", data="", element="SmallDisplacementElement3D8N"):
         path = tmp_path / "cube.mdpa"
-        path.write_text(CUBE.format(properties=properties, data=data, element=element))
+        path.write_text(CUBE.format(nodes=CUBE_NODES, properties=properties, data=data, element=element))
         return kl.read(path)
 
     return load
