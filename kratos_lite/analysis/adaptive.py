@@ -70,9 +70,8 @@ def solve_to(
     most = _affordable() if most_unknowns is None else whole_number(most_unknowns, "most_unknowns")
     check_geometry(geometry, model.mesh)
     if model.motion is not None:
-        raise ModelError(
-            "a model whose material moves through its mesh is not refined; solve it without error"
-        )
+        cure = "solve it without error"
+        raise ModelError(f"a model whose material moves through its mesh is not refined; {cure}")
     model.require_linear("a requested error")
     check_quantity(quantity)
     level: Level | None = None
@@ -130,10 +129,8 @@ def check_quantity(quantity: Quantity | None) -> None:
         raise InputError(f"quantity must be one such as DisplacementAt; got {short(quantity)}")
     part = getattr(quantity, "part", "")
     if not (isinstance(part, str) or callable(part)):
-        raise InputError(
-            f"{quantity} is of rows of nodes, which are others on a finer mesh; give the part by its name, "
-            "or a function of places"
-        )
+        cure = "give the part by its name, or a function of places"
+        raise InputError(f"{quantity} is of rows of nodes, which are others on a finer mesh; {cure}")
 
 
 def check_geometry(geometry: Geometry | None, mesh: Mesh) -> None:

@@ -253,10 +253,8 @@ class Result(ElementFields, Tabular):
         if not isinstance(points, Located):
             return self.mesh.locate(points, required=True)
         if points.mesh is not self.mesh:
-            raise InputError(
-                "these points were located in another mesh; locate them in that of the result, as in "
-                "result.at(result.mesh.locate(points))"
-            )
+            cure = "locate them in that of the result, as in result.at(result.mesh.locate(points))"
+            raise InputError(f"these points were located in another mesh; {cure}")
         return points.require()
 
     # ---- error ---------------------------------------------------------------------------------

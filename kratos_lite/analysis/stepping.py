@@ -114,9 +114,8 @@ def integrate(
         _log.info("each step of %g s in %d parts; the critical step is %g s", h, parts, critical)
     if parts > MOST_SUBSTEPS:
         stable = f"; the critical step is {stepper.critical_step():.3g} s" if substeps == "auto" else ""
-        raise InputError(
-            f"a step of {h:g} s has more than {MOST_SUBSTEPS} substeps{stable}; take shorter steps"
-        )
+        cure = "take shorter steps"
+        raise InputError(f"a step of {h:g} s has more than {MOST_SUBSTEPS} substeps{stable}; {cure}")
     stepper.prepare(h, parts)
     return _states(stepper, h, count, every, until, progress)
 
@@ -154,9 +153,8 @@ def _states(
             yield state
             answer = until is not None and until(state)
             if np.size(answer) != 1:
-                raise InputError(
-                    f"until must return True or False; got {short(answer)}; use .any() or .all()"
-                )
+                cure = "use .any() or .all()"
+                raise InputError(f"until must return True or False; got {short(answer)}; {cure}")
             if answer:
                 return
 

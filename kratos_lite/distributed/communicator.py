@@ -292,9 +292,8 @@ def _check(ranks: Ranks, words: list[str]) -> None:
     found = ranks.gather(words)
     for rank, one in enumerate(found):
         if one != found[0]:
-            raise InputError(
-                f"ranks share one command; rank 0 has {' '.join(found[0])!r}, rank {rank} {' '.join(one)!r}"
-            )
+            both = f"rank 0 has {' '.join(found[0])!r}, rank {rank} {' '.join(one)!r}"
+            raise InputError(f"ranks share one command; {both}")
 
 
 def _mpi() -> Any:

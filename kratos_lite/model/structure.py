@@ -855,10 +855,8 @@ class Structure(Tabular):
             if key_of(named[name]) == key_of(load):
                 return
             if not override:
-                raise ModelError(
-                    f"there is another load {name!r} already, {named[name]!r}; replace it by override=True, "
-                    f"or take it away by model.remove({name!r})"
-                )
+                cure = f"replace it by override=True, or take it away by model.remove({name!r})"
+                raise ModelError(f"there is another load {name!r} already, {named[name]!r}; {cure}")
             self.loads[:] = [load if other is named[name] else other for other in self.loads]
         else:
             self.loads.append(load)
@@ -925,9 +923,8 @@ class Structure(Tabular):
         """
         warnings, groups = self.check_geometry(), self.element_groups()
         if self.initial_displacement is not None and any(group.element.finite for group in groups):
-            raise ModelError(
-                "a stress-free displacement is for small strains; move the nodes of the mesh instead"
-            )
+            cure = "move the nodes of the mesh instead"
+            raise ModelError(f"a stress-free displacement is for small strains; {cure}")
         return groups, [*warnings, *(text for check in CHECKS for text in check(self, groups))]
 
     def free_motions(self, groups: list[ElementGroup]) -> FreeMotions:

@@ -120,10 +120,8 @@ class Supports:
         if old and old.key == condition.key:
             return
         if old and not condition.override:
-            raise ModelError(
-                f"there is another support {old.name!r} already, {old}; replace it by override=True, or take "
-                f"it away by model.release({old.name!r})"
-            )
+            cure = f"replace it by override=True, or take it away by model.release({old.name!r})"
+            raise ModelError(f"there is another support {old.name!r} already, {old}; {cure}")
         self._apply(condition)
         self.conditions.append(condition)
         if old:
@@ -253,9 +251,8 @@ class Supports:
             how = f"{self.values.flat[dof]:g} m and {new[i, j]:g} m"
             if function != CONSTANT or self._function.flat[dof] != CONSTANT:
                 how = "by a function of time and otherwise"
-            raise ModelError(
-                f"{self.name(dof)} is prescribed twice: {how}; fix it once, or with override=True"
-            )
+            cure = "fix it once, or with override=True"
+            raise ModelError(f"{self.name(dof)} is prescribed twice: {how}; {cure}")
 
     @property
     def motions(self) -> list[tuple[Callable[[float], float], Mask]]:
