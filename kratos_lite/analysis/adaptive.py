@@ -70,8 +70,9 @@ def solve_to(
     most = _affordable() if most_unknowns is None else whole_number(most_unknowns, "most_unknowns")
     check_geometry(geometry, model.mesh)
     if model.motion is not None:
-        cure = "solve it without error"
-        raise ModelError(f"a model whose material moves through its mesh is not refined; {cure}")
+        raise ModelError(
+            "a model whose material moves through its mesh is not refined; solve it without error"
+        )
     model.require_linear("a requested error")
     check_quantity(quantity)
     level: Level | None = None
@@ -129,8 +130,10 @@ def check_quantity(quantity: Quantity | None) -> None:
         raise InputError(f"quantity must be one such as DisplacementAt; got {short(quantity)}")
     part = getattr(quantity, "part", "")
     if not (isinstance(part, str) or callable(part)):
-        cure = "give the part by its name, or a function of places"
-        raise InputError(f"{quantity} is of rows of nodes, which are others on a finer mesh; {cure}")
+        raise InputError(
+            f"{quantity} is of rows of nodes, which are others on a finer mesh; give the part by its name, "
+            "or a function of places"
+        )
 
 
 def check_geometry(geometry: Geometry | None, mesh: Mesh) -> None:

@@ -121,8 +121,10 @@ def _moduli(result: Any) -> Array:
     for group in result.groups:
         modulus: Any = getattr(group.material, "E", None)
         if not isinstance(modulus, float):
-            cure = "take wrt='stiffness', the derivative by a factor of the stiffness of each element"
-            raise InputError(f"{type(group.material).__name__} has no Young's modulus E; {cure}")
+            raise InputError(
+                f"{type(group.material).__name__} has no Young's modulus E; take wrt='stiffness', the "
+                "derivative by a factor of the stiffness of each element"
+            )
         E[group.rows] = modulus if group.factors is None else modulus / group.factors
     return E
 

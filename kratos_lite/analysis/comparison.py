@@ -126,8 +126,10 @@ def compare(first: Result, second: Result) -> Comparison:
         located = second.mesh.locate(mesh.points)
         nodes = np.flatnonzero(located.inside & used)
         if not len(nodes):
-            cure = "compare results of one body, in one place and unit of length"
-            raise MeshError(f"no node of the first result lies in the mesh of the second; {cure}")
+            raise MeshError(
+                "no node of the first result lies in the mesh of the second; compare results of one body, in "
+                "one place and unit of length"
+            )
         values = second.at(located[nodes], recovered=True)
         u, stress = values.displacement, values.stress
     weight = _volumes(first)

@@ -47,8 +47,10 @@ class ElementFields:
 
     def _field(self, at: str, stress: bool) -> Any:
         if not isinstance(at, str):
-            cure = "values at points are those of result.at(points), such as result.at(points).stress"
-            raise InputError(f"at must be one of {', '.join(PLACES)}; {cure}")
+            raise InputError(
+                f"at must be one of {', '.join(PLACES)}; values at points are those of "
+                "result.at(points), such as result.at(points).stress"
+            )
         place = choice(at, "at", PLACES)
         points, u = self.mesh.points, self._strained
         if place == "gauss":

@@ -54,8 +54,10 @@ def homogenized(model: Structure, *, solver: str = "auto", tolerance: float = 1e
     cell = next((tie for tie in model.supports.ties if isinstance(tie, Periodic)), None)
     ways = np.zeros((0, 3)) if cell is None else cell.ways
     if cell is None or ways.shape != (3, 3) or np.linalg.matrix_rank(ways) < 3:
-        given = f"got {len(ways)}: give each as model.periodic('x-', 'x+')"
-        raise ModelError(f"a cell has three pairs of periodic parts along three directions; {given}")
+        raise ModelError(
+            f"a cell has three pairs of periodic parts along three directions; got {len(ways)}: give each as "
+            "model.periodic('x-', 'x+')"
+        )
     if model.supports.fixed.sum(axis=0).max() > 1:
         raise ModelError("supports hold more of the cell than one node; release them")
     if model.prestress is not None or model.initial_displacement is not None:

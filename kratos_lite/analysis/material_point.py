@@ -195,5 +195,7 @@ def _step(
         e[free] -= np.linalg.lstsq(D[np.ix_(free, free)], r, rcond=None)[0]
         if not np.isfinite(e).all():
             break
-    cure = "take more steps, or prescribe strains beyond the strength of the law"
-    raise SolveError(f"{type(law).__name__}: no strain with the stresses asked for was found; {cure}")
+    raise SolveError(
+        f"{type(law).__name__}: no strain with the stresses asked for was found; take more steps, or "
+        "prescribe strains beyond the strength of the law"
+    )

@@ -125,8 +125,10 @@ def solve_part(
 def _checked(model: Structure) -> tuple[list[ElementGroup], list[str]]:
     """Return elements and warnings of a part whose elements are sound; refuse what needs the whole mesh."""
     if len(model.supports.constraints) or model.motion is not None or model.mesh.hanging is not None:
-        cure = "solve it by `kratos-lite solve` from one file"
-        raise ModelError(f"constraints, hanging nodes and motions need the whole mesh on one process; {cure}")
+        raise ModelError(
+            "constraints, hanging nodes and motions need the whole mesh on one process; solve it by "
+            "`kratos-lite solve` from one file"
+        )
     warnings = model.check_geometry()
     groups = model.element_groups()
     if any(isinstance(one, Temperature) for load in model.loads for _, one in load.acting(0.0)):

@@ -246,8 +246,10 @@ class MeanDisplacement(Quantity):
         inside[mesh.nodes(self.part)] = True
         rows = [group.rows[inside[group.nodes].all(axis=1)] for group in result.groups]
         if not any(map(len, rows)):
-            cure = "a mean needs one, DisplacementAt takes a point"
-            raise ModelError(f"{self}: the part has neither a face on the boundary nor an element; {cure}")
+            raise ModelError(
+                f"{self}: the part has neither a face on the boundary nor an element; a mean needs one, "
+                "DisplacementAt takes a point"
+            )
         return BodyForce(direction, where=np.concatenate(rows))
 
 

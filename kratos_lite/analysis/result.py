@@ -253,8 +253,10 @@ class Result(ElementFields, Tabular):
         if not isinstance(points, Located):
             return self.mesh.locate(points, required=True)
         if points.mesh is not self.mesh:
-            cure = "locate them in that of the result, as in result.at(result.mesh.locate(points))"
-            raise InputError(f"these points were located in another mesh; {cure}")
+            raise InputError(
+                "these points were located in another mesh; locate them in that of the result, as in "
+                "result.at(result.mesh.locate(points))"
+            )
         return points.require()
 
     # ---- error ---------------------------------------------------------------------------------

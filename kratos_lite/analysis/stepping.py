@@ -114,8 +114,9 @@ def integrate(
         _log.info("each step of %g s in %d parts; the critical step is %g s", h, parts, critical)
     if parts > MOST_SUBSTEPS:
         stable = f"; the critical step is {stepper.critical_step():.3g} s" if substeps == "auto" else ""
-        cure = "take shorter steps"
-        raise InputError(f"a step of {h:g} s has more than {MOST_SUBSTEPS} substeps{stable}; {cure}")
+        raise InputError(
+            f"a step of {h:g} s has more than {MOST_SUBSTEPS} substeps{stable}; take shorter steps"
+        )
     stepper.prepare(h, parts)
     return _states(stepper, h, count, every, until, progress)
 
@@ -153,8 +154,9 @@ def _states(
             yield state
             answer = until is not None and until(state)
             if np.size(answer) != 1:
-                cure = "use .any() or .all()"
-                raise InputError(f"until must return True or False; got {short(answer)}; {cure}")
+                raise InputError(
+                    f"until must return True or False; got {short(answer)}; use .any() or .all()"
+                )
             if answer:
                 return
 

@@ -186,8 +186,9 @@ def _modes(thing: Any, given: dict[str, Any]) -> tuple[Numbers, list[str]]:
     for part in (shapes.real, shapes.imag):
         finite(part, "modes")
     if shapes.shape[-2:] != (mesh.n_nodes, 3) or shapes.ndim not in (2, 3) or not len(shapes):
-        found = f"got {shapes.shape}"
-        raise InputError(f"modes must have shape ({mesh.n_nodes}, 3) or (k, {mesh.n_nodes}, 3); {found}")
+        raise InputError(
+            f"modes must have shape ({mesh.n_nodes}, 3) or (k, {mesh.n_nodes}, 3); got {shapes.shape}"
+        )
     titles = given["titles"]
     if shapes.ndim == 2:
         shapes, titles = shapes[None], [given["title"] or "mode"] if titles is None else titles

@@ -284,8 +284,9 @@ class ElementRange:
                 except np.linalg.LinAlgError:
                     raise SolveError("the law does not resist enhanced strains; take b_bar") from None
             else:
-                cure = "take smaller steps"
-                raise SolveError(f"enhanced strains do not converge in {MODES_MAX} iterations; {cure}")
+                raise SolveError(
+                    f"enhanced strains do not converge in {MODES_MAX} iterations; take smaller steps"
+                )
             parts.append(PointStates(stress, variables, alpha))
             found = np.einsum("mgci,mgc->mi", B * dV[..., None, None], stress)
             add_nodal(forces, self.group.nodes[chunk], found.reshape(len(q), -1, 3))

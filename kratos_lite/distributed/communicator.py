@@ -292,8 +292,9 @@ def _check(ranks: Ranks, words: list[str]) -> None:
     found = ranks.gather(words)
     for rank, one in enumerate(found):
         if one != found[0]:
-            both = f"rank 0 has {' '.join(found[0])!r}, rank {rank} {' '.join(one)!r}"
-            raise InputError(f"ranks share one command; {both}")
+            raise InputError(
+                f"ranks share one command; rank 0 has {' '.join(found[0])!r}, rank {rank} {' '.join(one)!r}"
+            )
 
 
 def _mpi() -> Any:

@@ -163,8 +163,9 @@ def inside(folder: Path, name: str, allow_outside: bool = False) -> Path:
     relative = Path(name.replace("\\", "/"))
     leaves = relative.is_absolute() or ".." in relative.parts or (len(name) > 1 and name[1] == ":")
     if leaves and not allow_outside:
-        cure = "give a path inside it, without '..'"
-        raise ValueError(f"path {name!r} leaves the folder of the run file; {cure}")
+        raise ValueError(
+            f"path {name!r} leaves the folder of the run file; give a path inside it, without '..'"
+        )
     if any(len(part.encode()) > LONGEST for part in relative.parts):
         raise ValueError(f"a name in the path {shown(name)} is longer than {LONGEST} bytes; shorten it")
     return folder / relative

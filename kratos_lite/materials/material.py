@@ -95,11 +95,13 @@ class Material:
         if family:
             return
         if cls.is_linear and not any("elasticity" in vars(base) for base in cls.__mro__):
-            cure = "derive from that, or leave it out"
-            raise MaterialError(f"{cls.__name__}.is_linear is for a LinearMaterial; {cure}")
+            raise MaterialError(
+                f"{cls.__name__}.is_linear is for a LinearMaterial; derive from that, or leave it out"
+            )
         if cls.strain_measure not in ("small", "finite"):
-            given = f"got {cls.strain_measure!r}"
-            raise MaterialError(f"{cls.__name__}.strain_measure is 'small' or 'finite'; {given}")
+            raise MaterialError(
+                f"{cls.__name__}.strain_measure is 'small' or 'finite'; got {cls.strain_measure!r}"
+            )
         sizes = cls.internal_variables
         if not isinstance(sizes, Mapping) or not all(isinstance(size, int) for size in sizes.values()):
             raise MaterialError(
@@ -131,8 +133,9 @@ class Material:
                 f"{type(self).__name__} has no density: add density: float = 0.0 to its constants"
             )
         if self.density < 0:
-            cure = "reverse gravity instead"
-            raise MaterialError(f"{self._name('density')} {self.density:g} must be ≥ 0 kg/m³; {cure}")
+            raise MaterialError(
+                f"{self._name('density')} {self.density:g} must be ≥ 0 kg/m³; reverse gravity instead"
+            )
         for bound, units in ((">", self.positive), ("≥", self.not_negative)):
             for name, unit in units.items():
                 value = getattr(self, name)
@@ -236,9 +239,9 @@ class Material:
         """
         strain = np.array(strain, dtype=float)  # a copy, which a law cannot spoil
         if strain.shape[-1:] != (6,) or not dt >= 0:
-            given = f"got shape {strain.shape} and dt = {dt}"
             raise MaterialError(
-                f"a strain has six components xx yy zz xy yz zx, and a step dt ≥ 0 s; {given}"
+                f"a strain has six components xx yy zz xy yz zx, and a step dt ≥ 0 s; got shape "
+                f"{strain.shape} and dt = {dt}"
             )
         answer = self._response(strain, state, dt)
         if not isinstance(answer, tuple) or len(answer) != 3:

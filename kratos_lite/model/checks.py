@@ -65,8 +65,10 @@ def check_geometry(mesh: Mesh, formulation: str | None = None) -> list[str]:
     for block, element in zip(mesh.blocks, elements, strict=True):
         width = block.nodes.shape[1]
         if width != len(element.nodes):
-            given = f"got {block.nodes.shape}"
-            raise MeshError(f"block {block.name}: nodes must have shape (m, {len(element.nodes)}); {given}")
+            raise MeshError(
+                f"block {block.name}: nodes must have shape (m, {len(element.nodes)}); "
+                f"got {block.nodes.shape}"
+            )
         ordered = np.sort(block.nodes, axis=1)
         for cell, place in np.argwhere(ordered[:, 1:] == ordered[:, :-1])[:1]:
             raise MeshError(
@@ -272,8 +274,10 @@ def check_loads(
 def check_carried(mesh: Mesh, forces: Array, used: Mask) -> None:
     """Raise ModelError for forces (n, 3) on nodes that no element uses, by the mask (n,) of those used."""
     for node in np.flatnonzero(~used & (forces != 0).any(axis=1))[:1]:
-        cure = "load another node, or give it an element"
-        raise ModelError(f"node {mesh.node_ids[node]} carries a load but belongs to no element; {cure}")
+        raise ModelError(
+            f"node {mesh.node_ids[node]} carries a load but belongs to no element; load another node, or "
+            "give it an element"
+        )
 
 
 def equilibrium(

@@ -855,8 +855,10 @@ class Structure(Tabular):
             if key_of(named[name]) == key_of(load):
                 return
             if not override:
-                cure = f"replace it by override=True, or take it away by model.remove({name!r})"
-                raise ModelError(f"there is another load {name!r} already, {named[name]!r}; {cure}")
+                raise ModelError(
+                    f"there is another load {name!r} already, {named[name]!r}; replace it by override=True, "
+                    f"or take it away by model.remove({name!r})"
+                )
             self.loads[:] = [load if other is named[name] else other for other in self.loads]
         else:
             self.loads.append(load)
@@ -923,8 +925,9 @@ class Structure(Tabular):
         """
         warnings, groups = self.check_geometry(), self.element_groups()
         if self.initial_displacement is not None and any(group.element.finite for group in groups):
-            cure = "move the nodes of the mesh instead"
-            raise ModelError(f"a stress-free displacement is for small strains; {cure}")
+            raise ModelError(
+                "a stress-free displacement is for small strains; move the nodes of the mesh instead"
+            )
         return groups, [*warnings, *(text for check in CHECKS for text in check(self, groups))]
 
     def free_motions(self, groups: list[ElementGroup]) -> FreeMotions:

@@ -120,8 +120,10 @@ class Supports:
         if old and old.key == condition.key:
             return
         if old and not condition.override:
-            cure = f"replace it by override=True, or take it away by model.release({old.name!r})"
-            raise ModelError(f"there is another support {old.name!r} already, {old}; {cure}")
+            raise ModelError(
+                f"there is another support {old.name!r} already, {old}; replace it by override=True, or take "
+                f"it away by model.release({old.name!r})"
+            )
         self._apply(condition)
         self.conditions.append(condition)
         if old:
@@ -251,8 +253,9 @@ class Supports:
             how = f"{self.values.flat[dof]:g} m and {new[i, j]:g} m"
             if function != CONSTANT or self._function.flat[dof] != CONSTANT:
                 how = "by a function of time and otherwise"
-            cure = "fix it once, or with override=True"
-            raise ModelError(f"{self.name(dof)} is prescribed twice: {how}; {cure}")
+            raise ModelError(
+                f"{self.name(dof)} is prescribed twice: {how}; fix it once, or with override=True"
+            )
 
     @property
     def motions(self) -> list[tuple[Callable[[float], float], Mask]]:

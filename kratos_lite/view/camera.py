@@ -30,8 +30,10 @@ def rows_of(view: View | None, X: Array) -> Array:
         return _rows(_side_of(np.ptp(X, axis=0)))
     if isinstance(view, str):
         if view not in VIEWS:
-            given = f"got {view!r}.{nearest(view, list(VIEWS), 1)}"
-            raise InputError(f"view must be one of {', '.join(VIEWS)}, angles or a direction; {given}")
+            raise InputError(
+                f"view must be one of {', '.join(VIEWS)}, angles or a direction; got {view!r}."
+                f"{nearest(view, list(VIEWS), 1)}"
+            )
         return _rows(np.asarray(VIEWS[view], dtype=float))
     numbers = finite(view, "a view")
     if numbers.shape == (2,):

@@ -39,8 +39,10 @@ def check_part_files(path: Path, files: dict[int, Path], size: int) -> None:
     missing = [rank for rank in range(max(files) + 1) if rank not in files]
     name = re.sub(r"_\d+\.mdpa$", "", next(iter(files.values())).name)
     if missing:
-        cure = f"there are {_listed(files)}. Make the parts anew"
-        raise InputError(f"{path}: the part file {name}_{missing[0]}.mdpa is missing; {cure}")
+        raise InputError(
+            f"{path}: the part file {name}_{missing[0]}.mdpa is missing; there are {_listed(files)}. "
+            "Make the parts anew"
+        )
     if len(files) != size:
         raise InputError(
             f"{path}: there are {len(files)} part files, {_listed(files)}, and {size} rank"

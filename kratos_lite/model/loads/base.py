@@ -214,8 +214,9 @@ class TimeDependentLoad(Load):
         """
         load = self.function(time)
         if load is not None and (not isinstance(load, Load) or isinstance(load, TimeDependentLoad)):
-            given = f"got {load!r}"
-            raise InputError(f"the load at t = {time:g} s must be a PointLoad or another, or None; {given}")
+            raise InputError(
+                f"the load at t = {time:g} s must be a PointLoad or another, or None; got {load!r}"
+            )
         return load
 
     def acting(self, time: float) -> Sequence[tuple[float, Load]]:
@@ -266,8 +267,9 @@ class ScaledLoad(TimeDependentLoad):
     def __init__(self, load: Load, amplitude: Factor) -> None:
         if not isinstance(load, Load) or isinstance(load, TimeDependentLoad):
             name = type(load).__name__
-            given = f"got {name}"
-            raise InputError(f"an amplitude multiplies a constant load such as Gravity or Traction; {given}")
+            raise InputError(
+                f"an amplitude multiplies a constant load such as Gravity or Traction; got {name}"
+            )
         self.load, self.amplitude = load, function_of(amplitude, "the amplitude of a load")
 
     def check(self, mesh: Mesh) -> None:

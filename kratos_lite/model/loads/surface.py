@@ -380,8 +380,9 @@ def loaded_faces(mesh: Mesh, where: Where, what: str, cells: Sequence[str] = SUR
     for block in faces:
         if block.shape is None or block.shape.cell not in cells:
             other = "conditions of the unknown type" if block.shape is None else "other conditions,"
-            found = f"it meets {other} {block.name} (the first is {block.ids[0]})"
-            raise ModelError(f"{what} acts on {wanted}; {found}")
+            raise ModelError(
+                f"{what} acts on {wanted}; it meets {other} {block.name} (the first is {block.ids[0]})"
+            )
     if mesh.whole and not faces:
         name = f"part {where!r}" if isinstance(where, str) else "the chosen nodes"
         raise ModelError(
