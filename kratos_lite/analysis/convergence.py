@@ -24,7 +24,7 @@ from kratos_lite.model.refined import refined
 from kratos_lite.model.structure import Structure
 from kratos_lite.tabular import Tabular, unit_name
 from kratos_lite.typing import Array, ArrayLike
-from kratos_lite.validation import finite, instance, number, short, whole_number
+from kratos_lite.validation import finite, function_or_none, instance, number, short, whole_number
 
 SAFE, UNSAFE = 1.25, 3.0  # factors of the band in the asymptotic range, and beyond it
 LEAST, MOST = 0.5, 20.0  # order there, and any
@@ -152,6 +152,7 @@ def converge(
     if not (isinstance(quantity, Quantity) or callable(quantity)):
         text = "a quantity must be one such as kl.DisplacementAt, or a function"
         raise InputError(f"{text}; got {short(quantity)}")
+    function_or_none(solve, "solve must be a function of a model")
     uniform = isinstance(model, Structure)
     if not (uniform or (callable(model) and geometry is None)):
         raise InputError(
@@ -203,6 +204,9 @@ def limit_of(h: Array, f: Array) -> tuple[Array, float, float, str]:
 def _order(h: Array, f: Array) -> float:
     """Return the order of three values; nan if there is none."""
     from scipy.optimize import brentq  # rarely needed
+
+    if np.ptp(f) <= ROUNDING * np.abs(f).max():
+        return np.nan
 
     (a, b), (r, s) = np.diff(f), np.log(h[:2] / h[2])
     try:

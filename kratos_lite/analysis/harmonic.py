@@ -15,6 +15,7 @@ import numpy as np
 
 from kratos_lite.analysis.element_fields import ElementFields
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
+from kratos_lite.analysis.fields import labelled
 from kratos_lite.analysis.modal import natural_modes
 from kratos_lite.analysis.nodal_loads import forces_of
 from kratos_lite.assembly.element_groups import ElementGroup
@@ -25,7 +26,7 @@ from kratos_lite.model.loads.temperature import Temperature
 from kratos_lite.model.matching import Cut
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.plan import FALLBACK_LIMIT
-from kratos_lite.tabular import Tabular, in_units, unit_name
+from kratos_lite.tabular import Tabular, unit_name
 from kratos_lite.typing import Array, ArrayLike, Complexes, Progress
 from kratos_lite.validation import choice, finite, instance, number, short, whole_number
 
@@ -153,7 +154,7 @@ class HarmonicResponse(Tabular):
         made = {"frequency [rad/s]": self.frequencies}
         for i, axis in enumerate("xyz"):
             made |= {f"amplitude {axis} [m]": np.abs(u[:, i]), f"phase {axis} [rad]": np.angle(u[:, i])}
-        return {in_units(name, self.units): values for name, values in made.items()}
+        return labelled(made, self.units)
 
     def plot(self, point: ArrayLike, axis: str = "z", path: str | Path | None = None) -> Any:
         """Draw the amplitude of a point against the frequency, on logarithmic scales.
@@ -294,7 +295,8 @@ def _forces(model: Structure, e: EquationsOfMotion, loads: HarmonicLoads | None)
         of = load.load if isinstance(load, ScaledLoad) else load
         if isinstance(of, (Temperature, TimeDependentLoad)):
             raise ModelError(f"{of!r} does not swing: harmonic response takes forces, each with a factor")
-        if not isinstance(factor, Complex) or not np.isfinite(factor):
+        if not isinstance(factor, Complex):
             raise InputError(f"the factor of a load is a complex number; got {factor!r}")
+        finite(abs(factor), "the size of the factor of a load")
         total += factor * e.system.gather(forces_of(model, e.groups, load))
     return total

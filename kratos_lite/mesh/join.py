@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from kratos_lite.errors import MeshError
 from kratos_lite.mesh.blocks import Block, Part
 from kratos_lite.mesh.mesh import Mesh
 from kratos_lite.mesh.selection import Where
-from kratos_lite.validation import instance
+from kratos_lite.validation import instance, short
 
 FLAT = 1e-6
 """Fraction of the size of a cut by which its nodes may be off the plane."""
@@ -34,7 +35,7 @@ def join(meshes: Mapping[str, Mesh]) -> Mesh:
     Raises
     ------
     MeshError
-        There is no mesh, or one has hanging nodes.
+        There is no mesh, one has hanging nodes, or they are in different units.
 
     Examples
     --------
@@ -65,7 +66,10 @@ def join(meshes: Mapping[str, Mesh]) -> Mesh:
                 start += len(block)
         first = {what: first[what] + counts[what] for what in COUNTED}
     points = np.vstack([mesh.points for mesh in meshes.values()])
-    return Mesh(points, blocks["blocks"], conditions=blocks["conditions"], parts=parts)
+    units = {mesh.units for mesh in meshes.values()} - {"SI"} or {"SI"}  # which others replace
+    if len(units) > 1:
+        raise MeshError(f"meshes are joined in one set of units; got {' and '.join(sorted(units))}")
+    return Mesh(points, blocks["blocks"], conditions=blocks["conditions"], parts=parts, units=units.pop())
 
 
 def split(mesh: Mesh, where: Where, names: tuple[str, str] = ("cut-", "cut+")) -> Mesh:
@@ -94,6 +98,9 @@ def split(mesh: Mesh, where: Where, names: tuple[str, str] = ("cut-", "cut+")) -
     >>> bolt.n_nodes, bolt.nodes("cut+").tolist()
     (24, [20, 21, 22, 23])
     """
+    instance(mesh, "a mesh", Mesh, "kl.box()", error=MeshError)
+    if not isinstance(names, (tuple, list)) or len(names) != 2 or not all(isinstance(n, str) for n in names):
+        raise MeshError(f"names of both sides are needed, such as ('cut-', 'cut+'); got {short(names)}")
     rows, X = mesh.nodes(where), mesh.points
     center = X[rows].sum(axis=0) / max(len(rows), 1)
     _, sizes, axes = np.linalg.svd(X[rows] - center, full_matrices=False)
@@ -121,6 +128,6 @@ def split(mesh: Mesh, where: Where, names: tuple[str, str] = ("cut-", "cut+")) -
     }
     parts = {**both, names[0]: Part(rows), names[1]: Part(copy[rows])}
     ids = np.append(mesh.node_ids, mesh.node_ids.max() + 1 + np.arange(len(rows)))
-    points, source = np.vstack([X, X[rows]]), mesh.source
-    blocks, conditions = cells["blocks"], cells["conditions"]
-    return Mesh(points, blocks, node_ids=ids, conditions=conditions, parts=parts, source=source)
+    points = np.vstack([X, X[rows]])
+    more: dict[str, Any] = {"conditions": cells["conditions"], "source": mesh.source, "units": mesh.units}
+    return Mesh(points, cells["blocks"], node_ids=ids, parts=parts, **more)

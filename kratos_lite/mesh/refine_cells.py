@@ -165,6 +165,7 @@ class CellRefiner:
             parts={name: bare.part(part) for name, part in old.parts.items()},
             source=old.source,
             hanging=hanging_nodes(blocks, self.centers, n),
+            units=old.units,
         )
         return replace(bare, mesh=mesh)
 

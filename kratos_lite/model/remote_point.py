@@ -203,8 +203,15 @@ class RemotePoint(Coupling):
         -------
         force : (3,) N.
         moment : (3,) N m.
+
+        Raises
+        ------
+        InputError
+            It is none, or on another mesh where the part has no name.
         """
         mesh = self._mesh_of(result)
+        if not hasattr(result, "reactions"):
+            raise InputError(f"the reaction is read from a result or state; got {short(result)}")
         nodes = mesh.nodes(self.where)
         analysis = None if mesh is self.mesh else getattr(result, "_analysis", None)
         supports = analysis.model.supports if analysis else self._supports

@@ -133,6 +133,14 @@ def test_a_stress_at_a_clamped_edge_has_no_limit():
     assert "warning" in str(study)
 
 
+def test_values_that_stay_have_no_order():
+    for f in ([0.0] * 3, [2.0] * 3, [2.0, 2.0 + 1e-13, 2.0 + 3e-13]):
+        orders, _, band, warning = limit_of(0.5 ** np.arange(3), np.array(f))
+        assert np.isnan(orders).all()
+        assert band < 1e-11
+        assert warning == ""
+
+
 def test_the_table_and_the_picture(tmp_path):
     study = kl.converge(beam(), TIP)
     labels = [label for label, _ in study.table()]
@@ -165,6 +173,7 @@ def test_the_table_and_the_picture(tmp_path):
         ({"quantity": 3}, "a quantity must be one such as"),
         ({"quantity": lambda result: np.nan}, "the value of the quantity must be finite"),
         ({"quantity": kl.ReactionOf([0, 1, 2], "x")}, "is of rows of nodes"),
+        ({"solve": "modes"}, "solve must be a function of a model"),
         ({"geometry": {"hub": lambda X: X}}, "no part 'hub'"),
     ],
 )

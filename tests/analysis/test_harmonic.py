@@ -141,6 +141,12 @@ def carried():
         (cantilever, {"loads": [(kl.Traction("x+", (1.0, 0, 0)), "x")]}, InputError, "complex number"),
         (cantilever, {"loads": kl.Traction("x+", (1.0, 0, 0))}, InputError, "loads must be a list"),
         (free, {"frequencies": [1.0, 0.0], "method": "direct"}, ModelError, "frequency 0 needs supports"),
+        (
+            cantilever,
+            {"loads": [(kl.Traction("x+", (1.0, 0, 0)), 10**400)]},
+            InputError,
+            "the size of the fac",
+        ),
         (lambda: cantilever(density=0.0), {}, ModelError, "needs mass"),
         (free, {}, ModelError, "method='direct' takes alone"),
         (plastic, {}, ModelError, "harmonic response takes linear laws"),

@@ -182,6 +182,24 @@ def test_units_go_along_to_finer_meshes_and_studies():
     assert study.unit == "mm"
 
 
+def test_units_go_along_to_meshes_that_are_made_of_others_and_to_harmonic_response():
+    pytest.importorskip("matplotlib")
+    bolt, other = kl.box(cells=(1, 1, 2)), kl.box()
+    bolt.use_units("mm N MPa t")
+    cut = kl.split(bolt, lambda X: X[:, 2] == 0.5)
+    assert {mesh.units for mesh in (cut, refine(cut).mesh, kl.join({"a": cut, "b": other}))} == {bolt.units}
+    other.use_units("m kN kPa t")
+    with pytest.raises(KratosLiteError, match="one set of units; got m kN kPa t and mm N MPa t"):
+        kl.join({"a": bolt, "b": other})
+    model = kl.Model(bolt, kl.Isotropic3D(E=210e3, nu=0.3, density=7.85e-9))
+    model.fix("z-")
+    model.add(kl.Traction("z+", (0, 0, 1.0)))
+    response = model.harmonic([1.0, 2.0])
+    assert " mm at " in str(response)
+    assert "amplitude z [mm]" in response.columns((0, 0, 1))
+    assert response.plot((0, 0, 1)).axes[0].yaxis.get_major_formatter()(10, 0) == "10 mm"
+
+
 def test_steps_in_time_have_their_units(tmp_path, run, monkeypatch):
     monkeypatch.chdir(tmp_path)
     model = bracket(MM)

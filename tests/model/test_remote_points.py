@@ -265,6 +265,7 @@ def on_other_mesh(model):
         (lambda m, p: held_twice(m), "no rigid motion of 'x\\+'"),
         (written, "a remote point cannot be written"),
         (lambda m, p: on_other_mesh(m), "a part with a name"),
+        (lambda m, p: m.rigid("x+", POINT).reaction(np.zeros((3, 3))), "from a result or state"),
         (lambda m, p: m.rigid("x+", POINT).displacement(np.zeros((3, 3))), "displacements"),
     ],
 )  # fmt: skip
