@@ -26,7 +26,7 @@ for axis, way in (("x", (force, 0, 0)), ("z", (0, 0, force))):
     swing[axis] = model.harmonic(frequencies, damping=damping, loads=[machine.load(way)])
     u = np.abs(swing[axis].at(foot)[:, "xyz".index(axis)])
     for i in 1 + np.flatnonzero((u[1:-1] > u[:-2]) & (u[1:-1] > u[2:])):
-        print(f"along {axis}: {1e6 * u[i]:.1f} µm at {frequencies[i] / (2 * np.pi):.2f} Hz")
+        print(f"along {axis}: {1e6 * u[i]:.1f} µm at {frequencies[i]:.1f} rad/s")
 
 mass, spring = 2500.0 * 3.0 + 1500.0, 4e7 * 3.0
 r = frequencies / np.sqrt(spring / mass)

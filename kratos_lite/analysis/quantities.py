@@ -280,7 +280,7 @@ class Compliance(Quantity):
         return result.loads
 
     def explicit(self, result: Any, wrt: str, of_loads: Callable[[Array], Array]) -> Array | float:
-        """Return that of the loads."""
+        """Return u·∂f, the derivative of the loads where the displacements stay."""
         return of_loads(result.u)
 
 

@@ -41,8 +41,9 @@ class RankineDamage3D(VonMisesDamage3D):
     --------
     >>> import kratos_lite as kl
     >>> concrete = kl.RankineDamage3D(E=30e9, nu=0.2, strength=3e6, fracture_energy=100.0)
-    >>> path = kl.material_point(concrete, {"xx": [-1e-3]})
-    >>> print(f"{path.stress[-1, 0] / 1e6:.1f} MPa")  # elastic
+    >>> for strain in (1e-3, -1e-3):  # tension ends at the strength, compression is elastic
+    ...     print(f"{kl.material_point(concrete, {'xx': [strain]}).stress[-1, 0] / 1e6:.1f} MPa")
+    3.0 MPa
     -30.0 MPa
     """
 
