@@ -10,7 +10,7 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.elements.surface import area_vectors, face_rule, surface_mass
 from kratos_lite.errors import ModelError
 from kratos_lite.materials import Material
-from kratos_lite.mesh import Mesh, WhereElements, with_rows
+from kratos_lite.mesh import Mesh, WhereElements, mask_of, with_rows
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.typing import Array, Ints, Mask
@@ -91,8 +91,7 @@ def moving_nodes(mesh: Mesh, part: WhereElements) -> Mask:
     """Return the nodes (n,) of the elements of a part; ModelError if it shares one with other elements."""
     if part is None:
         return mesh.used_nodes()
-    in_part = np.zeros(mesh.n_elements, dtype=bool)
-    in_part[mesh.elements(part)] = True
+    in_part = mask_of(mesh.elements(part), mesh.n_elements)
     if not in_part.any():
         raise ModelError("a part in motion needs one element at least; got none")
     moving, resting = np.zeros((2, mesh.n_nodes), dtype=bool)

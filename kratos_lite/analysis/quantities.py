@@ -15,7 +15,7 @@ from kratos_lite.assembly.gauss_point_fields import volumes
 from kratos_lite.assembly.nodal_values import at_located, strain_of
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import ModelError
-from kratos_lite.mesh import Where
+from kratos_lite.mesh import Where, mask_of
 from kratos_lite.model.loads import Load
 from kratos_lite.model.loads.body import BodyForce
 from kratos_lite.model.loads.surface import Traction
@@ -242,8 +242,7 @@ class MeanDisplacement(Quantity):
         mesh, direction = result.mesh, np.eye(3)[AXES.index(self.axis)]
         if mesh.faces(self.part):
             return Traction(self.part, direction)
-        inside = np.zeros(mesh.n_nodes, dtype=bool)
-        inside[mesh.nodes(self.part)] = True
+        inside = mask_of(mesh.nodes(self.part), mesh.n_nodes)
         rows = [group.rows[inside[group.nodes].all(axis=1)] for group in result.groups]
         if not any(map(len, rows)):
             raise ModelError(

@@ -16,7 +16,7 @@ from kratos_lite.assembly.nonlinear_assembly import internal_forces
 from kratos_lite.elements.surface import area_vectors, face_rule
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import InputError, MeshError
-from kratos_lite.mesh import Mesh, with_rows
+from kratos_lite.mesh import Mesh, mask_of, with_rows
 from kratos_lite.mesh.locate import Located
 from kratos_lite.mesh.topology import faces_of
 from kratos_lite.quadrature import rule_for
@@ -192,8 +192,7 @@ def _polygons(mesh: Mesh, d: Array, n: Array) -> Pieces:
 def _around(mesh: Mesh, where: Any) -> tuple[str, Array, Pieces]:
     """Return the cut around a part: its nodes count 1, those that others share half."""
     name = f"around {where!r}" if isinstance(where, (str, int)) else "around some elements"
-    inside = np.zeros(mesh.n_elements, dtype=bool)
-    inside[mesh.elements(where)] = True
+    inside = mask_of(mesh.elements(where), mesh.n_elements)
     own, others = np.zeros((2, mesh.n_nodes), dtype=bool)
     for block, at in with_rows(mesh.blocks):
         own[block.nodes[inside[at]]] = True

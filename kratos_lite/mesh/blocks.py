@@ -216,6 +216,13 @@ def select(blocks: Sequence[Block], rows: Ints) -> list[Block]:
     return [block.take(rows[here] - at.start) for block, at, here in inside if here.any()]
 
 
+def mask_of(indices: Any, count: int) -> Mask:
+    """Return a mask (count,) of some indices."""
+    mask = np.zeros(count, dtype=bool)
+    mask[indices] = True
+    return mask
+
+
 def distinct(values: Ints) -> Ints:
     """Return the different values in increasing order."""
     if not len(values) or (values == values[0]).all():

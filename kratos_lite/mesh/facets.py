@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kratos_lite.mesh.blocks import NO_ROWS, Block
+from kratos_lite.mesh.blocks import NO_ROWS, Block, mask_of
 from kratos_lite.mesh.mesh import Mesh
 from kratos_lite.mesh.topology import equal_sets
 from kratos_lite.typing import Array, Ints, Mask
@@ -29,8 +29,7 @@ def facets(mesh: Mesh) -> tuple[int, float]:
 def reentrant_nodes(mesh: Mesh) -> Mask:
     """Return the nodes (n,) on edges of the surface where the body has more than 180° and `ANGLES`."""
     _, _, angle, ahead, edge = _folds(mesh)
-    found = np.zeros(mesh.n_nodes, dtype=bool)
-    found[edge[(angle > ANGLES[1]) & (ahead > -1e-6)]] = True
+    found = mask_of(edge[(angle > ANGLES[1]) & (ahead > -1e-6)], mesh.n_nodes)
     return found
 
 

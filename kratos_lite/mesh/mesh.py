@@ -18,6 +18,7 @@ from kratos_lite.mesh.blocks import (
     blocks_of,
     distinct,
     ids_of,
+    mask_of,
     rows_of_ids,
     select,
     with_rows,
@@ -528,8 +529,7 @@ class Mesh(Tabular):
         rows = self.part(where).conditions if isinstance(where, str) else NO_ROWS
         if len(rows):
             return select(self.conditions, rows)
-        inside = np.zeros(self.n_nodes, dtype=bool)
-        inside[self.nodes(where)] = True
+        inside = mask_of(self.nodes(where), self.n_nodes)
         chosen = [block.take(np.asarray(inside[block.nodes].all(axis=1))) for block in self.boundary]
         return [block for block in chosen if len(block)]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kratos_lite.mesh.blocks import Block, Part
+from kratos_lite.mesh.blocks import Block, Part, mask_of
 from kratos_lite.mesh.centers import Keys, are_among, corners_around, keys_of, sorted_keys
 from kratos_lite.mesh.mesh import Mesh
 from kratos_lite.mesh.selection import Where, WhereElements, elements_among
@@ -92,8 +92,7 @@ class RefinedMesh:
 
 def _keys_among(mesh: Mesh, rows: Ints) -> Keys:
     """Return the keys of the edges, faces and cells that a set of nodes means; see `RefinedMesh.grown`."""
-    inside = np.zeros(mesh.n_nodes, dtype=bool)
-    inside[rows] = True
+    inside = mask_of(rows, mesh.n_nodes)
     keys: list[Keys] = []
     alone = inside.copy()
     for faces in mesh.boundary:

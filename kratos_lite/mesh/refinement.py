@@ -13,7 +13,7 @@ import numpy as np
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import MeshError
 from kratos_lite.mesh import hanging
-from kratos_lite.mesh.blocks import Block, with_rows
+from kratos_lite.mesh.blocks import Block, mask_of, with_rows
 from kratos_lite.mesh.centers import Centers, Keys, are_among, keys_of, sorted_keys
 from kratos_lite.mesh.mesh import Mesh
 from kratos_lite.mesh.refine_cells import CellRefiner, Cut, name_of
@@ -41,8 +41,7 @@ def refine(mesh: Mesh, elements: ArrayLike | None = None, keep: ArrayLike | None
     A hexahedron, tetrahedron or wedge gives 8, a pyramid 6 and 4 tetrahedra.  Where a neighbor stays as it
     is, nodes hang: they take what its edge or face interpolates.
     """
-    marked = np.zeros(mesh.n_elements, dtype=bool)
-    marked[mesh.elements(elements)] = True
+    marked = mask_of(mesh.elements(elements), mesh.n_elements)
     centers = hanging.known_centers(mesh.blocks, mesh.hanging)
     if mesh.hanging is not None:
         marked = _closed(mesh, centers, marked)

@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from kratos_lite.errors import MeshError, nearest
-from kratos_lite.mesh.blocks import NO_ROWS, Cells, Part, distinct, without_repeats
+from kratos_lite.mesh.blocks import NO_ROWS, Cells, Part, distinct, mask_of, without_repeats
 from kratos_lite.tabular import in_units
 from kratos_lite.typing import Array, ArrayLike, Ints
 from kratos_lite.validation import finite, whole_numbers
@@ -140,7 +140,6 @@ def find_elements(where: WhereElements, part: Part | None, mesh: Cells) -> Ints:
 
 def elements_among(nodes: Ints, mesh: Cells) -> Ints:
     """Return the indices of the elements that have all their nodes among these."""
-    inside = np.zeros(len(mesh.points), dtype=bool)
-    inside[nodes] = True
+    inside = mask_of(nodes, len(mesh.points))
     rows = (inside[block.nodes].all(axis=1) for block in mesh.blocks)
     return np.flatnonzero(np.concatenate([NO_ROWS, *rows]))

@@ -19,7 +19,7 @@ import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import MAX_PROBLEMS, ModelError
-from kratos_lite.mesh import Mesh
+from kratos_lite.mesh import Mesh, mask_of
 from kratos_lite.model.rigid_body_modes import RigidBlocks, free_modes
 from kratos_lite.model.supports import Supports
 from kratos_lite.solvers.constraints import rigid_modes
@@ -177,8 +177,7 @@ class FreeMotions:
         first, size = np.unique(self.of_block, return_index=True)[1][self.of_block], self.blocks.frames[1]
         turn = self.modes[:, 3:] / size[:, None, None]
         apart = np.abs(turn - turn[first]).max(axis=(1, 2), initial=0.0) * size
-        hinged = np.zeros(len(self.counts), dtype=bool)
-        hinged[self.of_block[self._hangs & (apart > TOGETHER)]] = True
+        hinged = mask_of(self.of_block[self._hangs & (apart > TOGETHER)], len(self.counts))
         return hinged
 
     def described(self, components: Mask | bool = True) -> str:

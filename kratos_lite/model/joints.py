@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from kratos_lite.mesh import NO_ROWS, Mesh, equal_sets, with_rows
+from kratos_lite.mesh import NO_ROWS, Mesh, equal_sets, mask_of, with_rows
 from kratos_lite.mesh.centers import keys_of
 from kratos_lite.mesh.topology import corners, faces_of
 from kratos_lite.model.supports import Supports
@@ -66,8 +66,8 @@ def check_coincident(mesh: Mesh, supports: Supports) -> Iterator[str]:
     X = mesh.points[used]
     size = max(float(np.ptp(x)) for x in X.T)  # by columns, which is faster
     pairs = np.sort(used[_at_one_place(X, 1e-8 * size / len(used) ** (1 / 3))], axis=1)
-    inside = np.zeros(mesh.n_nodes, dtype=bool)
-    inside[np.concatenate([NO_ROWS, *(nodes for tie in supports.ties for nodes in tie.nodes_of)])] = True
+    of_ties = [NO_ROWS, *(nodes for tie in supports.ties for nodes in tie.nodes_of)]
+    inside = mask_of(np.concatenate(of_ties), mesh.n_nodes)
     pairs = pairs[~inside[pairs].all(axis=1)]
     if len(pairs):
         every, key = supports.constraints, np.array([mesh.n_nodes, 1])

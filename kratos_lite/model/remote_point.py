@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -281,12 +280,11 @@ class RemotePoint(Coupling):
         """Return ∫ N R dA (n, 3, 6) over the faces of the part."""
         from kratos_lite.model.loads.surface import Traction  # a quick start without it
 
-        modes = [partial(self._mode, i) for i in range(6)]
-        return np.stack([Traction(self.where, mode).forces(mesh, []) for mode in modes], axis=2)
+        def mode(i: int) -> Array:
+            traction = Traction(self.where, lambda X: rigid_modes(X, self.point)[:, i].reshape(-1, 3))
+            return traction.forces(mesh, [])
 
-    def _mode(self, i: int, X: Array) -> Array:
-        """Return a rigid mode (m, 3) at places (m, 3)."""
-        return rigid_modes(X, self.point)[:, i].reshape(-1, 3)
+        return np.stack([mode(i) for i in range(6)], axis=2)
 
     def _modes(self, mesh: Mesh) -> tuple[Ints, Array]:
         """Return the degrees of freedom (3k,) of the nodes that do not hang, and R (3k, 6) by its sizes."""
@@ -302,6 +300,8 @@ class RemotePoint(Coupling):
     def _of_rigid(self) -> Constraints:
         """Return u = R q of all nodes, by as many of their components as q has free ones."""
         # What is prescribed, of the point and of nodes, are equations A q = b, by which q = A⁺ b + Z s.
+        from kratos_lite.mesh.hanging import is_corner  # a quick start without it
+
         dofs, R = self._modes(self.mesh)
         held, p = self._supports.fixed.flat[dofs], int(self.fixed.sum())
         A = np.vstack([np.eye(6)[self.fixed], R[held]])
@@ -309,21 +309,23 @@ class RemotePoint(Coupling):
         self._check_rigid(A, known, dofs[held])
         Z = np.linalg.qr(A[known].T, mode="complete")[0][:, len(known) :]
         R, free, of_nodes = R[~held], dofs[~held], known >= p
-        corner = np.flatnonzero(_corners(self.mesh)[free // 3])  # the coarse level has these, too
-        masters = corner[independent_rows((R @ Z)[corner])]
-        masters = masters if len(masters) == Z.shape[1] else independent_rows(R @ Z)
-        if len(masters) < Z.shape[1]:
+        corner = np.flatnonzero(
+            is_corner(self.mesh.blocks, self.mesh.n_nodes)[free // 3]
+        )  # the coarse level has these, too
+        chosen = corner[independent_rows((R @ Z)[corner])]
+        chosen = chosen if len(chosen) == Z.shape[1] else independent_rows(R @ Z)
+        if len(chosen) < Z.shape[1]:
             raise ModelError(
                 f"the nodes of {short(self.where)} lie on a line or at one place, and a rotation of the "
                 "remote point about it moves none: prescribe it by fix_rotation, or take more nodes"
             )
-        W = R @ Z @ np.linalg.inv(R[masters] @ Z)
-        G = (R - W @ R[masters]) @ np.linalg.pinv(A[known])
+        W = R @ Z @ np.linalg.inv(R[chosen] @ Z)
+        G = (R - W @ R[chosen]) @ np.linalg.pinv(A[known])
         constants = G[:, ~of_nodes] @ self._prescribed[known[~of_nodes]]
         weights = np.hstack([W, G[:, of_nodes]])
         weights[np.abs(weights) < ROUNDING] = 0.0
-        independents = np.concatenate([free[masters], dofs[held][known[of_nodes] - p]])
-        rest = np.delete(np.arange(len(free)), masters)
+        independents = np.concatenate([free[chosen], dofs[held][known[of_nodes] - p]])
+        rest = np.delete(np.arange(len(free)), chosen)
         each = np.broadcast_to(independents, (len(rest), len(independents)))
         return Constraints.of(free[rest], each, weights[rest], constants[rest])
 
@@ -358,14 +360,6 @@ class RemotePoint(Coupling):
         others, inverse = np.delete(np.arange(len(dofs)), chosen), np.linalg.inv(C[:, chosen])
         each = np.broadcast_to(dofs[others], (len(C), len(others)))
         return Constraints.of(dofs[chosen], each, -inverse @ C[:, others], inverse @ self.values[self.fixed])
-
-
-def _corners(mesh: Mesh) -> Mask:
-    """Return which nodes (n,) are corners of elements."""
-    corner = np.zeros(mesh.n_nodes, dtype=bool)
-    for block in mesh.blocks:
-        corner[block.nodes[:, : block.known_shape.corners]] = True
-    return corner
 
 
 def dofs_of(nodes: Ints) -> Ints:

@@ -16,7 +16,7 @@ from kratos_lite.io.kratos.context import RunContext
 from kratos_lite.io.names import PRESTRESS
 from kratos_lite.io.settings import Settings, is_number, shown
 from kratos_lite.materials import MATERIALS, Material
-from kratos_lite.mesh import with_rows
+from kratos_lite.mesh import mask_of, with_rows
 from kratos_lite.model.loads.body import BodyForce, Gravity
 from kratos_lite.typing import Array
 
@@ -228,8 +228,7 @@ def _assign(entry: Settings, context: RunContext, document: Document, number: in
     have = ", ".join([f"{context.root} (all)", *(name for name, part in parts.items() if len(part.elements))])
     text = f"part {entry.text('model_part_name')!r} has no elements to carry a material; parts with elements"
     entry.expect(len(elements), "model_part_name", f"{text} are {have}")
-    mask = np.zeros(context.mesh.n_elements, dtype=bool)
-    mask[elements] = True
+    mask = mask_of(elements, context.mesh.n_elements)
     blocks = [
         replace(block, properties=np.where(mask[at], number, block.properties))
         for block, at in with_rows(document.mesh.blocks)

@@ -10,7 +10,7 @@ import numpy as np
 from kratos_lite.assembly import gauss_point_fields
 from kratos_lite.assembly.element_groups import ElementGroup, add_nodal
 from kratos_lite.errors import InputError
-from kratos_lite.mesh import Mesh, WhereElements
+from kratos_lite.mesh import Mesh, WhereElements, mask_of
 from kratos_lite.model.loads.base import DistributedLoad, OfPlace, placed, vectors
 from kratos_lite.model.local_axes import LocalAxes
 from kratos_lite.typing import Array, ArrayLike
@@ -78,8 +78,7 @@ class BodyForce(DistributedLoad):
 
     def _carriers(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> list[ElementGroup]:
         """Return the elements that carry the force."""
-        carriers = np.zeros(mesh.n_elements, dtype=bool)
-        carriers[mesh.elements(self.where)] = True
+        carriers = mask_of(mesh.elements(self.where), mesh.n_elements)
         parts = [group.take(carriers[group.rows]) for group in groups]
         return [part for part in parts if len(part)]
 

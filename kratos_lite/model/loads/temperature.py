@@ -10,7 +10,7 @@ import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.mesh import Mesh, WhereElements
+from kratos_lite.mesh import Mesh, WhereElements, mask_of
 from kratos_lite.model.loads.base import Load, OfPlace, at_places
 from kratos_lite.typing import Array, ArrayLike
 from kratos_lite.validation import finite, number
@@ -104,8 +104,7 @@ class Temperature(Load):
 
     def warnings(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
         """Return a warning if no element swells."""
-        has = np.zeros(mesh.n_elements, dtype=bool)
-        has[mesh.elements(self.where)] = True
+        has = mask_of(mesh.elements(self.where), mesh.n_elements)
         if any(has[group.rows].any() and group.material.expansion.any() for group in groups):
             return []
         return [f"{self!r} strains nothing: no material there has an alpha, its thermal expansion"]
@@ -126,8 +125,7 @@ def heated(
         return list(groups)
     heating = [np.zeros(group.nodes.shape) for group in groups]
     for factor, load in temperatures:
-        has = np.zeros(mesh.n_elements, dtype=bool)
-        has[mesh.elements(load.where)] = True
+        has = mask_of(mesh.elements(load.where), mesh.n_elements)
         difference = factor * load.difference(mesh)
         for i, group in enumerate(groups):
             heating[i] += np.where(has[group.rows][:, None], difference[group.nodes], 0.0)
