@@ -643,7 +643,8 @@ class Structure(Tabular):
         """
         if (force is None) == (length is None):
             raise InputError("a pretension is a force in N or a length in m; give one of them")
-        instance(name, "the name of a load", str, "'bolt'")
+        if name is not None:
+            instance(name, "the name of a load", str, "'bolt'")
         length = None if length is None else number(length, "the length of a pretension", least=-np.inf)
         load = None if force is None else BoltForce(a, b, force)
         cut = Cut(self.mesh, a, b, length)
