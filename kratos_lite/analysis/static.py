@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -207,6 +208,10 @@ class StaticAnalysis:
         if self._equations is not None:
             self._equations.system.destroy()
         self._equations = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave the equations out, which another solution makes anew."""
+        return vars(self) | {"_equations": None}
 
     def adjoint(self, load: Array, motion: Array, tolerance: float | None = None) -> Array:
         """Return the displacement (n, 3) in m under a load (n, 3) in N alone, supports displaced by a motion.

@@ -1,5 +1,7 @@
 """Derivatives of quantities: against central differences, closed forms, and what is refused."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -295,3 +297,12 @@ def test_a_gradient_needs_the_static_analysis_of_the_model_as_it_is():
         result.gradient(kl.Compliance())
     with pytest.raises(InputError, match="Quantity"):
         result.gradient("compliance")
+
+
+def test_a_result_of_a_kept_analysis_goes_through_pickle_and_solves_again():
+    model = bar()
+    model.add(kl.Traction("x+", (0, 0, 1.0)))
+    result, tip = model.static("amg").solve(), kl.MeanDisplacement("x+", "z")
+    other = pickle.loads(pickle.dumps(result))
+    assert (other.u == result.u).all()
+    assert abs(other.gradient(tip, "loads") / result.gradient(tip, "loads") - 1) < 1e-9
