@@ -30,7 +30,7 @@ def homogenized(model: Structure, *, solver: str = "auto", tolerance: float = 1e
     Raises
     ------
     ModelError
-        There are not three pairs along three directions, supports hold more than rigid translations, or
+        There are not three pairs along three directions, supports or springs hold more than one node, or
         the model has a motion, initial stress or laws that are not linear.
     MeshError, InputError, SolveError
         As for `Model.solve`.
