@@ -33,6 +33,10 @@ TOGETHER = 1e-5
 """Difference of the rotations of blocks up to which they turn as one, where modes have the size 1."""
 
 
+MIDDLE = 0.01
+"""What the way of a middle node counts beside that of a corner where free motions are held."""
+
+
 @dataclass(frozen=True, eq=False)
 class FreeMotions:
     """Rigid motions that supports and constraints leave free, by components of a model."""
@@ -105,10 +109,15 @@ class FreeMotions:
     def constrained(self) -> Mask:
         """Components (n, 3), one for each free motion, that hold these firmly."""
         # Gram-Schmidt on the rows of R: each is that along which what remains of the motions goes farthest.
+        # Corner nodes come first, as the coarse level of multigrid has these alone.
         chosen, component = np.zeros_like(self.supports.fixed), self.component
         if not self.any:
             return chosen
-        remaining = self._pair[0] * ~self.supports.fixed[..., None]
+        from kratos_lite.mesh.hanging import is_corner  # a quick start where nothing is free
+
+        mesh = self.blocks.mesh
+        corner = np.where(is_corner(mesh.blocks, mesh.n_nodes), 1.0, MIDDLE)
+        remaining = self._pair[0] * ~self.supports.fixed[..., None] * corner[:, None, None]
         remaining.reshape(-1, remaining.shape[2])[self.supports.dependents().dependents] = 0.0
         for step in range(remaining.shape[2]):
             size = (remaining**2).sum(axis=2)

@@ -309,9 +309,8 @@ class RemotePoint(Coupling):
         self._check_rigid(A, known, dofs[held])
         Z = np.linalg.qr(A[known].T, mode="complete")[0][:, len(known) :]
         R, free, of_nodes = R[~held], dofs[~held], known >= p
-        corner = np.flatnonzero(
-            is_corner(self.mesh.blocks, self.mesh.n_nodes)[free // 3]
-        )  # the coarse level has these, too
+        # Corner nodes come first, as the coarse level of multigrid has these alone.
+        corner = np.flatnonzero(is_corner(self.mesh.blocks, self.mesh.n_nodes)[free // 3])
         chosen = corner[independent_rows((R @ Z)[corner])]
         chosen = chosen if len(chosen) == Z.shape[1] else independent_rows(R @ Z)
         if len(chosen) < Z.shape[1]:

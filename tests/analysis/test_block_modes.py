@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 
 import kratos_lite as kl
 from kratos_lite.analysis import modal
@@ -197,6 +198,15 @@ def test_critical_rates_of_larger_wheels(monkeypatch):
     np.testing.assert_allclose(large, small, rtol=0.2)
     monkeypatch.setattr("kratos_lite.analysis.modal.DENSE_MODES", 0)
     np.testing.assert_allclose(critical_rate(wheel((3, 12, 2), 10.0), 3), small, rtol=1e-8)
+
+
+def test_a_free_ring_of_quadratic_elements_has_the_modes_of_lapack():
+    """What holds its rigid motions for the preconditioner are corner nodes, which the linear level has."""
+    model = kl.Model(kl.annulus(0.5, 2, 0.3, (3, 16, 2)), kl.Isotropic3D(nu=0.3, **STEEL))
+    omega, _ = model.modes(10)
+    matrices = model.matrices()
+    squares = eigh(matrices.K.toarray(), matrices.M.toarray(), eigvals_only=True, subset_by_index=[6, 9])
+    np.testing.assert_allclose(omega[6:], np.sqrt(squares), rtol=1e-7)
 
 
 # ---- steps in time of larger models ----
