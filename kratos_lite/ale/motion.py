@@ -28,7 +28,8 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh, WhereElements
-from kratos_lite.model.structure import Attachment, Structure
+from kratos_lite.model.attachments import Attachment
+from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.time_series import Factor, TimeSeries, function_of, slope_of
 from kratos_lite.typing import Array, Ints, Mask
@@ -267,6 +268,7 @@ class Motion(Attachment):
                 f"velocity passes through its boundary; {self.cure}"
             )
         self._bind(structure)
+        structure._motion = self
 
     def _bind(self, structure: Structure) -> None:
         """Tie or fix boundaries."""

@@ -11,6 +11,7 @@ from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.nodal_loads import at_temperature
 from kratos_lite.assembly.element_groups import group_of_element
 from kratos_lite.assembly.gauss_point_fields import internal_load
+from kratos_lite.assembly.sparsity_pattern import dofs_of
 from kratos_lite.model.loads import ScaledLoad
 from kratos_lite.model.loads.body import BodyForce
 from kratos_lite.model.structure import Structure
@@ -56,7 +57,7 @@ def matrices_of(
 
     t, n = number(time, "the time"), model.mesh.n_nodes
     e = EquationsOfMotion(model, lumped=flag(lumped, "lumped"), rayleigh=rayleigh, massless=True)
-    dofs = (3 * e.system.nodes[:, None] + np.arange(3)).ravel()
+    dofs = dofs_of(e.system.nodes)
 
     def whole(A: Any, square: bool = True) -> csr_array[Any, Any]:
         """Return a matrix (3a, ...) with the rows, and columns if it is square, of all degrees of freedom."""
@@ -115,6 +116,6 @@ def local_system_of(model: Structure, element: int, u: ArrayLike | None = None) 
         if isinstance(of, BodyForce):
             load += factor * of.forces(model.mesh, [group])
     nodes, placed, material = group.nodes[0].astype(np.int64), group.at(points), group.material
-    dofs = (3 * nodes[:, None] + np.arange(3)).ravel()
+    dofs = dofs_of(nodes)
     K = group.scaled(placed.stiffness(material.C))[0]
     return LocalSystem(K, load[nodes].ravel(), placed.mass(material.density)[0], dofs)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kratos_lite.assembly.sparsity_pattern import dofs_of
 from kratos_lite.typing import Array, Csr, Ints, Rows
 
 
@@ -18,7 +19,7 @@ class Attached:
 
     def on(self, nodes: Ints) -> Attached:
         """Return what they are on some nodes (a,), renumbered in order."""
-        dofs = (3 * nodes[:, None] + np.arange(3)).ravel()
+        dofs = dofs_of(nodes)
         return Attached(self.K[dofs][:, dofs], self.M[dofs][:, dofs])
 
     @property

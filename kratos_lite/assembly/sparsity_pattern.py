@@ -110,3 +110,8 @@ def _add_blocks(data: Array, positions: Ints, matrices: Array) -> None:
     selection = csc_array((np.ones(len(flat)), flat, np.arange(len(flat) + 1)), shape=(high - low, len(flat)))
     total = np.asarray(selection @ matrices.reshape(len(flat), -1))
     data[low:high] += total.reshape(data[low:high].shape)
+
+
+def dofs_of(nodes: Ints) -> Ints:
+    """Return the degrees of freedom (3k,) of nodes (k,): 3·node + axis."""
+    return np.asarray((3 * nodes[:, None] + np.arange(3)).ravel())

@@ -1,14 +1,15 @@
-"""Attachments: springs and masses on points, faces and remote points."""
+"""Attachments: what is added besides loads; springs and masses on points, faces and remote points."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from copy import copy
-from typing import TYPE_CHECKING, ClassVar, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
 
+from kratos_lite.assembly.attached import Attached
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh, Where
 from kratos_lite.mesh.selection import point_of
@@ -23,7 +24,25 @@ Place: TypeAlias = "Where | RemotePoint"
 """A part, a point (x, y, z) in m, or a remote point."""
 
 
-class MatrixAttachment(ABC):
+class Attachment(ABC):
+    """What `Structure.add` takes besides loads: springs and masses, and the motions of `kratos_lite.ale`."""
+
+    @abstractmethod
+    def attach(self, structure: Any) -> None:
+        """Become a part of a structure: check it, and set what it needs.
+
+        Parameters
+        ----------
+        structure : that it is added to.
+
+        Raises
+        ------
+        ModelError
+            It does not fit the structure.
+        """
+
+
+class AttachedMatrix(Attachment):
     """A matrix Jᵀ W J on what moves by J u, integrated over faces."""
 
     what: ClassVar[str]
@@ -31,6 +50,17 @@ class MatrixAttachment(ABC):
     where: Place
     to: Place | None = None
     W: Array
+
+    def attach(self, structure: Any) -> None:
+        """Add the matrix to the springs, or masses, of a structure; ModelError for a part of a mesh."""
+        if not structure.mesh.whole:
+            raise ModelError("springs and added masses need the whole mesh; solve without mpirun")
+        matrix = self.matrix(structure.mesh)
+        known = structure.attached or Attached(0 * matrix, 0 * matrix)
+        K, M = (known.K, known.M + matrix) if self.is_mass else (known.K + matrix, known.M)
+        structure.attached, structure.supports.springs = Attached(K, M), K
+        structure.attachments.append(self)
+        structure._changes += 1
 
     def matrix(self, mesh: Mesh) -> Csr:
         """Return the matrix (3n, 3n) on a mesh."""
@@ -57,7 +87,7 @@ class MatrixAttachment(ABC):
 
     def refined(
         self, finer: RefinedMesh, old: Sequence[RemotePoint], new: Sequence[RemotePoint]
-    ) -> MatrixAttachment:
+    ) -> AttachedMatrix:
         """Return the same on a finer mesh, whose remote points are new."""
         made = copy(self)
         for name in ("where", "to"):
@@ -73,7 +103,7 @@ class MatrixAttachment(ABC):
         return f"{type(self).__name__}({', '.join(f'{name}={short(v)}' for name, v in named.items())})"
 
 
-class ElasticSupport(MatrixAttachment):
+class ElasticSupport(AttachedMatrix):
     """Springs: on a point or remote point, or over faces as an elastic foundation; to ground or to another.
 
     Its forces on the body are among the reactions of a result.
@@ -133,7 +163,7 @@ class ElasticSupport(MatrixAttachment):
         return areas * self.W if len(self.W) > 1 else self.W * vectors[:, :, None] * vectors[:, None] / areas
 
 
-class AddedMass(MatrixAttachment):
+class AddedMass(AttachedMatrix):
     """Mass on a point, over faces, or on a remote point; see `Structure.add_mass`."""
 
     what, is_mass = "an added mass", True

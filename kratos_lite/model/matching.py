@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.assembly.sparsity_pattern import dofs_of
 from kratos_lite.elements.surface import area_vectors
 from kratos_lite.errors import ModelError
 from kratos_lite.mesh import Mesh, Where, components
@@ -152,8 +153,7 @@ class Cut(PartTie):
 
     def constraints(self, fixed: Mask, known: Mask) -> Constraints:
         """Return them; δ is that of the carriers, two degrees of freedom that stay free if it is."""
-        axes = np.arange(3)
-        one, other = ((3 * nodes[:, None] + axes).ravel() for nodes in (self.above, self.below))
+        one, other = map(dofs_of, (self.above, self.below))
         turned, n = known.flat[one], np.tile(self.normal, len(self.above))
         (a, b), stuck = self.carriers, fixed.flat[one] & fixed.flat[other] & (np.abs(n) > FLAT)
         if (stuck.any() and self.length != 0.0) or (self.length is None and known.flat[[a, b]].any()):

@@ -44,7 +44,7 @@ def refined(structure: S, finer: RefinedMesh) -> S:
     for tie in structure.supports.ties:
         new.supports.add_tie(tie.refined(finer, new.supports))
     for attachment in structure.attachments:
-        new.add(attachment.refined(finer, structure.points, new.points))
+        new.add(attachment.refined(finer, structure.remote_points, new.remote_points))
     new.loads = [load.refined(finer) for load in structure.loads]
     for name, load in structure.named_loads.items():
         new._named[name] = new.loads[next(i for i, one in enumerate(structure.loads) if one is load)]

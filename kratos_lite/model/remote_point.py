@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.assembly.sparsity_pattern import dofs_of
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh, Where
 from kratos_lite.model.supports import AXES, Supports, axis_numbers
@@ -359,8 +360,3 @@ class RemotePoint(Coupling):
         others, inverse = np.delete(np.arange(len(dofs)), chosen), np.linalg.inv(C[:, chosen])
         each = np.broadcast_to(dofs[others], (len(C), len(others)))
         return Constraints.of(dofs[chosen], each, -inverse @ C[:, others], inverse @ self.values[self.fixed])
-
-
-def dofs_of(nodes: Ints) -> Ints:
-    """Return the degrees of freedom (3k,) of nodes (k,)."""
-    return np.asarray((3 * nodes[:, None] + np.arange(3)).ravel())

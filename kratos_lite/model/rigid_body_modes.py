@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from kratos_lite.assembly.sparsity_pattern import dofs_of
 from kratos_lite.mesh import Mesh, components, distinct, with_rows
 from kratos_lite.model.supports import Supports
 from kratos_lite.solvers import direct
@@ -140,7 +141,7 @@ def _equations(blocks: RigidBlocks, supports: Supports) -> tuple[Ints, Ints, Arr
     joins[row[block != of_row[row]]] = True
     kept = joins[row] & (block >= 0)
     node, *ends = blocks.joints
-    joint = (3 * node[:, None] + np.arange(3)).ravel()
+    joint = dofs_of(node)
     row = np.concatenate([row[kept], *[first + np.arange(len(joint))] * 2])
     dof = np.concatenate([dof[kept], joint, joint])
     weight = np.concatenate([weight[kept], np.ones(len(joint)), -np.ones(len(joint))])

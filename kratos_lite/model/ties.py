@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.assembly.sparsity_pattern import dofs_of
 from kratos_lite.errors import ModelError
 from kratos_lite.mesh import NO_ROWS, Block, Mesh, Where
 from kratos_lite.model.mortar import NEAR, Cells, Mortar, mortar
@@ -99,7 +100,7 @@ class Tie(PartTie):
         from scipy.sparse import csr_array, diags_array, kron
 
         x, one, size = self.integrals, np.eye(3), self.mesh.points.size
-        dofs = (3 * x.nodes[:, None] + np.arange(3)).ravel()
+        dofs = dofs_of(x.nodes)
         free, held = (np.flatnonzero(mask) for mask in (~known.flat[dofs], known.flat[dofs]))
         T, S, near = (csr_array(kron(A, one)) for A in (x.T, x.inverse, x.neighbors))
         step = taken = near[:, held]

@@ -17,7 +17,7 @@ from weakref import finalize
 import numpy as np
 
 from kratos_lite.assembly.block_matrix import BlockMatrix
-from kratos_lite.assembly.sparsity_pattern import Pattern
+from kratos_lite.assembly.sparsity_pattern import Pattern, dofs_of
 from kratos_lite.errors import SolveError
 from kratos_lite.solvers.plan import of_band
 from kratos_lite.typing import Array, Csr, Ints, Rows
@@ -138,7 +138,7 @@ class Factorizer:
         self._height = w + 1 if symmetric else 3 * w + 1  # exchanged rows need room
         self.plan = of_band(3 * pattern.n_nodes, w, self._height)
         if self.plan.method == "band":
-            self._dofs = (3 * self._nodes[:, None] + np.arange(3)).ravel()
+            self._dofs = dofs_of(self._nodes)
             self._prepare(rows, pattern.indices)
 
     def _prepare(self, rows: Ints, columns: Rows) -> None:

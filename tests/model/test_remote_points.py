@@ -157,8 +157,8 @@ def test_modes_of_a_bar_with_a_rigid_end_and_weight():
     longitudinal = omega[np.abs(shapes).max(axis=1).argmax(axis=1) == 0][0]
     assert abs(longitudinal / wave - 1) < 0.05
     X = model.mesh.points[model.mesh.nodes("x+")]
-    moved = model.points[0].displacement(shapes)
-    turned = np.cross(model.points[0].rotation(shapes)[:, None], X - (2, 0.5, 0.5))
+    moved = model.remote_points[0].displacement(shapes)
+    turned = np.cross(model.remote_points[0].rotation(shapes)[:, None], X - (2, 0.5, 0.5))
     off = shapes[:, model.mesh.nodes("x+")] - moved[:, None] - turned
     assert np.abs(off).max() < 1e-9 * np.abs(shapes).max()
 
@@ -227,7 +227,7 @@ def moving(model):
 def held_twice(model):
     model.fix(model.mesh.nodes("x+")[:1], "x", 1e-3)
     model.rigid("x+", POINT).fix("xyz")
-    model.points[0].fix_rotation()
+    model.remote_points[0].fix_rotation()
     model.solve()
 
 

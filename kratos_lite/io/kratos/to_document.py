@@ -33,7 +33,7 @@ def document_from(model: Model) -> Document:
     """
     unwritten = {
         "a motion of the material": model.motion is not None,
-        "a remote point": any(point.is_rigid or point.fixed.any() for point in model.points),
+        "a remote point": any(point.is_rigid or point.fixed.any() for point in model.remote_points),
         "an elastic support or added mass": model.attached is not None,
         "a support that moves in time": bool(model.supports.motions),
         "a factor of the stiffness of each element": model.stiffness_factors is not None,
