@@ -76,7 +76,7 @@ def new_plot(size: tuple[float, float], *units: str, log: str = "") -> tuple[Any
     `log` names the axes with a logarithmic scale, such as ``"xy"``.
     """
     figure = empty(size)
-    from matplotlib.ticker import EngFormatter, LogLocator
+    from matplotlib.ticker import EngFormatter
 
     scales = ["log" if name in log else "linear" for name in "xy"]
     axes = figure.add_subplot(xscale=scales[0], yscale=scales[1])
@@ -84,13 +84,22 @@ def new_plot(size: tuple[float, float], *units: str, log: str = "") -> tuple[Any
     for axis, unit, scale in zip((axes.xaxis, axes.yaxis), units, scales, strict=True):
         axis.set_major_formatter(EngFormatter(unit) if unit in PREFIXED else f"{{x:g}} {unit}".rstrip())
         if scale == "log":
-            axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
             axis.set_minor_formatter("")
     return figure, axes
 
 
+FEW_POWERS = 1e3
+"""Largest to smallest number of a logarithmic axis up to which numbers stand between powers of ten."""
+
+
 def label(axes: Any, x: str, y: str, title: str) -> None:
     """Write what axes for curves show, over a grid; a legend where there are several curves."""
+    from matplotlib.ticker import LogLocator
+
+    for axis in (axes.xaxis, axes.yaxis):
+        if axis.get_scale() == "log":
+            low, high = axis.get_view_interval()
+            axis.set_major_locator(LogLocator(subs=(1, 2, 5) if high < FEW_POWERS * low else (1,)))
     axes.grid(True, color="0.92", lw=0.8)
     axes.set_axisbelow(True)
     axes.set_xlabel(x)

@@ -1,5 +1,6 @@
 """kl.plot and its options: values by name, views, limits, scale, zoom, cut, several side by side."""
 
+import itertools
 import subprocess
 import sys
 
@@ -10,6 +11,7 @@ import kratos_lite as kl
 from kratos_lite.analysis.subjects import nodal_values
 from kratos_lite.shapes import SHAPES
 from kratos_lite.view.camera import OBLIQUE, VIEWS, rows_of, window_of
+from kratos_lite.view.curves import response_figure
 from kratos_lite.view.facets import facets_of
 from kratos_lite.view.plane import clip_facets, cut_cells, plane_of
 from kratos_lite.view.rulers import extent
@@ -369,6 +371,18 @@ def test_nothing_is_written_where_the_picture_fails(result, tmp_path):
     with pytest.raises(kl.InputError, match=r"no folder .*missing"):
         result.plot(tmp_path / "missing" / "a.png")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("top", [30.0, 4e3, 2e6])
+def test_numbers_of_a_logarithmic_axis_are_apart(top):
+    x = np.geomspace(1.0, top, 9)
+    figure = response_figure(x, 1 / x, "m", "amplitude of uz")
+    figure.canvas.draw()
+    axes = figure.axes[0]
+    boxes = [t.get_window_extent() for t in axes.get_xticklabels() if t.get_text()]
+    inside = [box for box in boxes if axes.bbox.x0 <= box.x0 and box.x1 <= axes.bbox.x1]
+    assert len(inside) >= 2
+    assert not any(a.overlaps(b) for a, b in itertools.pairwise(inside))
 
 
 def test_a_notebook_shows_the_figure_once_with_and_without_pyplot():
