@@ -192,6 +192,7 @@ class Case:
     expected : comparisons of the end of a model with expected values, each of which returns a line, or a
         `Comparison` after some steps.
     files : files that were read.
+    then : further analyses that the input asks for, run after this one.
     """
 
     subject: Model | Body
@@ -206,6 +207,7 @@ class Case:
     outputs: Outputs = field(default_factory=Outputs)
     expected: list[Callable[[Result], str]] = field(default_factory=list)
     files: list[Path] = field(default_factory=list)
+    then: list[Case] = field(default_factory=list)
 
     @property
     def analysis(self) -> str:

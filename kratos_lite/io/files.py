@@ -106,6 +106,10 @@ def read_case(
             from kratos_lite.io.script import read_script
 
             case = read_script(path)
+        elif ending(path) == ".inp":
+            from kratos_lite.io.abaqus.steps import read_deck
+
+            case = read_deck(path)
         else:
             document = (
                 read_document(path, strict=strict)

@@ -1,0 +1,256 @@
+"""A deck: its cards, one by one, and the cases that its steps are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from kratos_lite.errors import InputError, nearest
+from kratos_lite.io.abaqus.cards import Card, read_cards
+from kratos_lite.io.abaqus.loads import Acting, LoadCards
+from kratos_lite.io.abaqus.materials import Definition, orientation
+from kratos_lite.io.abaqus.mesh import MeshCards
+from kratos_lite.io.abaqus.supports import Axes, Equation, Nodal, boundary, equations, node_rows
+from kratos_lite.mesh import Mesh
+from kratos_lite.model.local_axes import LocalAxes
+from kratos_lite.time_series import TimeSeries
+
+NO_EFFECT = frozenset(
+    "HEADING PREPRINT RESTART NODEOUTPUT ELEMENTOUTPUT OUTPUT CONTROLS CONDUCTIVITY SPECIFICHEAT "
+    "FILTER TIMEPOINTS CONTACTFILE".split()
+)
+"""Cards that change nothing in the displacements of solids."""
+REFUSED = {
+    **dict.fromkeys(("CONTACTPAIR", "CONTACTPRINT", "GAP", "CLEARANCE"), "contact"),
+    **dict.fromkeys(("SHELLSECTION", "MEMBRANESECTION"), "shells and membranes"),
+    **dict.fromkeys(("BEAMSECTION", "BEAMGENERALSECTION"), "beams"),
+    **dict.fromkeys(
+        ("HEATTRANSFER", "COUPLEDTEMPERATURE-DISPLACEMENT", "UNCOUPLEDTEMPERATURE-DISPLACEMENT"), "heat transfer"
+    ),
+    **dict.fromkeys(("CYCLICSYMMETRYMODEL", "SELECTCYCLICSYMMETRYMODES"), "cyclic symmetry"),
+    **dict.fromkeys(("CREEP", "VISCO", "CYCLICHARDENING", "DEFORMATIONPLASTICITY", "HYPERFOAM"), "this law"),
+    **dict.fromkeys(("USERMATERIAL", "DEPVAR"), "a law of your own in Fortran; take kl.UMAT in Python"),
+    **dict.fromkeys(("SENSITIVITY", "DESIGNVARIABLES", "OBJECTIVE", "SUBSTRUCTUREGENERATE"), "this analysis"),
+    **dict.fromkeys(("DASHPOT", "MODELCHANGE", "SUBMODEL", "MPC", "COMPLEXFREQUENCY", "GREEN"), "this card"),
+    **dict.fromkeys(("FLUIDSECTION", "CFD", "FLUIDCONSTANTS", "DFLUX", "CFLUX", "FILM", "RADIATE"), "heat and flow"),
+}  # fmt: skip
+"""What cards stand for that are refused."""
+SURFACE_LAWS = ("SURFACEINTERACTION", "SURFACEBEHAVIOR", "FRICTION", "GAPCONDUCTANCE", "CONTACTDAMPING")
+"""Cards of contact, which alone change nothing."""
+OF_MATERIAL = {
+    "ELASTIC": ("TYPE",), "DENSITY": (), "EXPANSION": ("TYPE", "ZERO"), "PLASTIC": ("HARDENING",),
+    "HYPERELASTIC": ("NEOHOOKE", "MOONEY-RIVLIN", "OGDEN", "N", "MODULI"), "DAMPING": ("ALPHA", "BETA"),
+}  # fmt: skip
+"""Cards after *MATERIAL, and their options."""
+PROCEDURES = {
+    "STATIC": ("SOLVER", "DIRECT"),
+    "FREQUENCY": ("SOLVER", "STORAGE", "GLOBAL"),
+    "BUCKLE": ("SOLVER",),
+    "DYNAMIC": ("SOLVER", "DIRECT", "ALPHA"),
+}
+"""Kinds of steps, and their options."""
+
+
+@dataclass
+class Step:
+    """A step: what it asks for, and the supports and loads at its end."""
+
+    card: Card
+    large: bool  # NLGEOM
+    procedure: Card | None = None
+    outputs: list[Card] = field(default_factory=list)
+    held: Nodal = field(init=False)
+    acting: Acting = field(init=False)
+
+    @property
+    def kind(self) -> str:
+        """Its procedure, such as STATIC."""
+        return self.procedure.keyword if self.procedure else ""
+
+    def numbers(self) -> list[float]:
+        """Return the numbers of its data line, or none."""
+        row = next(self.procedure.rows(), None) if self.procedure else None
+        return [row.number(i, 0.0) for i in range(len(row.fields))] if row else []
+
+    @property
+    def perturbs(self) -> bool:
+        """Whether it begins from the stresses of the steps before it."""
+        return "PERTURBATION" in self.card.options
+
+
+class Deck:
+    """What the cards of a deck have said so far."""
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.notes = path, list[str]()
+        self.cards = MeshCards()
+        self.materials = dict[str, Definition]()
+        self.sections = list[tuple[str, str, str, Card]]()  # ELSET, MATERIAL, ORIENTATION
+        self.orientations = dict[str, LocalAxes]()
+        self.amplitudes = dict[str, TimeSeries]()
+        self.equations = list[Equation]()
+        self.steps = list[Step]()
+        self.ignored = set[str]()
+        self.open: Step | None = None  # the step that is being read
+        self._material: Definition | None = None
+        self._mesh: Mesh | None = None
+
+    @property
+    def mesh(self) -> Mesh:
+        """The mesh, which is complete when the first card needs it."""
+        if self._mesh is None:
+            mesh = self._mesh = self.cards.mesh(self.path.name)
+            n = mesh.n_nodes
+            self.held, self.acting = Nodal.none(n), Acting(Nodal.none(n), Nodal.none(n, 1))
+            self.axes = Axes(of_node=np.full(n, -1))
+            self.initial = np.zeros(n)  # temperatures
+            self.loads = LoadCards(self.cards, mesh)
+        return self._mesh
+
+    def read(self) -> None:
+        """Read all cards."""
+        for card in read_cards(self.path):
+            keyword = card.keyword
+            if keyword in REFUSED:
+                card.wrong(f"{REFUSED[keyword]} is not supported; decks of solids without it are read")
+            if keyword in OF_MATERIAL:
+                self._of_material(card)
+                continue
+            if keyword not in ("MATERIAL",):
+                self._material = None
+            if keyword in NO_EFFECT or keyword in SURFACE_LAWS:
+                self.ignored.add(keyword)
+                continue
+            if keyword not in CARDS:
+                card.wrong(f"this card is not known.{nearest(keyword, (*CARDS, *NO_EFFECT, *OF_MATERIAL))}")
+            CARDS[keyword](self, card)
+        if self.open is not None:
+            self.open.card.wrong("the step is not ended by *END STEP")
+        if not self.steps:
+            raise InputError(f"{self.path}: there is no *STEP; a mesh alone is read by kl.read")
+        if self.ignored:
+            self.notes.append(f"cards without effect here: {', '.join(sorted(self.ignored))}")
+
+    def _of_material(self, card: Card) -> None:
+        if card.keyword == "DAMPING" and self._material is None:
+            card.wrong("damping is read in a *MATERIAL alone")
+        if self._material is None:
+            card.wrong("it belongs after *MATERIAL")
+        card.check_options(OF_MATERIAL[card.keyword])
+        self._material.cards[card.keyword] = card
+
+    # ---- the model ------------------------------------------------------------------------------------
+
+    def material(self, card: Card) -> None:
+        """Read *MATERIAL."""
+        card.check_options(("NAME",))
+        self._material = self.materials[card.option("NAME").upper()] = Definition(card)
+
+    def section(self, card: Card) -> None:
+        """Read *SOLID SECTION."""
+        card.check_options(("ELSET", "MATERIAL", "ORIENTATION"))
+        names = [card.option(name, "").upper() for name in ("ELSET", "MATERIAL", "ORIENTATION")]
+        self.sections.append((names[0], names[1], names[2], card))
+
+    def orientation(self, card: Card) -> None:
+        """Read *ORIENTATION."""
+        self.orientations[card.option("NAME").upper()] = orientation(card)
+
+    def amplitude(self, card: Card) -> None:
+        """Read *AMPLITUDE, pairs of a time and a factor."""
+        card.check_options(("NAME", "TIME", "DEFINITION"))
+        if card.option("DEFINITION", "TABULAR").upper() != "TABULAR":
+            card.wrong("DEFINITION=TABULAR alone is supported")
+        pairs = card.every()
+        if pairs.size % 2 or not pairs.size:
+            card.wrong(f"times and factors come in pairs; got {pairs.size} numbers")
+        try:
+            self.amplitudes[card.option("NAME").upper()] = TimeSeries(pairs[::2], pairs[1::2])
+        except InputError as error:
+            card.wrong(str(error))
+
+    def transform(self, card: Card) -> None:
+        """Read *TRANSFORM."""
+        mesh = self.mesh
+        self.axes.transform(card, self.cards, mesh)
+
+    def initial_conditions(self, card: Card) -> None:
+        """Read *INITIAL CONDITIONS."""
+        card.check_options(("TYPE",))
+        if (kind := card.option("TYPE").upper()) != "TEMPERATURE":
+            card.wrong(f"TYPE={kind} is not supported; TEMPERATURE is")
+        mesh = self.mesh
+        for row in card.rows():
+            self.initial[node_rows(row.text(0), row, self.cards, mesh)] = row.number(1)
+
+    def equation(self, card: Card) -> None:
+        """Read *EQUATION."""
+        self.equations += equations(card, self.cards, self.mesh)
+
+    def boundary(self, card: Card) -> None:
+        """Read *BOUNDARY, of the model or of a step."""
+        mesh = self.mesh
+        if card.options.get("OP", "").upper() == "NEW":
+            self.held.clear()
+        boundary(card, self.held, self.cards, mesh)
+
+    # ---- steps ----------------------------------------------------------------------------------------
+
+    def step(self, card: Card) -> None:
+        """Read *STEP."""
+        card.check_options(("NLGEOM", "INC", "PERTURBATION", "AMPLITUDE", "NAME"))
+        if self.open is not None:
+            card.wrong(f"the step of {self.open.card.place} is not ended by *END STEP")
+        if card.options.get("AMPLITUDE", "RAMP").upper() not in ("RAMP", "STEP"):
+            card.wrong("AMPLITUDE is RAMP or STEP")
+        large = card.options.get("NLGEOM", "NO" if "NLGEOM" not in card.options else "YES").upper() != "NO"
+        self.open = Step(card, large)
+        _ = self.mesh
+
+    def procedure(self, card: Card) -> None:
+        """Read the kind of a step, such as *STATIC, and its data line."""
+        step = self._in_step(card)
+        if step.procedure is not None:
+            card.wrong(f"the step has *{step.procedure.keyword} already; write another *STEP")
+        card.check_options(PROCEDURES[card.keyword])
+        step.procedure = card
+
+    def load(self, card: Card) -> None:
+        """Read a card of loads."""
+        self._in_step(card)
+        read = getattr(self.loads, card.keyword.lower())
+        read(card, self.acting, len(self.steps) + 1)
+
+    def output(self, card: Card) -> None:
+        """Read a card that asks for results."""
+        self._in_step(card).outputs.append(card)
+
+    def end_step(self, card: Card) -> None:
+        """Read *END STEP."""
+        step = self._in_step(card)
+        if step.procedure is None:
+            step.card.wrong("the step has no procedure such as *STATIC")
+        step.held, step.acting = self.held.copy(), self.acting.copy()
+        self.steps.append(step)
+        self.open = None
+
+    def _in_step(self, card: Card) -> Step:
+        if self.open is None:
+            card.wrong("it belongs between *STEP and *END STEP")
+        return self.open
+
+
+CARDS: dict[str, Callable[[Deck, Card], None]] = {
+    **{name: lambda deck, card, f=name: getattr(deck.cards, f.lower())(card)  # type: ignore[misc]
+       for name in ("NODE", "ELEMENT", "NSET", "ELSET", "SURFACE")},
+    "MATERIAL": Deck.material, "SOLIDSECTION": Deck.section, "ORIENTATION": Deck.orientation,
+    "AMPLITUDE": Deck.amplitude, "TRANSFORM": Deck.transform, "INITIALCONDITIONS": Deck.initial_conditions,
+    "EQUATION": Deck.equation, "BOUNDARY": Deck.boundary, "STEP": Deck.step, "ENDSTEP": Deck.end_step,
+    **dict.fromkeys(PROCEDURES, Deck.procedure),
+    **dict.fromkeys(("CLOAD", "DLOAD", "DSLOAD", "TEMPERATURE"), Deck.load),
+    **dict.fromkeys(("NODEFILE", "ELFILE", "NODEPRINT", "ELPRINT", "SECTIONPRINT", "FACEPRINT"), Deck.output),
+}  # fmt: skip
+"""What reads each card."""

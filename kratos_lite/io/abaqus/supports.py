@@ -1,0 +1,169 @@
+"""Supports and equations of a deck, on its mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+import numpy as np
+
+from kratos_lite.analysis.model import Model
+from kratos_lite.io.abaqus.cards import Card, Row
+from kratos_lite.io.abaqus.materials import axes_of
+from kratos_lite.io.abaqus.mesh import MeshCards
+from kratos_lite.mesh import Mesh
+from kratos_lite.model.local_axes import LocalAxes
+from kratos_lite.time_series import TimeSeries
+from kratos_lite.typing import Array, Ints, Mask
+
+
+@dataclass
+class Nodal:
+    """Values at nodes along directions, (n, k): which are given, with the names of their amplitudes."""
+
+    given: Mask
+    values: Array
+    amplitudes: Array  # of str
+    steps: Ints  # in which each was given
+
+    @classmethod
+    def none(cls, n: int, k: int = 3) -> Nodal:
+        """Return nothing at n nodes."""
+        steps, names = np.zeros((n, k), dtype=np.int64), np.full((n, k), "", dtype=object)
+        return cls(np.zeros((n, k), dtype=bool), np.zeros((n, k)), names, steps)
+
+    def copy(self) -> Nodal:
+        """Return a copy."""
+        return Nodal(self.given.copy(), self.values.copy(), self.amplitudes.copy(), self.steps.copy())
+
+    def clear(self) -> None:
+        """Remove everything."""
+        self.given[:], self.values[:], self.steps[:] = False, 0.0, 0
+
+    def put(self, rows: Ints, axes: int | slice, value: float, amplitude: str) -> None:
+        """Give a value to nodes."""
+        self.given[rows, axes], self.values[rows, axes] = True, value
+        self.amplitudes[rows, axes] = amplitude
+
+    def add(self, rows: Ints, axis: int, value: float, amplitude: str, step: int) -> None:
+        """Add a value to those of the same step, and replace those of earlier ones."""
+        self.values[rows[self.steps[rows, axis] < step], axis] = 0.0
+        self.steps[rows, axis] = step
+        np.add.at(self.values[:, axis], rows, value)
+        self.given[rows, axis], self.amplitudes[rows, axis] = True, amplitude
+
+
+Equation: TypeAlias = tuple[Ints, Ints, Array, str]
+"""Rows of nodes, directions from 0, coefficients, and its place."""
+
+
+@dataclass
+class Axes:
+    """Local axes of nodes (*TRANSFORM)."""
+
+    each: list[LocalAxes] = field(default_factory=list)
+    of_node: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))  # index of `each`, or -1
+
+    def transform(self, card: Card, cards: MeshCards, mesh: Mesh) -> None:
+        """Read *TRANSFORM."""
+        card.check_options(("NSET", "TYPE"))
+        rows = node_rows(card.option("NSET"), card, cards, mesh)
+        line = next(card.rows(), None) or card.wrong("two points are needed on its data line")
+        self.each.append(axes_of(line, card.option("TYPE", "R")))
+        self.of_node[rows] = len(self.each) - 1
+
+    def directions(self, mesh: Mesh, rows: Ints) -> Array:
+        """Return the axes (m, 3, 3) of nodes."""
+        out = np.broadcast_to(np.eye(3), (len(rows), 3, 3)).copy()
+        for i, axes in enumerate(self.each):
+            of = self.of_node[rows] == i
+            out[of] = axes.directions(mesh.points[rows[of]])
+        return out
+
+
+def node_rows(word: str, at: Row | Card, cards: MeshCards, mesh: Mesh) -> Ints:
+    """Return the rows of nodes that a number or the name of a set means."""
+    ids = cards.nodes_of(word, at)
+    rows = mesh.node_rows(ids)
+    if (rows < 0).any():
+        at.wrong(f"there is no node {ids[rows < 0][0]}")
+    return rows
+
+
+def boundary(card: Card, held: Nodal, cards: MeshCards, mesh: Mesh) -> None:
+    """Read *BOUNDARY."""
+    card.check_options(("OP", "AMPLITUDE", "FIXED"))
+    if "FIXED" in card.options:
+        card.wrong("option FIXED is not supported; give the value")
+    for row in card.rows():
+        rows = node_rows(row.text(0), row, cards, mesh)
+        word = row.text(1)
+        if not word.isdigit():
+            row.wrong(f"{word!r} is no number of a direction; 1, 2, 3 are x, y, z")
+        first, last = row.integer(1), row.integer(2, row.integer(1))
+        if not 1 <= first <= last:
+            row.wrong(f"directions {first} to {last}: give the first and the last of 1, 2, 3")
+        if first > 3:
+            if first == 11:
+                row.wrong("temperatures are given by *TEMPERATURE; degree of freedom 11 is not supported")
+            continue  # rotations, which solids do not have
+        axes = slice(first - 1, min(last, 3))
+        held.put(rows, axes, row.number(3, 0.0), card.options.get("AMPLITUDE", "").upper())
+
+
+def equations(card: Card, cards: MeshCards, mesh: Mesh) -> list[Equation]:
+    """Return the equations of *EQUATION: nodes, directions from 0, coefficients, place."""
+    card.check_options(())
+    found, rows = list[Equation](), card.rows()
+    for row in rows:
+        count, values = row.integer(0), list[float]()
+        while len(values) < 3 * count:
+            line = next(rows, None) or row.wrong(f"an equation of {count} terms has {3 * count} values")
+            values += [line.number(i) for i in range(len(line.fields))]
+        table = np.array(values[: 3 * count]).reshape(-1, 3)
+        nodes = mesh.node_rows(table[:, 0].astype(np.int64))
+        if (nodes < 0).any():
+            row.wrong(f"there is no node {table[nodes < 0, 0][0]:g}")
+        if not np.isin(table[:, 1], (1, 2, 3)).all():
+            row.wrong("an equation has directions 1, 2, 3 of solids alone")
+        found.append((nodes, table[:, 1].astype(int) - 1, table[:, 2], row.place))
+    return found
+
+
+def scaled(series: TimeSeries, factor: float) -> TimeSeries:
+    """Return a series times a factor."""
+    return TimeSeries(series.times, factor * series.values)
+
+
+def apply(model: Model, held: Nodal, axes: Axes, series: dict[str, TimeSeries]) -> None:
+    """Support a model; nodes that share axis, amplitude and local axes are one call."""
+    local = axes.of_node
+    for system in np.unique(local[held.given.any(axis=1)]).tolist():
+        of = held.given & (local == system)[:, None]
+        frame = axes.each[system] if system >= 0 else None
+        for axis in range(3):
+            rows = np.flatnonzero(of[:, axis])
+            for name in sorted(set(held.amplitudes[rows, axis])):
+                some = rows[held.amplitudes[rows, axis] == name]
+                values = held.values[some, axis]
+                letter = "xyz"[axis] if frame is None else frame.letters[axis]
+                if not name:
+                    model.fix(some, letter, values[:, None], local=frame)
+                    continue
+                for value in np.unique(values).tolist():
+                    model.fix(some[values == value], letter, scaled(series[name], value), local=frame)
+
+
+def constrain(model: Model, rows: list[Equation], axes: Axes) -> None:
+    """Add equations; those of as many terms are one call."""
+    mesh, by_size = model.mesh, dict[int, list[tuple[Ints, Array]]]()
+    for nodes, directions, factors, _ in rows:
+        weights = factors[:, None] * axes.directions(mesh, nodes)[range(len(nodes)), directions]
+        term, axis = np.nonzero(np.abs(weights) > 1e-12 * np.abs(weights).max())
+        dofs, w = 3 * nodes[term] + axis, weights[term, axis]
+        first = int(np.argmax(np.abs(w * (term == 0))))
+        order = np.r_[first, np.delete(np.arange(len(dofs)), first)]
+        by_size.setdefault(len(dofs), []).append((dofs[order], w[order]))
+    for found in by_size.values():
+        dofs, w = np.array([d for d, _ in found]), np.array([x for _, x in found])
+        model.constrain(dofs[:, 0], dofs[:, 1:], weights=-w[:, 1:] / w[:, :1])
