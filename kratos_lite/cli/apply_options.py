@@ -41,6 +41,15 @@ def case_of(options: Namespace, part: int | None = None) -> Case:
         part=part,
         **given(options, "linear", "scale"),
     )
+    if case.then:
+        refuse(options, ("modes", "buckling", "time"), "does not go with a file of several steps")
+    for number, each in enumerate((case, *case.then), 1):
+        _apply(each, options, f"-{number}" if case.then else "")
+    return case
+
+
+def _apply(case: Case, options: Namespace, mark: str) -> None:
+    """Change a case as the options say; the names of its outputs get a mark."""
     for name, value in given(options, "solver", "tolerance", "error", "backend", "petsc").items():
         setattr(case, name, value)
     if case.is_of_model:
@@ -53,10 +62,19 @@ def case_of(options: Namespace, part: int | None = None) -> Case:
     if given(options, "modes", "buckling"):
         _take_modes(case, options)
     for name, path in given(options, "json", "picture", "state").items():
-        setattr(case.outputs, name, path)
+        setattr(case.outputs, name, _marked(path, mark))
     case.outputs.sections = options.section
-    case.outputs.results, case.outputs.mode = options.output or case.outputs.results, options.vtu
-    return case
+    results = [_marked(path, mark) for path in options.output]
+    case.outputs.results, case.outputs.mode = results or case.outputs.results, options.vtu
+
+
+def _marked(path: str, mark: str) -> str:
+    """Return a path with a mark before its ending.
+
+    >>> _marked("out/part.vtu", "-2")
+    'out/part-2.vtu'
+    """
+    return str(Path(path).with_suffix("")) + mark + Path(path).suffix
 
 
 def given(options: Namespace, *names: str) -> dict[str, Any]:

@@ -72,20 +72,32 @@ def solve(options: Namespace) -> int:
             summary, written = solve_parts(options)
             _print([] if options.quiet else [*summary, *map(_written, written)])
             return 0
-        with in_terminal("read", options.progress) as progress:
+        with in_terminal("read", options.progress):
             case = case_of(options)
             seconds["read"] = perf_counter() - clock
-            outcome = run(case, progress)
-        if outcome.result is not None:
-            outcome.result.report.seconds = {**seconds, **outcome.result.report.seconds}
-        try:  # a file that fails loses no summary, and a terminal that fails loses no file
-            with in_terminal("evaluate", options.progress):
-                summary = [] if options.quiet else outcome.summary(verbose=options.verbose)
-            _print(summary)
-        except OSError:
-            _write(outcome, options)
-            raise
-        return _write(outcome, options)
+        cases, codes = [case, *case.then], list[int]()
+        for number, each in enumerate(cases, 1):
+            _print([f"{'step':<22}{number} of {len(cases)}"] if case.then and not options.quiet else [])
+            with in_terminal("check", options.progress) as progress:
+                outcome = run(each, progress)
+            if outcome.result is not None:
+                outcome.result.report.seconds = {**seconds, **outcome.result.report.seconds}
+            codes.append(_show(outcome, options))
+        return max(codes)
+
+
+def _show(outcome: Outcome, options: Namespace) -> int:
+    """Print the summary of an outcome and write its files; return the exit code."""
+    from kratos_lite.view.progress import in_terminal
+
+    try:  # a file that fails loses no summary, and a terminal that fails loses no file
+        with in_terminal("evaluate", options.progress):
+            summary = [] if options.quiet else outcome.summary(verbose=options.verbose)
+        _print(summary)
+    except OSError:
+        _write(outcome, options)
+        raise
+    return _write(outcome, options)
 
 
 def _read_options(options: Namespace) -> None:
@@ -130,9 +142,9 @@ def info(options: Namespace) -> int:
     kratos-lite info examples/bodies/pendulum.py
     """
     with _within_numbers(options):
-        from kratos_lite.io.formats import ending, read_document
+        from kratos_lite.io.formats import describes_case, read_document
 
-        if ending(options.input) in (".json", ".py"):
+        if describes_case(options.input):
             from kratos_lite.io.files import read_case
             from kratos_lite.io.run import describe_case
 
@@ -146,9 +158,9 @@ def info(options: Namespace) -> int:
 
 def _document(options: Namespace) -> Document:
     """Return what a model file says; of a run file or script, a document of its model."""
-    from kratos_lite.io.formats import ending, read_document
+    from kratos_lite.io.formats import describes_case, read_document
 
-    if ending(options.input) not in (".json", ".py"):
+    if not describes_case(options.input):
         return read_document(options.input, strict=not options.lenient)
     from kratos_lite.io.files import read_case
     from kratos_lite.io.formats.document import Note

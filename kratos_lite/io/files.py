@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from kratos_lite.errors import InputError
 from kratos_lite.io.case import Case
-from kratos_lite.io.formats import ending, input_file, read_document, write_document
+from kratos_lite.io.formats import describes_case, ending, input_file, read_document, write_document
 from kratos_lite.io.formats.part_files import part_files, read_part
 from kratos_lite.io.kratos.to_model import model_from
 from kratos_lite.validation import number, path_of
@@ -32,7 +32,8 @@ def read(
     Parameters
     ----------
     path : .mdpa or any file of an .elem set or its stem (both also gzipped), a .json run file of Kratos, a
-        folder with a ``ProjectParameters.json``, a Python script with a case, or any format of meshio.
+        folder with a ``ProjectParameters.json``, a deck of CalculiX (.inp) with steps, of which the first
+        counts, a Python script with a case, or any format of meshio.
     materials : take the materials from the file; False leaves them to the caller (but for run files).
     strict : refuse `.mdpa` rows that do not stand on lines of their own (but in run files).
     initial_displacement : take the DISPLACEMENT of nodes that are not fixed for the state without stress,
@@ -72,7 +73,8 @@ def read_case(
     Parameters
     ----------
     path : a model file, as for `read`; a .json run file of Kratos; a folder with a
-        ``ProjectParameters.json``; or a Python script that defines a `case`, or `body`, `dt` and `steps`.
+        ``ProjectParameters.json``; a deck of CalculiX (.inp), whose further steps are ``then``; or a Python
+        script that defines a `case`, or `body`, `dt` and `steps`.
     materials : take the materials from a model file; False leaves them to the caller.
     strict : refuse `.mdpa` rows that do not stand on lines of their own.
     allow_outside : let a .json file name files outside its folder.
@@ -93,7 +95,7 @@ def read_case(
         With file, line and cure of everything that is wrong.
     """
     path, scale = input_file(path_of(path)), number(scale, "scale", above=0)
-    if scale != 1 and ending(path) in (".json", ".py"):
+    if scale != 1 and describes_case(path):
         raise InputError(f"{path}: scale is that of a mesh file; write {ending(path)} files in SI units")
     with watched(None, "read"):
         if ending(path) == ".json":
@@ -106,7 +108,7 @@ def read_case(
             from kratos_lite.io.script import read_script
 
             case = read_script(path)
-        elif ending(path) == ".inp":
+        elif describes_case(path):
             from kratos_lite.io.abaqus.steps import read_deck
 
             case = read_deck(path)

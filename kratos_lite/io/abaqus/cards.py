@@ -62,7 +62,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Card:
-    """A keyword in capitals without blanks, its options, its place, and its data with the first line of these."""
+    """A keyword in capitals without blanks, its options, its place, and the text of its data lines."""
 
     keyword: str
     options: dict[str, str]

@@ -27,15 +27,13 @@ REFUSED = {
     **dict.fromkeys(("CONTACTPAIR", "CONTACTPRINT", "GAP", "CLEARANCE"), "contact"),
     **dict.fromkeys(("SHELLSECTION", "MEMBRANESECTION"), "shells and membranes"),
     **dict.fromkeys(("BEAMSECTION", "BEAMGENERALSECTION"), "beams"),
-    **dict.fromkeys(
-        ("HEATTRANSFER", "COUPLEDTEMPERATURE-DISPLACEMENT", "UNCOUPLEDTEMPERATURE-DISPLACEMENT"), "heat transfer"
-    ),
+    **dict.fromkeys(("COUPLEDTEMPERATURE-DISPLACEMENT", "UNCOUPLEDTEMPERATURE-DISPLACEMENT"), "heat transfer"),
     **dict.fromkeys(("CYCLICSYMMETRYMODEL", "SELECTCYCLICSYMMETRYMODES"), "cyclic symmetry"),
     **dict.fromkeys(("CREEP", "VISCO", "CYCLICHARDENING", "DEFORMATIONPLASTICITY", "HYPERFOAM"), "this law"),
     **dict.fromkeys(("USERMATERIAL", "DEPVAR"), "a law of your own in Fortran; take kl.UMAT in Python"),
     **dict.fromkeys(("SENSITIVITY", "DESIGNVARIABLES", "OBJECTIVE", "SUBSTRUCTUREGENERATE"), "this analysis"),
     **dict.fromkeys(("DASHPOT", "MODELCHANGE", "SUBMODEL", "MPC", "COMPLEXFREQUENCY", "GREEN"), "this card"),
-    **dict.fromkeys(("FLUIDSECTION", "CFD", "FLUIDCONSTANTS", "DFLUX", "CFLUX", "FILM", "RADIATE"), "heat and flow"),
+    **dict.fromkeys(("HEATTRANSFER", "FLUIDSECTION", "CFD", "DFLUX", "CFLUX", "FILM", "RADIATE"), "heat transfer"),
 }  # fmt: skip
 """What cards stand for that are refused."""
 SURFACE_LAWS = ("SURFACEINTERACTION", "SURFACEBEHAVIOR", "FRICTION", "GAPCONDUCTANCE", "CONTACTDAMPING")

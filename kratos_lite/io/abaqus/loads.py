@@ -19,7 +19,6 @@ from kratos_lite.model.loads.nodal import NodalForces
 from kratos_lite.model.loads.surface import ConditionLoads
 from kratos_lite.model.loads.temperature import Temperature
 from kratos_lite.shapes.faces import FACE_SHAPES
-from kratos_lite.time_series import Factor
 from kratos_lite.typing import Array, Ints
 
 Face: TypeAlias = tuple[int, int]
@@ -187,11 +186,7 @@ def loads_of(
         none = {cell: np.zeros((n, 3)) for cell in ("point", "line", "triangle", "quadrilateral")}
         yield ConditionLoads(np.zeros((len(number), 3)), none, pressure, np.zeros(n)), name
     for (kind, at, _), term in acting.bodies.items():
-        where = (
-            mesh.parts[at].elements
-            if at in mesh.parts
-            else rows_of_ids(mesh.element_ids, np.array([int(at)]))
-        )
+        where = at if at in mesh.parts else rows_of_ids(mesh.element_ids, np.array([int(at)]))
         if kind == "GRAV":
             size, *direction = term.values
             yield Gravity(size * np.array(direction), where), term.amplitude

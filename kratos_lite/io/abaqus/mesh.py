@@ -75,10 +75,9 @@ class MeshCards:
             values = np.array(rows)
         table = values.reshape(-1, 4)
         ids = table[:, 0].astype(np.int64)
-        if ((ids != table[:, 0]) | (ids < 1)).any():
-            card.wrong(
-                f"ids of nodes are whole numbers from 1; got {table[(ids != table[:, 0]) | (ids < 1), 0][0]:g}"
-            )
+        wrong = (ids != table[:, 0]) | (ids < 1)
+        if wrong.any():
+            card.wrong(f"ids of nodes are whole numbers from 1; got {table[wrong, 0][0]:g}")
         self.node_cards.append((ids, table[:, 1:]))
         if "NSET" in card.options:
             self.node_sets.setdefault(card.option("NSET").upper(), []).append(ids)

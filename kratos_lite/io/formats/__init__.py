@@ -5,6 +5,7 @@ A new format is one module, and one branch in `read_document`, in `write_documen
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from kratos_lite.errors import InputError, naming
@@ -25,6 +26,16 @@ def ending(path: str | Path) -> str:
     if suffixes and suffixes[-1] == ".gz":
         suffixes.pop()
     return suffixes[-1] if suffixes else ""
+
+
+def describes_case(path: str | Path) -> bool:
+    """Return whether a file says more than a model: a run file, a script, or a deck with steps."""
+    kind = ending(path)
+    if kind == ".inp" and Path(path).is_file():
+        from kratos_lite.io.text import read_bytes
+
+        return re.search(rb"(?im)^[ \t]*\*step\b", read_bytes(path)) is not None
+    return kind in (".json", ".py")
 
 
 def input_file(path: str | Path) -> Path:

@@ -278,6 +278,10 @@ class ConditionLoads(Load):
         self.pressure = pressure  # (c,) Pa, against the normal by the right hand about the nodes
         self.nodal_pressure = nodal_pressure  # (n,) Pa
 
+    def __repr__(self) -> str:
+        loaded = self.force.any(axis=1) | (self.pressure != 0)
+        return f"forces and pressures of {int(loaded.sum())} conditions"
+
     def follow(self, mesh: Mesh, x: Array) -> Iterator[tuple[Rows, Array, Array]]:
         """Yield what deformed faces and lines change; a force per area keeps its direction."""
         yield from self._deformed(mesh, x, self.following)
