@@ -19,25 +19,29 @@ from kratos_lite.model.local_axes import LocalAxes
 from kratos_lite.time_series import TimeSeries
 
 NO_EFFECT = frozenset(
-    "HEADING PREPRINT RESTART NODEOUTPUT ELEMENTOUTPUT OUTPUT CONTROLS CONDUCTIVITY SPECIFICHEAT "
-    "FILTER TIMEPOINTS CONTACTFILE".split()
+    "HEADING PREPRINT RESTART NODEOUTPUT ELEMENTOUTPUT OUTPUT CONTROLS CONDUCTIVITY SPECIFICHEAT FILTER "
+    "TIMEPOINTS PHYSICALCONSTANTS SURFACEINTERACTION SURFACEBEHAVIOR FRICTION GAPCONDUCTANCE "
+    "CONTACTDAMPING CONTACTFILE".split()
 )
-"""Cards that change nothing in the displacements of solids."""
-REFUSED = {
-    **dict.fromkeys(("CONTACTPAIR", "CONTACTPRINT", "GAP", "CLEARANCE"), "contact"),
-    **dict.fromkeys(("SHELLSECTION", "MEMBRANESECTION"), "shells and membranes"),
-    **dict.fromkeys(("BEAMSECTION", "BEAMGENERALSECTION"), "beams"),
-    **dict.fromkeys(("COUPLEDTEMPERATURE-DISPLACEMENT", "UNCOUPLEDTEMPERATURE-DISPLACEMENT"), "heat transfer"),
-    **dict.fromkeys(("CYCLICSYMMETRYMODEL", "SELECTCYCLICSYMMETRYMODES"), "cyclic symmetry"),
-    **dict.fromkeys(("CREEP", "VISCO", "CYCLICHARDENING", "DEFORMATIONPLASTICITY", "HYPERFOAM"), "this law"),
-    **dict.fromkeys(("USERMATERIAL", "DEPVAR"), "a law of your own in Fortran; take kl.UMAT in Python"),
-    **dict.fromkeys(("SENSITIVITY", "DESIGNVARIABLES", "OBJECTIVE", "SUBSTRUCTUREGENERATE"), "this analysis"),
-    **dict.fromkeys(("DASHPOT", "MODELCHANGE", "SUBMODEL", "MPC", "COMPLEXFREQUENCY", "GREEN"), "this card"),
-    **dict.fromkeys(("HEATTRANSFER", "FLUIDSECTION", "CFD", "DFLUX", "CFLUX", "FILM", "RADIATE"), "heat transfer"),
-}  # fmt: skip
+"""Cards that change nothing in the displacements of solids, or nothing by themselves."""
+_REFUSED = {
+    "contact": "CONTACTPAIR CONTACTPRINT GAP CLEARANCE",
+    "shells and membranes": "SHELLSECTION MEMBRANESECTION",
+    "beams": "BEAMSECTION BEAMGENERALSECTION",
+    "heat transfer": "HEATTRANSFER COUPLEDTEMPERATURE-DISPLACEMENT UNCOUPLEDTEMPERATURE-DISPLACEMENT "
+    "CFLUX DFLUX FILM RADIATE",
+    "flow": "FLUIDSECTION FLUIDCONSTANTS CFD",
+    "cyclic symmetry": "CYCLICSYMMETRYMODEL SELECTCYCLICSYMMETRYMODES",
+    "this law": "CREEP VISCO CYCLICHARDENING DEFORMATIONPLASTICITY HYPERFOAM CHANGEPLASTIC CHANGEMATERIAL",
+    "a law in Fortran": "USERMATERIAL DEPVAR",
+    "optimization": "SENSITIVITY DESIGNVARIABLES OBJECTIVE",
+    "a substructure": "SUBSTRUCTUREGENERATE SUBMODEL",
+    "a change of the model": "MODELCHANGE CHANGESOLIDSECTION",
+    "this card": "DASHPOT MPC COMPLEXFREQUENCY GREEN",
+}
+REFUSED = {keyword: what for what, keywords in _REFUSED.items() for keyword in keywords.split()}
 """What cards stand for that are refused."""
-SURFACE_LAWS = ("SURFACEINTERACTION", "SURFACEBEHAVIOR", "FRICTION", "GAPCONDUCTANCE", "CONTACTDAMPING")
-"""Cards of contact, which alone change nothing."""
+OF_MESH = ("NODE", "ELEMENT", "NSET", "ELSET", "SURFACE")
 OF_MATERIAL = {
     "ELASTIC": ("TYPE",), "DENSITY": (), "EXPANSION": ("TYPE", "ZERO"), "PLASTIC": ("HARDENING",),
     "HYPERELASTIC": ("NEOHOOKE", "MOONEY-RIVLIN", "OGDEN", "N", "MODULI"), "DAMPING": ("ALPHA", "BETA"),
@@ -84,53 +88,49 @@ class Deck:
 
     def __init__(self, path: Path) -> None:
         self.path, self.notes = path, list[str]()
-        self.cards = MeshCards()
+        cards, self.cards = list(read_cards(path)), MeshCards()
+        for card in cards:
+            if card.keyword in OF_MESH:
+                getattr(self.cards, card.keyword.lower())(card)
+        mesh = self.mesh = self.cards.mesh(path.name)
+        n = mesh.n_nodes
         self.materials = dict[str, Definition]()
         self.sections = list[tuple[str, str, str, Card]]()  # ELSET, MATERIAL, ORIENTATION
         self.orientations = dict[str, LocalAxes]()
         self.amplitudes = dict[str, TimeSeries]()
-        self.equations = list[Equation]()
+        self.held, self.acting = Nodal.none(n), Acting(Nodal.none(n), Nodal.none(n, 1))
+        self.axes, self.equations = Axes(of_node=np.full(n, -1)), list[Equation]()
+        self.initial = np.zeros(n)  # temperatures
+        self.loads = LoadCards(self.cards, mesh)
         self.steps = list[Step]()
-        self.ignored = set[str]()
         self.open: Step | None = None  # the step that is being read
         self._material: Definition | None = None
-        self._mesh: Mesh | None = None
+        self._read([card for card in cards if card.keyword not in OF_MESH])
 
-    @property
-    def mesh(self) -> Mesh:
-        """The mesh, which is complete when the first card needs it."""
-        if self._mesh is None:
-            mesh = self._mesh = self.cards.mesh(self.path.name)
-            n = mesh.n_nodes
-            self.held, self.acting = Nodal.none(n), Acting(Nodal.none(n), Nodal.none(n, 1))
-            self.axes = Axes(of_node=np.full(n, -1))
-            self.initial = np.zeros(n)  # temperatures
-            self.loads = LoadCards(self.cards, mesh)
-        return self._mesh
-
-    def read(self) -> None:
-        """Read all cards."""
-        for card in read_cards(self.path):
+    def _read(self, cards: list[Card]) -> None:
+        """Read all cards but those of the mesh."""
+        ignored = set[str]()
+        for card in cards:
             keyword = card.keyword
             if keyword in REFUSED:
-                card.wrong(f"{REFUSED[keyword]} is not supported; decks of solids without it are read")
+                card.wrong(f"{REFUSED[keyword]} is not supported")
             if keyword in OF_MATERIAL:
                 self._of_material(card)
                 continue
-            if keyword not in ("MATERIAL",):
-                self._material = None
-            if keyword in NO_EFFECT or keyword in SURFACE_LAWS:
-                self.ignored.add(keyword)
+            if keyword in NO_EFFECT:
+                ignored.add(keyword)
                 continue
+            self._material = None
             if keyword not in CARDS:
-                card.wrong(f"this card is not known.{nearest(keyword, (*CARDS, *NO_EFFECT, *OF_MATERIAL))}")
+                known = (*CARDS, *OF_MESH, *NO_EFFECT, *OF_MATERIAL)
+                card.wrong(f"this card is not known.{nearest(keyword, known)}")
             CARDS[keyword](self, card)
         if self.open is not None:
             self.open.card.wrong("the step is not ended by *END STEP")
         if not self.steps:
             raise InputError(f"{self.path}: there is no *STEP; a mesh alone is read by kl.read")
-        if self.ignored:
-            self.notes.append(f"cards without effect here: {', '.join(sorted(self.ignored))}")
+        if ignored:
+            self.notes.append(f"cards without effect here: {', '.join(sorted(ignored))}")
 
     def _of_material(self, card: Card) -> None:
         if card.keyword == "DAMPING" and self._material is None:
@@ -172,17 +172,15 @@ class Deck:
 
     def transform(self, card: Card) -> None:
         """Read *TRANSFORM."""
-        mesh = self.mesh
-        self.axes.transform(card, self.cards, mesh)
+        self.axes.transform(card, self.cards, self.mesh)
 
     def initial_conditions(self, card: Card) -> None:
         """Read *INITIAL CONDITIONS."""
         card.check_options(("TYPE",))
         if (kind := card.option("TYPE").upper()) != "TEMPERATURE":
             card.wrong(f"TYPE={kind} is not supported; TEMPERATURE is")
-        mesh = self.mesh
         for row in card.rows():
-            self.initial[node_rows(row.text(0), row, self.cards, mesh)] = row.number(1)
+            self.initial[node_rows(row.text(0), row, self.cards, self.mesh)] = row.number(1)
 
     def equation(self, card: Card) -> None:
         """Read *EQUATION."""
@@ -190,10 +188,9 @@ class Deck:
 
     def boundary(self, card: Card) -> None:
         """Read *BOUNDARY, of the model or of a step."""
-        mesh = self.mesh
         if card.options.get("OP", "").upper() == "NEW":
             self.held.clear()
-        boundary(card, self.held, self.cards, mesh)
+        boundary(card, self.held, self.cards, self.mesh)
 
     # ---- steps ----------------------------------------------------------------------------------------
 
@@ -206,7 +203,6 @@ class Deck:
             card.wrong("AMPLITUDE is RAMP or STEP")
         large = card.options.get("NLGEOM", "NO" if "NLGEOM" not in card.options else "YES").upper() != "NO"
         self.open = Step(card, large)
-        _ = self.mesh
 
     def procedure(self, card: Card) -> None:
         """Read the kind of a step, such as *STATIC, and its data line."""
@@ -242,8 +238,6 @@ class Deck:
 
 
 CARDS: dict[str, Callable[[Deck, Card], None]] = {
-    **{name: lambda deck, card, f=name: getattr(deck.cards, f.lower())(card)  # type: ignore[misc]
-       for name in ("NODE", "ELEMENT", "NSET", "ELSET", "SURFACE")},
     "MATERIAL": Deck.material, "SOLIDSECTION": Deck.section, "ORIENTATION": Deck.orientation,
     "AMPLITUDE": Deck.amplitude, "TRANSFORM": Deck.transform, "INITIALCONDITIONS": Deck.initial_conditions,
     "EQUATION": Deck.equation, "BOUNDARY": Deck.boundary, "STEP": Deck.step, "ENDSTEP": Deck.end_step,

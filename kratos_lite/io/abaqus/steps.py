@@ -24,7 +24,6 @@ from kratos_lite.time_series import Factor, TimeSeries
 def read_deck(path: Path) -> Case:
     """Return the case of the first step of a deck, which names those that follow."""
     deck = Deck(path)
-    deck.read()
     with naming(str(path)):
         cases = _Building(deck).cases()
     cases[0].then = cases[1:]
@@ -76,7 +75,7 @@ class _Building:
             material = material_of(deck.materials[name], deck.orientations.get(axes), finite=large)
             model.assign(material, rows)
             assigned[rows] = True
-        if deck.steps and not assigned.all():
+        if not assigned.all():
             missing = mesh.element_ids[~assigned][0]
             raise InputError(f"{deck.path}: element {missing} is in no *SOLID SECTION")
         model.notes += deck.notes
