@@ -61,6 +61,7 @@ def solve(options: Namespace) -> int:
     with _within_numbers(options):
         from kratos_lite.cli.apply_options import case_of
         from kratos_lite.cli.ranks import part_files_of, solve_parts
+        from kratos_lite.io.outputs import check_outputs
         from kratos_lite.io.run import run
         from kratos_lite.solvers.direct import reserve_buffers
         from kratos_lite.view.progress import in_terminal
@@ -76,6 +77,8 @@ def solve(options: Namespace) -> int:
             case = case_of(options)
             seconds["read"] = perf_counter() - clock
         cases, codes = [case, *case.then], list[int]()
+        for each in case.then:
+            check_outputs(each)
         for number, each in enumerate(cases, 1):
             _print([f"{'step':<22}{number} of {len(cases)}"] if case.then and not options.quiet else [])
             with in_terminal("check", options.progress) as progress:

@@ -56,6 +56,7 @@ def seeds(folder: Path) -> list[Seed]:
     """Return all seeds; `folder` is for files that other programs write."""
     mesh, files = GOOD["mesh.mdpa"], {f"set.{name}": GOOD[f"set.{name}"] for name in SET}
     found = [Seed("mdpa", {"mesh.mdpa": mesh}, "mesh.mdpa"), Seed("elem", files, "set.elem")]
+    found.append(Seed("deck", {"deck.inp": GOOD["deck.inp"]}, "deck.inp"))
     dynamic = json.loads(json.dumps(KRATOS))
     dynamic["solver_settings"] |= {"solver_type": "Dynamic", "scheme_type": "bossak", "rayleigh_alpha": 0.1}
     for settings, in_time in ((KRATOS, False), (KRATOS | {"ale": ALE}, False), (dynamic, True)):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kratos_lite.errors import InputError, nearest
+from kratos_lite.errors import InputError, naming, nearest
 from kratos_lite.io.abaqus.cards import Card, read_cards
 from kratos_lite.io.abaqus.loads import Acting, LoadCards
 from kratos_lite.io.abaqus.materials import Definition, orientation
@@ -92,7 +92,8 @@ class Deck:
         for card in cards:
             if card.keyword in OF_MESH:
                 getattr(self.cards, card.keyword.lower())(card)
-        mesh = self.mesh = self.cards.mesh(path.name)
+        with naming(str(path)):
+            mesh = self.mesh = self.cards.mesh(path.name)
         n = mesh.n_nodes
         self.materials = dict[str, Definition]()
         self.sections = list[tuple[str, str, str, Card]]()  # ELSET, MATERIAL, ORIENTATION
@@ -124,7 +125,8 @@ class Deck:
             if keyword not in CARDS:
                 known = (*CARDS, *OF_MESH, *NO_EFFECT, *OF_MATERIAL)
                 card.wrong(f"this card is not known.{nearest(keyword, known)}")
-            CARDS[keyword](self, card)
+            with naming(card.place):
+                CARDS[keyword](self, card)
         if self.open is not None:
             self.open.card.wrong("the step is not ended by *END STEP")
         if not self.steps:
