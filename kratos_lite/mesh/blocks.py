@@ -223,10 +223,16 @@ def mask_of(indices: Any, count: int) -> Mask:
     return mask
 
 
+SPARSE = 8
+"""Largest id over their number, from which on ids are sorted instead of listed in a table."""
+
+
 def distinct(values: Ints) -> Ints:
     """Return the different values in increasing order."""
     if not len(values) or (values == values[0]).all():
         return values[:1]
+    if (values[1:] > values[:-1]).all():
+        return values
     ordered: Ints = np.sort(values)
     different: Ints = ordered[np.append(True, ordered[1:] != ordered[:-1])]
     return different
@@ -252,6 +258,10 @@ def rows_of_ids(ids: Ints, wanted: ArrayLike, order: Ints | None = None) -> Ints
     wanted = np.asarray(wanted, dtype=np.int64)
     if not len(ids):
         return np.full(wanted.shape, -1, dtype=np.int64)
+    if order is None and 0 <= ids.min() and (top := int(ids.max())) < SPARSE * len(ids):
+        row_of = np.full(top + 2, -1)  # the last is that of ids that are not there
+        row_of[ids[::-1]] = np.arange(len(ids))[::-1]
+        return np.asarray(row_of[np.where((wanted < 0) | (wanted > top), top + 1, wanted)])
     order = np.argsort(ids, kind="stable") if order is None else order
     rows = order[np.minimum(np.searchsorted(ids, wanted, sorter=order), len(ids) - 1)]
     return np.where(ids[rows] == wanted, rows, -1)

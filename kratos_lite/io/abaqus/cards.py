@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,11 +13,14 @@ import numpy as np
 from kratos_lite.errors import InputError, nearest
 from kratos_lite.io.settings import inside
 from kratos_lite.io.text import read_bytes, real, shown
+from kratos_lite.native import kernels
 from kratos_lite.typing import Array, Ints
 
-_STARRED = re.compile(rb"^[ \t]*\*.*$", re.MULTILINE)
+_COMMENT = re.compile(rb"^[ \t]*\*\*.*$", re.MULTILINE)
+_BROKEN = re.compile(rb",[ \t]*\n")
+"""Where a row goes on in the next line."""
 _OPTION = re.compile(r'\s*([^=,"]+?)\s*(?:=\s*("[^"]*"|[^,]*?))?\s*(?:,|$)')
-_BLANKS = bytes.maketrans(b",dD", b" ee")
+_BLANKS, _LINES = bytes.maketrans(b",", b" "), bytes.maketrans(b", \t", b"\n\n\n")
 DEEPEST = 20
 """Files that are included in each other."""
 
@@ -99,21 +101,21 @@ class Card:
                 fields = line.decode("utf-8", "replace").strip().rstrip(",").split(",")
                 yield Row(f"{self.file}:{i}", tuple(field.strip() for field in fields))
 
+    def plain(self, kinds: str) -> tuple[Ints, Array, Ints] | None:
+        """Return integers (m, a), reals (m, b) and lines of plain rows, or None; `kinds` are i and r."""
+        text, alone = kernels("text"), len(kinds) == 1
+        data = self.data.translate(_LINES) if alone else _BROKEN.sub(b" ", self.data).translate(_BLANKS)
+        return text.rows(data, 0, len(data), kinds, self.line) if text else None
+
     def every(self) -> Array:
         """Return all numbers of the data in order, whatever the lines; InputError at the first wrong one."""
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", DeprecationWarning)
-            try:
-                values = np.fromstring(self.data.translate(_BLANKS), sep=" ")
-                if np.isfinite(values).all():
-                    return values
-            except (DeprecationWarning, ValueError):
-                pass
         found = [[row.number(i) for i in range(len(row.fields)) if row.fields[i]] for row in self.rows()]
         return np.array([value for row in found for value in row])
 
     def ids(self, width: int) -> Ints:
         """Return all numbers as rows of `width` ids."""
+        if plain := self.plain("i" * width):
+            return plain[0]
         values = self.every()
         if values.size % width:
             self.wrong(f"{values.size} numbers are no rows of {width}")
@@ -126,38 +128,55 @@ class Card:
 def read_cards(path: Path, *, depth: int = 0) -> Iterator[Card]:
     """Yield the cards of a deck and of the files that it includes."""
     data = read_bytes(path)
-    stars = [match for match in _STARRED.finditer(data)]
-    starts = [m for m in stars if not m.group().lstrip().startswith(b"**")]
-    head = data[: starts[0].start()] if starts else data
-    stray = [line for line in head.split(b"\n") if line.strip() and not line.lstrip().startswith(b"**")]
+    stars = list(_starred(data))
+    starts = [at for at in stars if not data.startswith(b"**", at)]
+    stray = [
+        line for line in data[: starts[0] if starts else None].split(b"\n") if _COMMENT.sub(b"", line).strip()
+    ]
     if stray or not starts:
         found = shown(stray[0]) if stray else "nothing"
         raise InputError(f"{path}: a deck begins with a card such as *NODE; got {found}")
-    line, at = 1, 0
-    has_comments = len(stars) > len(starts)
-    for match, after in zip(starts, [*(m.start() for m in starts[1:]), len(data)], strict=True):
-        line += data.count(b"\n", at, match.start())
-        at = match.start()
-        header, end = match.group().strip(), match.end()
+    has_comments, line, before = len(stars) > len(starts), 1, 0
+    for at, after in zip(starts, [*starts[1:], len(data)], strict=True):
+        line += data.count(b"\n", before, at)
+        before, end = at, _line_end(data, at)
+        header = data[at:end].strip()
         while header.endswith(b",") and end < after:  # the options go on in the next line
-            stop = data.find(b"\n", end + 1, after)
-            stop = after if stop < 0 else stop
+            stop = _line_end(data, end + 1)
             header, end = header + data[end + 1 : stop].strip(), stop
         body = data[end:after]
-        if has_comments and b"**" in body:
-            body = re.sub(rb"(?m)^[ \t]*\*\*.*$", b"", body)
+        body = _COMMENT.sub(b"", body) if has_comments and b"**" in body else body
         card = _card(header, body, str(path), line + data.count(b"\n", at, end))
         if card.keyword != "INCLUDE":
             yield card
         elif depth == DEEPEST:
             card.wrong("files include each other; remove one of the cards")
         else:
-            name = card.option("INPUT").strip('"')
-            try:
-                yield from read_cards(inside(path.parent, name), depth=depth + 1)
-            except ValueError as error:
-                card.wrong(str(error)) if not isinstance(error, InputError) else None
-                raise
+            yield from read_cards(_included(path, card), depth=depth + 1)
+
+
+def _starred(data: bytes) -> Iterator[int]:
+    """Yield where a star is the first in its line."""
+    at = data.find(b"*")
+    while at >= 0:
+        if not data[data.rfind(b"\n", 0, at) + 1 : at].strip():
+            yield at
+        at = data.find(b"\n", at)
+        at = data.find(b"*", at) if at >= 0 else at
+
+
+def _line_end(data: bytes, at: int) -> int:
+    end = data.find(b"\n", at)
+    return end if end >= 0 else len(data)
+
+
+def _included(path: Path, card: Card) -> Path:
+    try:
+        return inside(path.parent, card.option("INPUT"))
+    except InputError:
+        raise
+    except ValueError as error:
+        card.wrong(str(error))
 
 
 def _card(header: bytes, data: bytes, file: str, line: int) -> Card:

@@ -164,7 +164,7 @@ def with_faces(mesh: Mesh, every: Iterable[Face], name: str) -> tuple[Mesh, dict
         number |= {face: len(number) + i for i, (face, _) in enumerate(found)}
         nodes = np.array([n for _, n in found])
         conditions.append(Block(f"{name}3D{nodes.shape[1]}N", nodes, ids, shape=shape))
-    return mesh.replace(conditions=conditions), number
+    return mesh.replace(conditions=conditions) if conditions else mesh, number
 
 
 def loads_of(

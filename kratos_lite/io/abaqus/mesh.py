@@ -10,7 +10,7 @@ import numpy as np
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import InputError, MeshError, nearest
 from kratos_lite.io.abaqus.cards import Card, Row
-from kratos_lite.mesh import Block, Mesh, Part, distinct, rows_of_ids
+from kratos_lite.mesh import Block, Mesh, Part, distinct, ids_of, rows_of_ids
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array, Ints
 
@@ -65,20 +65,18 @@ class MeshCards:
     def node(self, card: Card) -> None:
         """Read *NODE."""
         card.check_options(("NSET",))
-        values = card.every()
-        lines = card.data.count(b"\n") + 1 - card.data.count(b"\n\n") - 2
-        if values.size % 4 or values.size // 4 < lines:
-            rows = [[float(row.integer(0)), *(row.number(i, 0.0) for i in (1, 2, 3))] for row in card.rows()]
+        if plain := card.plain("irrr"):
+            ids, points = plain[0].ravel(), plain[1]
+        else:
             for row in card.rows():
                 if len(row.fields) > 4:
                     row.wrong(f"a node has an id and three coordinates; got {len(row.fields)} values")
-            values = np.array(rows)
-        table = values.reshape(-1, 4)
-        ids = table[:, 0].astype(np.int64)
-        wrong = (ids != table[:, 0]) | (ids < 1)
-        if wrong.any():
-            card.wrong(f"ids of nodes are whole numbers from 1; got {table[wrong, 0][0]:g}")
-        self.node_cards.append((ids, table[:, 1:]))
+            rows = [[row.integer(0), *(row.number(i, 0.0) for i in (1, 2, 3))] for row in card.rows()]
+            ids = np.array([row[0] for row in rows], dtype=np.int64)
+            points = np.array([row[1:] for row in rows]).reshape(-1, 3)
+        if (ids < 1).any():
+            card.wrong(f"ids of nodes are whole numbers from 1; got {ids[ids < 1][0]}")
+        self.node_cards.append((ids, points))
         if "NSET" in card.options:
             self.node_sets.setdefault(card.option("NSET").upper(), []).append(ids)
 
@@ -181,36 +179,38 @@ class MeshCards:
                 raise InputError(f"{cells.place}: {text}")
             order = np.argsort(shape.to_vtk)
             blocks.append(Block(name, rows[:, order], cells.ids))
-        mesh = Mesh(points, blocks, node_ids=ids, source=source)
-        return mesh.replace(parts=self._parts(mesh))
+        return Mesh(points, blocks, node_ids=ids, source=source, parts=self._parts(ids, blocks, source))
 
-    def _parts(self, mesh: Mesh) -> dict[str, Part]:
+    def _parts(self, ids: Ints, blocks: list[Block], source: str) -> dict[str, Part]:
         """Return the sets as parts; one of nodes and one of elements of the same name are one part."""
-        parts, order = {}, np.argsort(mesh.element_ids, kind="stable")
+        parts, of_elements = {}, ids_of(blocks)
         for name in dict.fromkeys([*self.node_sets, *self.element_sets]):
             nodes = np.concatenate([np.zeros(0, dtype=np.int64), *self.node_sets.get(name, [])])
             cells = np.concatenate([np.zeros(0, dtype=np.int64), *self.element_sets.get(name, [])])
-            rows = mesh.node_rows(distinct(nodes))
+            rows = rows_of_ids(ids, distinct(nodes))
             if (rows < 0).any():
                 missing = distinct(nodes)[rows < 0][0]
-                raise MeshError(f"{mesh.source}: NSET {name} holds node {missing}, which is not there")
-            elements = rows_of_ids(mesh.element_ids, distinct(cells), order)
+                raise MeshError(f"{source}: NSET {name} holds node {missing}, which is not there")
+            elements = rows_of_ids(of_elements, distinct(cells))
             elements = elements[elements >= 0]  # springs and masses are no elements of the mesh
             if len(elements) and not len(rows):
-                rows = np.unique(np.concatenate([b.nodes[m].ravel() for b, m in _within(mesh, elements)]))
+                used = np.zeros(len(ids), dtype=bool)
+                for block, at in _within(blocks, elements):
+                    used[block.nodes[at]] = True
+                rows = np.flatnonzero(used)
             if len(rows) or len(elements):
                 parts[name] = Part(nodes=rows, elements=elements)
         return parts
 
 
-def _within(mesh: Mesh, elements: Ints) -> list[tuple[Block, Ints]]:
+def _within(blocks: list[Block], elements: Ints) -> list[tuple[Block, Ints]]:
     """Return the blocks of elements, each with the rows in it."""
-    ends = np.cumsum([0, *(len(block) for block in mesh.blocks)])
+    ends = np.cumsum([0, *map(len, blocks)])
     order = np.sort(elements)
     cuts = np.searchsorted(order, ends)
     return [
         (block, order[a:b] - start)
-        for block, (a, b), start in zip(mesh.blocks, pairwise(cuts), ends[:-1], strict=True)
+        for block, (a, b), start in zip(blocks, pairwise(cuts), ends[:-1], strict=True)
     ]
 
 
