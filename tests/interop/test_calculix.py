@@ -165,3 +165,24 @@ def test_materials_are_averaged_together_and_heated_bodies_have_temperatures(tmp
     assert sorted(mats[0]) == sorted(mats[1])
     table = dat.prints(result, np.sort(mesh.nodes("x-")), "NT", "FIXED")
     assert table == printed.splitlines()[: len(table)]
+
+
+def test_forces_in_time_are_internal_ones_without_inertia(tmp_path):
+    mesh = kl.box((2, 1, 1), (2, 1, 1), "KinematicLinear3D8N")  # straight, with the same masses
+    model, deck, load = model_and_deck(mesh)
+    steps = ["*STEP,INC=100", "*DYNAMIC,DIRECT,ALPHA=0.", "1.E-5,4.E-5", *load, "*NODE FILE", "U,V,RF", *END]
+    frd, _ = ccx(tmp_path, [*deck, *steps])
+    transient = model.transient(integrator=kl.Newmark())
+    with kl.SeriesWriter(tmp_path / "ours.frd", transient) as series:
+        for state in kl.integrate(transient, dt=1e-5, steps=4):
+            if state.step:
+                series.add(state)
+    ours = [
+        block for block in blocks((tmp_path / "ours.frd").read_text()) if block[1] in ("DISP", "VELO", "FORC")
+    ]
+    theirs = blocks(frd)
+    assert [(head, name) for head, name, *_ in ours] == [(head, name) for head, name, *_ in theirs]
+    for (_, name, *_, values), (*_, expected) in zip(ours, theirs, strict=True):
+        assert np.abs(values - expected).max() <= 1e-3 * np.abs(expected).max(), (
+            name
+        )  # it iterates until 5e-3

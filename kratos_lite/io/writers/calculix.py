@@ -11,6 +11,7 @@ from kratos_lite import voigt
 from kratos_lite.analysis.fields import GaussPoints, known
 from kratos_lite.analysis.result import Result
 from kratos_lite.assembly import nodal_values
+from kratos_lite.assembly.gauss_point_fields import internal_load
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.model.loads.temperature import Temperature
 from kratos_lite.quadrature import Rule
@@ -71,10 +72,15 @@ def at_gauss(result: Result, name: str) -> list[Array]:
 
 def averaged(result: Result, name: str) -> Array | None:
     """Return a field (n, c), extrapolated and averaged at nodes."""
-    values = at_gauss(result, name)
-    return (
-        nodal_values.averaged(result.groups, values, result.mesh.n_nodes, extrapolation) if values else None
-    )
+    values, how = at_gauss(result, name), (result.mesh.n_nodes, extrapolation)
+    return nodal_values.averaged(result.groups, values, *how) if values else None
+
+
+def forces(result: Result) -> Array:
+    """Return the internal forces (n, 3), which at rest are those of supports and loads."""
+    if not result.is_linear:
+        return result.reactions + result.loads
+    return internal_load(result.mesh.points, result.groups, result._strained)
 
 
 def temperatures(result: Result) -> Array | None:
@@ -105,13 +111,11 @@ AT_NODES: dict[str, Callable[[Result], Array | None]] = {
     "STRESS": partial(averaged, name="stress"),
     "TOSTRAIN": partial(averaged, name="strain"),
     "MESTRAIN": partial(averaged, name="mechanical_strain"),
-    "FORC": lambda result: result.reactions + result.loads,
+    "FORC": forces,
     "PE": partial(averaged, name="accumulated_plastic_strain"),
     "ENER": partial(averaged, name="strain_energy_density"),
     "ERROR": error,
 }
-
-
 ALL = tuple(name for name in AT_NODES if name != "MESTRAIN")
 
 

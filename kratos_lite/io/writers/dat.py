@@ -43,10 +43,8 @@ def prints(
     """Return the table of a variable of nodes or elements, of the set `where`; `totals` NO, YES or ONLY."""
     field, title, total = VARIABLES[choice(variable, "a printed variable", VARIABLES)]
     if field in AT_NODES:
-        tables = [
-            (result.mesh.node_ids[rows, None], values[rows].reshape(len(rows), -1))
-            for values in at_nodes(result, [field]).values()
-        ]
+        ids, found = result.mesh.node_ids[rows, None], at_nodes(result, [field]).values()
+        tables = [(ids, values[rows].reshape(len(rows), -1)) for values in found]
     else:
         tables = _of_elements(result, rows, field, bool(total))
     if not tables:
@@ -67,13 +65,12 @@ def _of_elements(result: Result, rows: Ints, field: str, whole: bool) -> list[tu
     tables = []
     for group, values in zip(result.groups, at_gauss(result, field), strict=False):
         chosen, places = np.isin(group.rows, rows), order(group.rule)
-        ids, there = result.mesh.element_ids[group.rows[chosen], None], values[chosen][:, places]
-        if whole:
-            tables.append((ids, there.sum(axis=1)))
-            continue
-        numbers = np.tile(np.arange(1, len(places) + 1), len(ids))[:, None]
+        ids, there = result.mesh.element_ids[group.rows[chosen]], values[chosen][:, places]
+        there = there.sum(axis=1, keepdims=True) if whole else there
         there = there[..., [0, 1, 2, 3, 5, 4]] if there.shape[-1] == 6 else there
-        tables.append((np.hstack([ids.repeat(len(places), 0), numbers]), there.reshape(len(numbers), -1)))
+        numbers = np.tile(np.arange(1, there.shape[1] + 1), len(ids))
+        named = np.column_stack([ids.repeat(there.shape[1]), numbers])[:, : 1 if whole else 2]
+        tables.append((named, there.reshape(len(numbers), there.shape[2])))
     return tables
 
 

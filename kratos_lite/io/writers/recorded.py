@@ -119,8 +119,11 @@ class RecordedModel:
         """Return the fields of the nodes by CalculiX's names, velocities among them where there are any."""
         from kratos_lite.io.writers.calculix import at_nodes  # rarely needed
 
-        velocity = {"VELO": state.v} if self.kind == "time" else {}
-        return {"DISP": state.u, **velocity, **at_nodes(self.transient.result(state))}
+        result = self.transient.result(state)
+        fields = {"DISP": state.u, **({"VELO": state.v} if self.kind == "time" else {}), **at_nodes(result)}
+        if self.kind == "time" and not result.is_linear:
+            del fields["FORC"]  # internal forces are those of supports and loads at rest alone
+        return fields
 
     def row(self, state: Any) -> Array:
         """Return time, energy, largest displacement and total reaction."""
