@@ -175,6 +175,19 @@ class ElementFields:
         """
         return at_gauss(self.mesh.points, group, self._strained)
 
+    def gauss_points(self, group: ElementGroup) -> GaussPoints:
+        """Return what is known at the Gauss points of elements.
+
+        Parameters
+        ----------
+        group : some of the elements of the result.
+
+        Returns
+        -------
+        GaussPoints
+        """
+        return GaussPoints(self.mesh.points, group, self.u, self._strained)
+
     def stress_of_material(self, row: int) -> Array:
         """Return recovered stresses at the nodes of one material, which those of its neighbors do not change.
 
@@ -251,7 +264,7 @@ class ElementFields:
         place = choice(at, f"the place of the field {name}", field.where)
         if "gauss" not in field.where or (place == "node" and not field.sampled):
             return self.u if name == "displacement" else field.at(self)
-        placed = [GaussPoints(self.mesh.points, group, self.u, self._strained) for group in self.groups]
+        placed = [self.gauss_points(group) for group in self.groups]
         values = [field.at(points) for points in placed]
         if place in ("raw", "averaged", "node"):
             return self._extrapolated(values, place)
@@ -288,7 +301,7 @@ class ElementFields:
 
         def values(group: ElementGroup) -> Array:
             nonlocal tail
-            value = field.at(GaussPoints(self.mesh.points, group, self.u, self._strained))
+            value = field.at(self.gauss_points(group))
             tail = value.shape[2:]
             return value.reshape(*value.shape[:2], -1)
 
@@ -415,7 +428,7 @@ class ElementFields:
         known_here = QUANTITIES | {f.kratos: f.at for f in known(self.groups).values() if f.sampled}
         quantity = known_here[choice(name, "a quantity at integration points", known_here)]
         groups = self.groups if element is None else [group_of_element(self.mesh, self.groups, element)]
-        made = [quantity(GaussPoints(self.mesh.points, g, self.u, self._strained)) for g in groups]
+        made = [quantity(self.gauss_points(g)) for g in groups]
         return in_order(groups, made) if element is None else made[0][0]
 
     # ---- totals --------------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from typing import TypeAlias
 
 import numpy as np
 
@@ -16,6 +17,9 @@ from kratos_lite.registry import remembered
 from kratos_lite.shapes.base import at_points
 from kratos_lite.shapes.inverse import cofactors, determinant
 from kratos_lite.typing import Array, Ints
+
+Extrapolation: TypeAlias = Callable[[type[KinematicLinear], Rule], Array]
+"""A matrix (n, g) from values at the Gauss points of an element to those at its nodes."""
 
 
 @remembered
@@ -70,17 +74,19 @@ def _averages(points: Array, group: ElementGroup, u: Array, stress: bool) -> tup
     return total, means
 
 
-def averaged(groups: Sequence[ElementGroup], values: Sequence[Array], n: int) -> Array:
+def averaged(
+    groups: Sequence[ElementGroup], values: Sequence[Array], n: int, rule: Extrapolation = extrapolation
+) -> Array:
     """Return values (m, g, c) at Gauss points, extrapolated to nodes and averaged there, (n, c)."""
-    total = sum(_sums(group, value, n) for group, value in zip(groups, values, strict=True))
+    total = sum(_sums(group, value, n, rule) for group, value in zip(groups, values, strict=True))
     count = np.bincount(np.concatenate([group.nodes.ravel() for group in groups]), minlength=n)
     return np.asarray(total / np.maximum(count[:, None], 1))
 
 
-def _sums(group: ElementGroup, value: Array, n: int) -> Array:
+def _sums(group: ElementGroup, value: Array, n: int, rule: Extrapolation = extrapolation) -> Array:
     """Return the sums at nodes (n, c) of values (m, g, c) extrapolated to the nodes of each element."""
     total = np.zeros((n, value.shape[-1]))
-    add_nodal(total, group.nodes, extrapolation(group.element, group.rule) @ value)
+    add_nodal(total, group.nodes, rule(group.element, group.rule) @ value)
     return total
 
 

@@ -18,10 +18,10 @@ FORMULATION = (
 INTEGRATOR = (
     "newmark[:BETA,GAMMA], hht[:ALPHA], bossak[:ALPHA], generalized_alpha[:RHO] or central_difference"
 )
-MODES = "find the N lowest natural frequencies instead; modes go to -o OUT.pvd or OUT.html, and --picture"
+MODES = "find the N lowest natural frequencies instead; modes go to -o OUT.pvd, .html or .frd, and --picture"
 OUTPUT = (
     "static: .vtu (ParaView), .html (browser), .vtk, .json, .csv (nodes), .pvtu (many processes); in time: "
-    ".pvd, .html, .csv, .npz; of modes: .pvd, .html; may be given several times"
+    ".pvd, .html, .csv, .npz; of modes: .pvd, .html; of all: .frd (CalculiX); may be given several times"
 )
 PICTURE = "picture of the deformed model, of its modes, or of a body along its path; .gif, .mp4: film"
 RESTART = "go on from a state that --state wrote; files hold the rest alone, so give them new names"

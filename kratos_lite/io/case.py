@@ -112,8 +112,8 @@ class Outputs:
 
     Attributes
     ----------
-    results : results by their endings: at rest .vtu, .vtk, .json, .html or .csv, over many processes .pvtu
-        (which .vtu becomes) or .json; in time .pvd, .html, .csv or .npz.
+    results : results by their endings: at rest .vtu, .vtk, .json, .html, .csv or .frd, over many processes
+        .pvtu (which .vtu becomes) or .json; in time .pvd, .html, .csv, .npz or .frd.
     json : summary, displacements and reactions of a model at its end.
     picture : of the end of a model, or of the path of a body; a film with the ending .gif or .mp4.
     state : the last state, from which another run goes on.

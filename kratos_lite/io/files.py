@@ -130,10 +130,10 @@ def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
 
     Parameters
     ----------
-    path : a result goes to .vtu, .vtk, .json, .html, a page for the browser, or, values of nodes alone, .csv;
-        to .pvtu and .vtu pieces of a result of many processes; values at points and sections to .csv; a
-        state to .npz, from which `read_state` reads; a model or a mesh to .mdpa, an .elem set, .vtu or a
-        format of meshio.
+    path : a result goes to .vtu, .vtk, .json, .html, a page for the browser, .frd of CalculiX or, values of
+        nodes alone, .csv; to .pvtu and .vtu pieces of a result of many processes; values at points and
+        sections to .csv; a state to .npz, from which `read_state` reads; a model or a mesh to .mdpa, an .elem
+        set, .vtu or a format of meshio.
     thing : a `Result`, what its `at`, `along` or `section` returns, a `State`, `Model` or `Mesh`.
     mode : of the .vtu file of a result: ``binary`` (if not given), ``compressed`` or ``ascii``.
 

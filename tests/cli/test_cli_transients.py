@@ -312,7 +312,7 @@ def test_shapes_of_buckling_are_told_and_written_as_modes_are(run, folder):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("-o", "a.vtu"), "a.vtu: modes are written as .pvd (for ParaView) or .html"),
+        (("-o", "a.vtu"), "a.vtu: modes are written as .pvd (for ParaView), .html or .frd"),
         (("--json", "a.json"), "--json does not hold modes; -o OUT.pvd or OUT.html does"),
         (("--vtu", "ascii"), "--vtu ascii: there is no output to write so; add -o OUT.pvd"),
         (("--picture", "a.xyz"), "a.xyz: pictures cannot be written as .xyz"),

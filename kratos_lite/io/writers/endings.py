@@ -6,12 +6,12 @@ from pathlib import Path
 
 from kratos_lite.errors import InputError
 
-RESULTS = (".vtu", ".vtk", ".json", ".html", ".csv", ".pvtu")
+RESULTS = (".vtu", ".vtk", ".json", ".html", ".csv", ".pvtu", ".frd")
 """Formats that keep fields on nodes; most others of meshio drop them unsaid."""
-SERIES = (".pvd", ".html", ".csv", ".npz")
-"""Formats of states in time: for ParaView, a page for the browser, a table, arrays."""
-MODES = (".pvd", ".html")
-"""Formats of modes: for ParaView, a page for the browser that lets them swing."""
+SERIES = (".pvd", ".html", ".csv", ".npz", ".frd")
+"""Formats of states in time: for ParaView, a page for the browser, a table, arrays, CalculiX's."""
+MODES = (".pvd", ".html", ".frd")
+"""Formats of modes: for ParaView, a page for the browser that lets them swing, CalculiX's."""
 
 
 def check_result(path: str | Path, mode: str | None = None) -> None:
@@ -32,12 +32,12 @@ def check_result(path: str | Path, mode: str | None = None) -> None:
 
 def check_series(path: str | Path) -> None:
     """Raise InputError for a format that cannot hold states in time."""
-    _check(path, SERIES, "states in time are written as .pvd (for ParaView), .html, .csv or .npz")
+    _check(path, SERIES, "states in time are written as .pvd (for ParaView), .html, .csv, .npz or .frd")
 
 
 def check_modes(path: str | Path) -> None:
     """Raise InputError for a format that cannot hold modes."""
-    _check(path, MODES, "modes are written as .pvd (for ParaView) or .html")
+    _check(path, MODES, "modes are written as .pvd (for ParaView), .html or .frd")
 
 
 def check_ending(path: str | Path, wanted: str) -> None:

@@ -28,16 +28,17 @@ def write_modes(
     mode: str = "binary",
     buckling: bool = False,
 ) -> None:
-    """Write modes as a page for the browser, which lets them swing, or as a series for ParaView.
+    """Write modes as a page for the browser, which lets them swing, as a series for ParaView or as .frd.
 
     Parameters
     ----------
     path : the file, .html; or .pvd, an index, and beside it ``NAME_00001.vtu`` … of each mode with
-        DISPLACEMENT, of a complex mode also DISPLACEMENT_IMAGINARY.
+        DISPLACEMENT, of a complex mode also DISPLACEMENT_IMAGINARY; or .frd of CalculiX.
     mesh : of n nodes.
     values : (k,) frequencies ω in rad/s as of ``model.modes``, or complex λ in 1/s as of
         ``model.complex_modes``.
-    shapes : (k, n, 3) of any size, real or complex; each is shown with the largest displacement 1.
+    shapes : (k, n, 3) of any size, real or complex; each is shown with the largest displacement 1, but
+        for .frd, which has them as they are.
     mode : of ``.vtu`` files: ``binary``, ``compressed`` or ``ascii``.
     buckling : whether the values are factors as of ``model.buckling``.
 
@@ -65,6 +66,11 @@ def write_modes(
         raise InputError(f"{path}: not written: there are no modes")
     if path.suffix.lower() == ".pvd":
         _write_frames(path, mesh, forms, mode)
+        return
+    if path.suffix.lower() == ".frd":
+        from kratos_lite.io.writers.frd import steps_of_modes, write_frd  # rarely needed
+
+        write_frd(path, mesh, steps_of_modes(numbers, forms, buckling))
         return
     from kratos_lite.io.writers.page.write import write_modes_page  # rarely needed
 

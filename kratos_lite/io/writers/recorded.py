@@ -35,7 +35,7 @@ class RecordedBody:
     """A body, or many as arrays only."""
 
     columns: tuple[str, ...] = OF_BODIES
-    units = "SI"
+    units, kind = "SI", "time"
     names: tuple[str, ...] = ("time", "step", "q", "u", "external_work")
 
     def __init__(self, body: Body, path: str | Path) -> None:
@@ -64,6 +64,10 @@ class RecordedBody:
             values = {"displacement": moved, "velocity": self.body.velocity(X)}
             return {FIELDS[name].kratos: value for name, value in values.items()}, {}
 
+    def at_nodes(self, state: State) -> dict[str, Array]:
+        """Return displacements and velocities of the nodes by CalculiX's names."""
+        return dict(zip(("DISP", "VELO"), self.fields(state)[0].values(), strict=True))
+
     def row(self, state: State) -> Array:
         """Return time, energies, work, mass center and momenta."""
         body = self.body
@@ -85,6 +89,7 @@ class RecordedModel:
     """A transient of a model."""
 
     columns: tuple[str, ...] = OF_MODELS
+    kind = "time"
     names: tuple[str, ...] = ("time", "step", "u", "v", "a", "reactions")
 
     def __init__(self, transient: Any) -> None:
@@ -110,6 +115,16 @@ class RecordedModel:
         points, cells = fields(self.transient.result(state))
         return points | {field.kratos: field.at(state) for field in listed("state").values()}, cells
 
+    def at_nodes(self, state: Any) -> dict[str, Array]:
+        """Return the fields of the nodes by CalculiX's names, velocities among them where there are any."""
+        from kratos_lite.io.writers.calculix import at_nodes  # rarely needed
+
+        result = self.transient.result(state)
+        fields = {"DISP": state.u, **({"VELO": state.v} if self.kind == "time" else {}), **at_nodes(result)}
+        if self.kind == "time" and not result.is_linear:
+            del fields["FORC"]  # internal forces are those of supports and loads at rest alone
+        return fields
+
     def row(self, state: Any) -> Array:
         """Return time, energy, largest displacement and total reaction."""
         largest = np.linalg.norm(state.u, axis=1).max()
@@ -125,6 +140,7 @@ class RecordedSteps(RecordedModel):
     """Quasi-static steps of a model."""
 
     columns: tuple[str, ...] = ("time [s]", "work [J]", *OF_MODELS[2:])
+    kind = "static"
     names: tuple[str, ...] = ("time", "step", "u", "reactions", "work")
 
     def mesh(self) -> Mesh:

@@ -1,4 +1,4 @@
-"""Results to files: `.vtu`, `.pvtu` for ParaView, `.vtk`, `.json`, `.html` for browsers, `.csv` of nodes."""
+"""Results to files: `.vtu`, `.pvtu` for ParaView, `.vtk`, `.json`, `.html`, `.csv` of nodes, `.frd`."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def write_result(path: str | Path, result: Result, mode: str | None = None) -> None:
-    """Write a result by the ending of `path`: .vtu or .pvtu (in a mode), .vtk, .json, .html or .csv."""
+    """Write a result by the ending of `path`: .vtu or .pvtu (in a mode), .vtk, .json, .html, .csv, .frd."""
     ending = Path(path).suffix.lower()
     check_result(path, mode)
     if ending == ".json":
@@ -33,6 +33,11 @@ def write_result(path: str | Path, result: Result, mode: str | None = None) -> N
         from kratos_lite.io.writers.page.write import write_result_page  # rarely needed
 
         write_result_page(path, result)
+    elif ending == ".frd":
+        from kratos_lite.io.writers.calculix import at_nodes  # rarely needed
+        from kratos_lite.io.writers.frd import FrdStep, write_frd
+
+        write_frd(path, result.mesh, [FrdStep(at_nodes(result))])
     elif ending == ".pvtu":
         from kratos_lite.io.writers.pieces import write_pieces  # rarely needed
 

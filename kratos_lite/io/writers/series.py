@@ -1,4 +1,4 @@
-"""Series of states in time: frames for ParaView, tables and arrays."""
+"""Series of states in time: frames for ParaView, tables, arrays and increments of CalculiX."""
 
 from __future__ import annotations
 
@@ -94,7 +94,21 @@ class Page(Arrays):
         write_states_page(self.path, self.subject, self.states)
 
 
-KINDS: dict[str, type[Arrays]] = {".pvd": Frames, ".html": Page, ".csv": Table, ".npz": Arrays}
+class Increments(Page):
+    """A file of CalculiX."""
+
+    def write(self) -> None:
+        """Write the file."""
+        from kratos_lite.io.writers.frd import FrdStep, write_frd  # rarely needed
+
+        kind, states = self.subject.kind, enumerate(self.states, 1)
+        steps = (FrdStep(self.subject.at_nodes(s), s.time, kind, increment=i) for i, s in states)
+        write_frd(self.path, self.subject.mesh(), steps)
+
+
+KINDS: dict[str, type[Arrays]] = {
+    ".pvd": Frames, ".html": Page, ".csv": Table, ".npz": Arrays, ".frd": Increments
+}  # fmt: skip
 
 
 class SeriesWriter:
@@ -110,6 +124,7 @@ class SeriesWriter:
     - ``.npz``: arrays with a row for each state: ``time``, ``step``, and ``q``, ``u``, ``external_work`` of a
       body, or ``u``, ``v``, ``a``, ``reactions`` of a transient, or ``u``,
       ``reactions``, ``work`` of quasi-static steps.
+    - ``.frd``: for programs that read files of CalculiX, an increment for each state.
 
     The folder is made if it is missing.  Every file is written as a whole or not at all.  Index, page, table
     and arrays come at the end, also when the loop ends early or by an error: then they hold the states up to

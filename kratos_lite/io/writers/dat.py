@@ -1,0 +1,154 @@
+"""Tables as CalculiX 2.20 prints them to `.dat` files: lists of lines, none of what a result has not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import pi
+from typing import Any
+
+import numpy as np
+
+from kratos_lite.analysis.result import Result
+from kratos_lite.elements.surface import area_vectors
+from kratos_lite.io.writers.calculix import AT_NODES, at_gauss, at_nodes, order
+from kratos_lite.mesh import Block
+from kratos_lite.quadrature import rule_for
+from kratos_lite.shapes.base import at_points
+from kratos_lite.typing import Array, Ints
+from kratos_lite.validation import choice
+from kratos_lite.voigt import tensor
+
+TENSOR = "(elem, integ.pnt.,{0}xx,{0}yy,{0}zz,{0}xy,{0}xz,{0}yz) "
+VARIABLES = {
+    "U": ("DISP", "displacements (vx,vy,vz) ", ""),
+    "RF": ("FORC", "forces (fx,fy,fz) ", "total force (fx,fy,fz) "),
+    "NT": ("NDTEMP", "temperatures ", ""),
+    "S": ("stress", "stresses " + TENSOR.format("s"), ""),
+    "E": ("strain", "strains " + TENSOR.format("e"), ""),
+    "ME": ("mechanical_strain", "mechanical strains " + TENSOR.format("e"), ""),
+    "PEEQ": ("accumulated_plastic_strain", "equivalent plastic strain (elem, integ.pnt.,pe)", ""),
+    "ENER": ("strain_energy_density", "internal energy density (elem, integ.pnt.,energy) ", ""),
+    "COORD": ("place", "global coordinates (elem, integ.pnt.,x,y,z) ", ""),
+    "EVOL": ("volume", "volume (element, volume) ", "total volume "),
+    "ELSE": ("energy", "internal energy (element, energy) ", "total internal energy "),
+}
+"""Variables of *NODE PRINT and *EL PRINT: the field, and titles of its values and their total."""
+PARTS = [f"{axis}-{what}     " for what in ("COMPONENT", "ROTATION ") for axis in "XYZ"]
+HEAD = ["MODE NO.   " + "".join(PARTS).rstrip()]
+
+
+def prints(
+    result: Result, rows: Ints, variable: str, where: str, time: float = 1.0, totals: str = "NO"
+) -> list[str]:
+    """Return the table of a variable of nodes or elements, of the set `where`; `totals` NO, YES or ONLY."""
+    field, title, total = VARIABLES[choice(variable, "a printed variable", VARIABLES)]
+    if field in AT_NODES:
+        ids, found = result.mesh.node_ids[rows, None], at_nodes(result, [field]).values()
+        tables = [(ids, values[rows].reshape(len(rows), -1)) for values in found]
+    else:
+        tables = _of_elements(result, rows, field, bool(total))
+    if not tables:
+        return []
+    ids, table = map(np.vstack, zip(*tables, strict=True))
+    of, lines = f"for set {where} and time{_fortran(time):>15}", list[str]()
+    if totals != "ONLY" or not total:
+        form = "%10d" + "%4d" * (ids.shape[1] - 1) + "%14.6E" * table.shape[1]
+        ordered = np.hstack([ids, table])[np.lexsort(ids.T[::-1])]
+        lines += ["", f" {title}{of}", "", *(form % tuple(row) for row in ordered.tolist())]
+    if totals != "NO" and total:
+        lines += ["", f" {total}{of}", "", "      " + "".join(f"{sum_:14.6E}" for sum_ in table.sum(axis=0))]
+    return lines
+
+
+def _of_elements(result: Result, rows: Ints, field: str, whole: bool) -> list[tuple[Ints, Array]]:
+    """Return ids and values of elements of each group; or also numbers of Gauss points, and values there."""
+    tables = []
+    for group, values in zip(result.groups, at_gauss(result, field), strict=False):
+        chosen, places = np.isin(group.rows, rows), order(group.rule)
+        ids, there = result.mesh.element_ids[group.rows[chosen]], values[chosen][:, places]
+        there = there.sum(axis=1, keepdims=True) if whole else there
+        there = there[..., [0, 1, 2, 3, 5, 4]] if there.shape[-1] == 6 else there
+        numbers = np.tile(np.arange(1, there.shape[1] + 1), len(ids))
+        named = np.column_stack([ids.repeat(there.shape[1]), numbers])[:, : 1 if whole else 2]
+        tables.append((named, there.reshape(len(numbers), there.shape[2])))
+    return tables
+
+
+def section_print(result: Result, faces: Sequence[Block], where: str, time: float = 1.0) -> list[str]:
+    """Return *SECTION PRINT of faces, outward: force, moment and area of the stress that nodes show."""
+    stress, X, parts = at_nodes(result, ["STRESS"])["STRESS"], result.mesh.points, np.zeros(13)
+    full = any(len(group.rule) == 27 for group in result.groups)
+    degrees = {3: 1, 4: 3, 6: 2, 8: 5 if full else 3}
+    for block in faces:
+        shape, nodes = block.known_shape, block.nodes
+        rule = rule_for(shape.cell, degrees[nodes.shape[1]])
+        N, n = at_points(shape.N, rule.points), area_vectors(shape, X[nodes], rule)
+        force, place = np.einsum("fgij,fgj->fgi", tensor(N @ stress[nodes]), n), N @ X[nodes]
+        area = np.linalg.norm(n, axis=-1, keepdims=True)
+        parts += np.concatenate([force, np.cross(place, force), place * area, n, area], -1).sum(axis=(0, 1))
+    F, M, center, normal, area = np.split(parts, [3, 6, 9, 12])
+    center, normal = center / area, normal / area
+    moment = M - np.cross(center, F)
+    tension, torque = F @ normal, moment @ normal
+    shear, bending = np.linalg.norm([F - tension * normal, moment - torque * normal], axis=1)
+    tables: dict[str, Any] = {
+        "total surface force (fx,fy,fz) and moment about the origin(mx,my,mz)": [*F, *M],
+        "center of gravity and mean normal": [*center, *normal],
+        "moment about the center of gravity(mx,my,mz)": moment,
+        "area, normal force (+ = tension), shear force (size), torque and bending moment (size)": [
+            *area, tension, shear, torque, bending,
+        ],
+    }  # fmt: skip
+    lines = ["", "", "", f" statistics for surface set {where} and time{_fortran(time):>15}"]
+    for title, values in tables.items():
+        lines += ["", f"   {title}", "", "  " + "".join(f"{value:14.6E}" for value in values)]
+    return lines
+
+
+def frequencies(omega: Array, shapes: Array, M: Any, points: Array, free: Ints) -> list[str]:
+    """Return the tables of modes: ω (k,) in rad/s, shapes (k, n, 3), M (3n, 3n), free degrees of freedom."""
+    flat, axes, rigid = shapes.reshape(len(shapes), -1), np.eye(3)[:, None, :], np.zeros((6, points.size))
+    motions = np.vstack([np.broadcast_to(axes, (3, *points.shape)), np.cross(axes, points)])
+    rigid[:, free] = motions.reshape(6, -1)[:, free]
+    masses = np.einsum("ki,ik->k", flat, M @ flat.T)
+    factors = flat @ (M @ rigid.T) / np.sqrt(masses)[:, None]
+    effective, total = factors**2, np.einsum("ki,ik->k", rigid, M @ rigid.T)
+    head = [
+        " MODE NO    EIGENVALUE                       FREQUENCY   ",
+        f"{'REAL PART':>46}{'IMAGINARY PART':>26}",
+        f"{'(RAD/TIME)      (CYCLES/TIME     (RAD/TIME)':>70}",
+    ]
+    values = np.column_stack([omega**2, omega, omega / (2 * pi), 0 * omega])
+    return [
+        *_titled("E I G E N V A L U E   O U T P U T", head, values),
+        *_titled("P A R T I C I P A T I O N   F A C T O R S", HEAD, factors),
+        *_titled(
+            "E F F E C T I V E   M O D A L   M A S S", HEAD, [*effective, effective.sum(axis=0)], "TOTAL"
+        ),
+        *_titled("T O T A L   E F F E C T I V E   M A S S", HEAD, [total], ""),
+    ]
+
+
+def buckling(factors: Array) -> list[str]:
+    """Return the table of factors of buckling (k,)."""
+    head = [" MODE NO       BUCKLING", f"{'FACTOR':>22}"]
+    return _titled("B U C K L I N G   F A C T O R   O U T P U T", head, factors[:, None])
+
+
+def _titled(title: str, head: list[str], table: Any, last: str | None = None) -> list[str]:
+    """Return a table with numbered rows, or another name of the last one."""
+    names = [f"{i:7d}" for i in range(1, len(table) + 1)]
+    names[-1] = names[-1] if last is None else f"{last:7}"
+    rows = [name + "".join(f"{_fortran(v):>16}" for v in row) for name, row in zip(names, table, strict=True)]
+    return ["", f"     {title}", "", *head, "", *rows]
+
+
+def _fortran(value: float) -> str:
+    """Return a number as E14.7 of Fortran.
+
+    >>> _fortran(-12.5)
+    '-0.1250000E+02'
+    """
+    digits, power = f"{abs(value):.6E}".split("E")
+    exponent = int(power) + 1 if value else 0
+    return f"{'-' if value < 0 else ''}0.{digits.replace('.', '')}E{exponent:+03d}"
