@@ -50,6 +50,8 @@ class Anisotropic3D(LinearMaterial):
     density: float = 0.0
     alpha: ArrayLike = (0.0,) * 6
 
+    aliases: ClassVar[tuple[str, ...]] = ("UserProvidedLinearElastic3DLaw",)
+    variables: ClassVar[dict[str, str]] = {"stiffness": "ELASTICITY_TENSOR", "density": "DENSITY"}
     tables: ClassVar[Mapping[str, Axes]] = {"stiffness": (6, 6), "alpha": (6,)}
 
     @property

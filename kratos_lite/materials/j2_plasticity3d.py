@@ -64,10 +64,10 @@ class J2Plasticity3D(VonMises):
     >>> print(f"{stress[3] / 1e6:.2f} MPa")  # σ_Y / √3
     144.34 MPa
 
-    With a measured curve, of which stress strains it beyond the yield stress by 2 %:
+    With a measured curve, in which a plastic strain of 2 % belongs to 310 MPa:
 
     >>> steel = kl.J2Plasticity3D(200e9, 0.3, 250e6, curve=[(0.01, 300e6), (0.05, 340e6)])
-    >>> path = kl.material_point(steel, {"xx": [0.0, 0.0 + 310e6 / 200e9 + 0.02]})
+    >>> path = kl.material_point(steel, {"xx": [0.0, 310e6 / 200e9 + 0.02]})
     >>> print(f"{path.stress[-1, 0] / 1e6:.1f} MPa")
     310.0 MPa
     """

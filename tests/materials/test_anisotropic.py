@@ -53,10 +53,10 @@ def test_it_is_known_by_its_constants():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: kl.Anisotropic3D(np.eye(3)), r"stiffness must have shape \(6, 6\); got \(3, 3\)"),
-        (lambda: kl.Anisotropic3D("C"), "stiffness must be made of real numbers; got 'C'"),
+        (lambda: kl.Anisotropic3D(np.eye(3)), r"stiffness .* must have shape \(6, 6\); got \(3, 3\)"),
+        (lambda: kl.Anisotropic3D("C"), r"stiffness .* must be made of real numbers; got 'C'"),
         (lambda: kl.Anisotropic3D([]), "C must be"),
-        (lambda: kl.Anisotropic3D(np.full((6, 6), np.nan)), "stiffness must be finite"),
+        (lambda: kl.Anisotropic3D(np.full((6, 6), np.nan)), r"stiffness .* must be finite"),
         (lambda: kl.Anisotropic3D(np.triu(np.ones((6, 6)))), "C is not symmetric"),
         (lambda: kl.Anisotropic3D(-np.eye(6)), "C must be positive definite"),
         (lambda: kl.Anisotropic3D(np.eye(6), alpha=1e-5), r"alpha must have shape \(6,\); got \(\)"),
