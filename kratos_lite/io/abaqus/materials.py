@@ -174,7 +174,9 @@ def _bulk(D: list[float], shear: float) -> list[float]:
 
 def orientation(card: Card) -> LocalAxes:
     """Return the axes of *ORIENTATION."""
-    card.check_options(("NAME", "SYSTEM"))
+    card.check_options(("NAME", "SYSTEM", "DEFINITION"))
+    if card.option("DEFINITION", "COORDINATES").upper() != "COORDINATES":
+        card.wrong("the axes are given by DEFINITION=COORDINATES alone")
     rows = list(card.rows())
     if len(rows) != 1:
         card.wrong("two points on one line give the axes; further rotations are not supported")

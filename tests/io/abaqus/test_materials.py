@@ -145,6 +145,7 @@ WRONG = {  # what follows *MATERIAL, and the message, which begins with the line
     "*HYPERELASTIC, OGDEN\n1.,0.,1.\n": "the exponents alpha of OGDEN are not 0",
     "*HYPERELASTIC, NEO HOOKE\n1.,.1\n*EXPANSION\n1.\n": "rubber that temperatures strain is not supported",
     f"{ORTHO}*ORIENTATION, NAME=R, SYSTEM=CYLINDRICAL\n0.,0.,0.,0.,0.,1.\n": "must be SYSTEM=RECTANGULAR",
+    f"{ORTHO}*ORIENTATION, NAME=R, DEFINITION=NODES\n1,2,3\n": "DEFINITION=COORDINATES alone",
     f"{ORTHO}*ORIENTATION, NAME=R\n0.,1.,0.,0.,0.,1.\n3,30.\n": "further rotations are not supported",
 }
 
