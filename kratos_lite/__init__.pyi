@@ -101,6 +101,7 @@ from kratos_lite.io.writers.state import read_state as read_state
 from kratos_lite.materials import MATERIALS as MATERIALS
 from kratos_lite.materials import LinearMaterial as LinearMaterial
 from kratos_lite.materials import Material as Material
+from kratos_lite.materials.anisotropic3d import Anisotropic3D as Anisotropic3D
 from kratos_lite.materials.cone_softening3d import ConeSoftening3D as ConeSoftening3D
 from kratos_lite.materials.drucker_prager3d import DruckerPrager3D as DruckerPrager3D
 from kratos_lite.materials.generalized_maxwell3d import GeneralizedMaxwell3D as GeneralizedMaxwell3D

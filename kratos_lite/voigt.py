@@ -39,6 +39,11 @@ def vector(stress: ArrayLike) -> Array:
     return t[..., i, j]
 
 
+def turned_strain(strain: ArrayLike, R: Array) -> Array:
+    """Return the components (..., 6) of strains along the rows of R (3, 3), unit vectors."""
+    return vector(R @ tensor(strain * HALF_SHEAR) @ R.T) * SHEAR_TWICE
+
+
 def times(a: Array, C: Array) -> Array:
     """Return C a of vectors (..., 6) as one product of two matrices, which is faster than many."""
     return np.asarray((a.reshape(-1, 6) @ C.T).reshape(a.shape))

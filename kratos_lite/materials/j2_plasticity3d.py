@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -12,7 +13,8 @@ from kratos_lite import voigt
 from kratos_lite.errors import MaterialError
 from kratos_lite.materials.isotropic_law import ELASTIC, VonMises
 from kratos_lite.materials.material import GaussState, Response
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, ArrayLike
+from kratos_lite.validation import Axes
 
 CONVERGED = 1e-13
 """Fraction of the yield stress that the return may miss."""
@@ -26,7 +28,8 @@ class J2Plasticity3D(VonMises):
     The yield stress grows with the accumulated plastic strain p, and its center, the back stress, with the
     plastic strain:
 
-        σ_Y(p) = yield_stress + hardening p + (saturation_stress - yield_stress) (1 - exp(-exponent p)),
+        σ_Y(p) = yield_stress + c(p) + hardening p
+                 + (saturation_stress - yield_stress) (1 - exp(-exponent p)),
         dα = ⅔ kinematic dε_p.
 
     Parameters
@@ -39,6 +42,8 @@ class J2Plasticity3D(VonMises):
     exponent : rate of that growth, ≥ 0.
     density : kg/m³.
     alpha : thermal expansion in 1/K; see `Temperature`.
+    curve : measured rows of p > 0 and yield_stress + c(p) in Pa, which never fall; c is linear between them,
+        from 0 at p = 0, and constant after the last.
 
     Raises
     ------
@@ -58,6 +63,13 @@ class J2Plasticity3D(VonMises):
     >>> stress, _, state = steel.evaluate(shear, steel.initial_state(), 1.0)
     >>> print(f"{stress[3] / 1e6:.2f} MPa")  # σ_Y / √3
     144.34 MPa
+
+    With a measured curve, in which a plastic strain of 2 % belongs to 310 MPa:
+
+    >>> steel = kl.J2Plasticity3D(200e9, 0.3, 250e6, curve=[(0.01, 300e6), (0.05, 340e6)])
+    >>> path = kl.material_point(steel, {"xx": [0.0, 310e6 / 200e9 + 0.02]})
+    >>> print(f"{path.stress[-1, 0] / 1e6:.1f} MPa")
+    310.0 MPa
     """
 
     E: float
@@ -69,6 +81,7 @@ class J2Plasticity3D(VonMises):
     exponent: float = 0.0
     density: float = 0.0
     alpha: float = 0.0
+    curve: ArrayLike = ()
 
     positive: ClassVar[Mapping[str, str]] = {"yield_stress": "Pa"}
     not_negative: ClassVar[Mapping[str, str]] = {
@@ -76,6 +89,7 @@ class J2Plasticity3D(VonMises):
         "kinematic": "Pa",
         "exponent": "",
     }
+    tables: ClassVar[Mapping[str, Axes]] = {"curve": ("rows", 2)}
     aliases: ClassVar[tuple[str, ...]] = (
         "SmallStrainJ2Plasticity3DLaw",
         "SmallStrainJ2Plasticity3D",
@@ -94,20 +108,38 @@ class J2Plasticity3D(VonMises):
     }
 
     def check(self) -> None:
-        """Check that the yield stress does not fall to its saturation."""
+        """Check that the yield stress does not fall."""
         super().check()
+        p, stress, _ = self._curve
+        if not ((np.diff(p) > 0).all() and (np.diff(stress) >= 0).all()):
+            raise MaterialError(
+                "the plastic strains of a curve grow from 0, and its stresses do not fall from yield_stress "
+                f"{self.yield_stress:g} Pa; got {self.curve}"
+            )
         if self.saturation_stress and self.saturation_stress < self.yield_stress:
             raise MaterialError(
                 f"{self._name('saturation_stress')} {self.saturation_stress:g} must be ≥ the yield stress "
                 f"{self.yield_stress:g} Pa, or 0 for none"
             )
 
+    @cached_property
+    def _curve(self) -> tuple[Array, Array, Array]:
+        """Plastic strains (k,) from 0 of the curve, its stresses in Pa, and its slopes after them."""
+        p, stress = np.vstack([(0.0, self.yield_stress), np.reshape(self.curve, (-1, 2))]).T
+        with np.errstate(all="ignore"):  # checked later
+            return p, stress, np.append(np.diff(stress) / np.diff(p), 0.0)
+
     def _yield_stress(self, p: Array) -> tuple[Array, Array]:
         """Return the yield stress in Pa and its slope at accumulated plastic strains p (...)."""
         rise = max(self.saturation_stress - self.yield_stress, 0.0)
         decay = np.exp(-self.exponent * p)
-        stress = self.yield_stress + self.hardening * p + rise * (1 - decay)
-        return stress, self.hardening + rise * self.exponent * decay
+        stress = self.hardening * p + rise * (1 - decay)
+        slope = self.hardening + rise * self.exponent * decay
+        if not self.curve:
+            return self.yield_stress + stress, slope
+        knots, stresses, slopes = self._curve
+        after = slopes[np.searchsorted(knots, p, side="right") - 1]
+        return np.interp(p, knots, stresses) + stress, slope + after
 
     def response(self, strain: Array, state: GaussState, dt: float) -> Response:
         """Return stress, consistent tangent and internal variables; see `Material.response`."""
@@ -129,9 +161,13 @@ class J2Plasticity3D(VonMises):
     def _increment(self, q: Array, p: Array, G: float) -> tuple[Array, Array]:
         """Return the increment of p at which q - (3G + kinematic) Δp = σ_Y(p + Δp), and the slope of σ_Y."""
         dp = np.zeros_like(q)
-        stress, slope = self._yield_stress(p)
-        plastic = q > stress
-        for _ in range(MOST_ITERATIONS):  # a convex function: Newton comes from below
+        for knot in self._curve[0][1:]:  # begin at the last below the end
+            at = np.maximum(knot - p, 0.0)
+            is_below = q - (3 * G + self.kinematic) * at > self._yield_stress(p + at)[0]
+            dp = np.where(is_below, at, dp)
+        stress, slope = self._yield_stress(p + dp)
+        plastic = q - (3 * G + self.kinematic) * dp > stress
+        for _ in range(MOST_ITERATIONS):  # a convex function between knots: Newton comes from below
             excess = np.where(plastic, q - (3 * G + self.kinematic) * dp - stress, 0.0)
             if (np.abs(excess) <= CONVERGED * np.maximum(q, self.yield_stress)).all():
                 break

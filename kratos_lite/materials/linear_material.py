@@ -60,7 +60,7 @@ class LinearMaterial(Material, family=True):
         scale = np.sqrt(np.abs(np.diag(self.C)))
         scales = np.outer(scale, scale)  # a C that was turned has round-off in place of zeros
         if not (np.abs(self.C - self.C.T) <= 1e-10 * scales).all():
-            raise MaterialError(f"{type(self).__name__}: C is not symmetric; check the Poisson ratios")
+            raise MaterialError(f"{type(self).__name__}: C is not symmetric; check entries, Poisson ratios")
         if not (scale > 0).all() or not np.linalg.eigvalsh(self.C / scales)[0] > 0:
             raise MaterialError(f"{type(self).__name__}: C must be positive definite; {self.why_unstable()}")
 

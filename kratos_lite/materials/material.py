@@ -15,6 +15,7 @@ from kratos_lite.errors import MaterialError, SolveError, nearest
 from kratos_lite.registry import Registry
 from kratos_lite.tabular import names_of
 from kratos_lite.typing import Array
+from kratos_lite.validation import Axes, finite
 
 MAX_FLOAT = float_info.max
 
@@ -46,6 +47,7 @@ class Material:
     strain_measure : ``"small"``; or ``"finite"``: the strain is Green's, the stress the second of Piola and
         Kirchhoff, and elements are total Lagrangian.
     positive, not_negative : constants that must be > 0 or ≥ 0 → their units.
+    tables : constants that are arrays, kept as tuples → their shapes, a word for any length.
     internal_variables : name → numbers at each Gauss point, 0 at the beginning; ``element_length``
         and ``element_radius`` are cube root of the volume and farthest node from the center, in m.
     symmetric_tangent : whether the tangent is symmetric.
@@ -55,7 +57,7 @@ class Material:
     Raises
     ------
     MaterialError
-        If a constant is not a finite number, or the density is negative.
+        If a constant is not finite or no number (or table), or the density is negative.
 
     Notes
     -----
@@ -84,6 +86,7 @@ class Material:
     strain_measure: ClassVar[str] = "small"
     positive: ClassVar[Mapping[str, str]] = {}
     not_negative: ClassVar[Mapping[str, str]] = {}
+    tables: ClassVar[Mapping[str, Axes]] = {}
     internal_variables: ClassVar[Mapping[str, int]] = {}
     symmetric_tangent: ClassVar[bool] = True
     keeps_volume: ClassVar[bool] = False
@@ -123,6 +126,11 @@ class Material:
     def __post_init__(self) -> None:
         for name in names_of(type(self)):
             value = getattr(self, name)
+            if name in self.tables:
+                shape = self.tables[name] if np.size(value) else None
+                array = finite(value, self._name(name), shape, error=MaterialError)
+                vars(self)[name] = _tuples(array.tolist())
+                continue
             if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
                 raise MaterialError(f"{self._name(name)} must be a number; got {value!r}")
             size: Any = abs(value)
@@ -368,3 +376,8 @@ class Material:
         if missing:
             raise MaterialError(f"{cls.__name__} needs {', '.join(missing)}")
         return cls(**constants)
+
+
+def _tuples(value: Any) -> Any:
+    """Return lists in lists as tuples, which can be hashed."""
+    return tuple(map(_tuples, value)) if isinstance(value, list) else value

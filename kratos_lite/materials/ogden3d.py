@@ -19,7 +19,7 @@ ALIKE = 1e-6
 
 @dataclass(frozen=True)
 class Ogden3D(Material):
-    """Rubber: W = Σ μ_p/α_p (λ̄₁^α_p + λ̄₂^α_p + λ̄₃^α_p - 3) + κ/2 (J - 1)² of isochoric stretches.
+    """Rubber: W = Σ μ_p/α_p (λ̄₁^α_p + λ̄₂^α_p + λ̄₃^α_p - 3) + U(J) of isochoric stretches.
 
     Parameters
     ----------
@@ -27,6 +27,7 @@ class Ogden3D(Material):
         strains is ½ Σ μ_p α_p > 0.
     bulk : bulk modulus κ in Pa, > 0.
     density : kg/m³ of the undeformed body.
+    bulk4, bulk6 : Pa, ≥ 0: U = κ/2 (J - 1)² + bulk4 (J - 1)⁴ + bulk6 (J - 1)⁶.
 
     Raises
     ------
@@ -53,9 +54,12 @@ class Ogden3D(Material):
     mu3: float = 0.0
     alpha3: float = 1.0
     density: float = 0.0
+    bulk4: float = 0.0
+    bulk6: float = 0.0
 
     isotropic: ClassVar[bool] = True
     positive: ClassVar[Mapping[str, str]] = {"bulk": "Pa"}
+    not_negative: ClassVar[Mapping[str, str]] = {"bulk4": "Pa", "bulk6": "Pa"}
     strain_measure: ClassVar[str] = "finite"
 
     def check(self) -> None:
@@ -73,8 +77,10 @@ class Ogden3D(Material):
         """Return S, ∂S/∂E and no internal variables; see `Material.response`."""
         squares, axes = np.linalg.eigh(np.eye(3) + 2 * voigt.tensor(strain * voigt.HALF_SHEAR))
         J = np.sqrt(squares.prod(axis=-1))[..., None]
-        beta = np.broadcast_to(self.bulk * (J - 1) * J, squares.shape).copy()
-        slope = np.broadcast_to((self.bulk * (2 * J - 1) * J)[..., None], (*squares.shape, 3)).copy()
+        pressure = self.bulk * (J - 1) + 4 * self.bulk4 * (J - 1) ** 3 + 6 * self.bulk6 * (J - 1) ** 5
+        second = self.bulk + 12 * self.bulk4 * (J - 1) ** 2 + 30 * self.bulk6 * (J - 1) ** 4
+        beta = np.broadcast_to(J * pressure, squares.shape).copy()
+        slope = np.broadcast_to((J * pressure + J**2 * second)[..., None], (*squares.shape, 3)).copy()
         for mu, alpha in self.terms:
             power = (squares / J ** (2 / 3)) ** (alpha / 2)
             mean = power.mean(axis=-1, keepdims=True)
@@ -89,7 +95,8 @@ class Ogden3D(Material):
         J = np.sqrt(squares.prod(axis=-1))
         isochoric = squares / J[..., None] ** (2 / 3)
         terms = [mu / alpha * ((isochoric ** (alpha / 2)).sum(axis=-1) - 3) for mu, alpha in self.terms]
-        return np.asarray(sum(terms) + self.bulk / 2 * (J - 1) ** 2)
+        volume = self.bulk / 2 * (J - 1) ** 2 + self.bulk4 * (J - 1) ** 4 + self.bulk6 * (J - 1) ** 6
+        return np.asarray(sum(terms) + volume)
 
 
 def of_stretches(squares: Array, axes: Array, beta: Array, slope: Array) -> tuple[Array, Array]:

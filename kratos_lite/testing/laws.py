@@ -201,7 +201,7 @@ def isotropy(law: Material) -> Measured | str:
         return f"{type(law).__name__} claims no isotropy; isotropic = True in the class would"
     Q = np.linalg.qr(np.random.default_rng(11).normal(size=(3, 3)))[0]
     strain = BEYOND[-1] * limit(law) * _directions()
-    turned = voigt.vector(Q @ voigt.tensor(strain * voigt.HALF_SHEAR) @ Q.T) * voigt.SHEAR_TWICE
+    turned = voigt.turned_strain(strain, Q)
     stress, of_turned = (law.evaluate(e, start(law, POINTS), DT)[0] for e in (strain, turned))
     expected = voigt.vector(Q @ voigt.tensor(stress) @ Q.T)
     return Measured(difference(of_turned, expected), 1e-9, "stress of a turned strain against the turned one")

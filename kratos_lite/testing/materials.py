@@ -106,9 +106,8 @@ def _about(axis: ArrayLike, degrees: float) -> Array:
 def _turned(material: LinearMaterial, turns: Mapping[str, Array]) -> Measured:
     """Compare the stress of a turned strain with the turned stress."""
     errors = {}
-    doubled = np.array([1, 1, 1, 2, 2, 2])  # engineering shear is twice the tensor component
     for name, R in turns.items():
-        turned = voigt.vector(R @ voigt.tensor(STRAIN / doubled) @ R.T) * doubled
+        turned = voigt.turned_strain(STRAIN, R)
         expected = voigt.vector(R @ voigt.tensor(material.stress(STRAIN)) @ R.T)
         text = f"stress of a strain turned by {name} against the turned stress"
         errors[text] = difference(material.stress(turned), expected)

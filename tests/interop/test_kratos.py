@@ -385,6 +385,16 @@ def test_orthotropic_body_is_that_of_kratos(tmp_path):
         kl.read(path)
 
 
+def test_a_crystal_that_is_turned_is_that_of_kratos(tmp_path):
+    C = 1e9 * (np.diag([3.0, 2, 4, 1.5, 1, 2]) + np.cos(np.add.outer(np.arange(6), np.arange(6))) / 4)
+    crystal = kl.Anisotropic3D(C, density=500.0).turned(kl.Cartesian((1, 2, 3)).directions((0, 0, 0)))
+    model = cube(distorted_cube(8, 2), GRAVITY)
+    model.assign(crystal)
+    kl.write(tmp_path / "a.mdpa", model)
+    (theirs,) = ask(tmp_path, [{"mdpa": str(tmp_path / "a.mdpa"), "solve": True}])
+    close(model.solve().displacement(), by_node(model.mesh, theirs["displacement"]), 1e-12)
+
+
 def hanging(links):
     """Return a cube held at the bottom, with constraints between corners of its top."""
     model = kl.Model(distorted_cube(8, 2), STEEL)

@@ -9,9 +9,11 @@ import kratos_lite as kl
 from kratos_lite.errors import InputError, MaterialError, SolveError
 from kratos_lite.materials import Material
 
+CURVE = ((1e-4, 260e6), (2e-4, 260e6), (3e-4, 900e6), (2e-3, 950e6), (3e-3, 2000e6))  # steep between flat
 LAWS = [
     (kl.J2Plasticity3D(200e9, 0.3, 250e6), 3e-3),
     (kl.J2Plasticity3D(200e9, 0.3, 250e6, 1e9, 2e9, 400e6, 20.0), 3e-3),
+    (kl.J2Plasticity3D(200e9, 0.3, 250e6, 1e9, 2e9, 400e6, 20.0, curve=CURVE), 3e-3),
     (kl.J2Softening3D(200e9, 0.3, 250e6, 4e6), 3e-3),
     (kl.J2Softening3D(200e9, 0.3, 250e6, 4e5, curve=3), 3e-3),
     (kl.J2Softening3D(200e9, 0.3, 250e6, 4e6, curve=0), 3e-3),
@@ -29,6 +31,7 @@ LAWS = [
     (kl.NeoHookean3D(1e6, 0.3), 0.1),
     (kl.MooneyRivlin3D(0.3e6, 0.1e6, 1e7), 0.1),
     (kl.Ogden3D(0.63e6, 1.3, 1e7, 1.2e3, 5.0, -1e4, -2.0), 0.1),
+    (kl.Ogden3D(0.63e6, 1.3, 1e5, bulk4=3e6, bulk6=2e7), 0.1),
 ]
 HYPERELASTIC = [law for law, _ in LAWS if law.strain_measure == "finite"]
 
@@ -113,6 +116,25 @@ def test_saturation_of_voce():
     p = state["accumulated_plastic_strain"][0]
     assert abs(stress[0] - (200e6 + 100e6 * (1 - np.exp(-50 * p)))) < 1.0
     assert abs(p - (0.05 - stress[0] / 200e9)) < 1e-12
+
+
+@pytest.mark.parametrize("steps", [1, 7, 100])
+def test_a_bar_follows_its_measured_curve(steps):
+    """σ = c(p) and ε = σ/E + p, at knots, between them, and constant after the last."""
+    law = kl.J2Plasticity3D(200e9, 0.3, 250e6, curve=CURVE)
+    for p in (1e-4, 1.5e-4, 2e-4, 2.7e-4, 3e-4, 1e-3, 3e-3, 0.1):
+        expected = np.interp(p, [0, *(a for a, _ in CURVE)], [250e6, *(b for _, b in CURVE)])
+        stress, state = uniaxial(law, np.linspace(0, expected / 200e9 + p, steps + 1)[1:])
+        assert abs(stress[-1] - expected) < 1e-9 * expected
+        assert abs(state["accumulated_plastic_strain"][0] - p) < 1e-9 * p + 1e-14
+
+
+@pytest.mark.parametrize("curve", [[(0.0, 300e6)], [(0.1, 200e6)], [(0.1, 300e6), (0.1, 400e6)]])
+def test_a_curve_that_falls_or_turns_back_is_refused(curve):
+    with pytest.raises(
+        MaterialError, match="the plastic strains of a curve grow from 0, and its stresses do"
+    ):
+        kl.J2Plasticity3D(200e9, 0.3, 250e6, curve=curve)
 
 
 @pytest.mark.parametrize("sign", [1, -1])

@@ -1,10 +1,12 @@
 """Everything that is registered passes the conformance kit."""
 
+import numpy as np
 import pytest
 
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import InputError
 from kratos_lite.materials import MATERIALS
+from kratos_lite.materials.anisotropic3d import Anisotropic3D
 from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.materials.orthotropic3d import Orthotropic3D
 from kratos_lite.quadrature import CELLS, rule_for
@@ -30,6 +32,7 @@ MATERIALS_TO_CHECK = [
     Isotropic3D(E=1e12, nu=0.4999),
     ORTHOTROPIC,
     Orthotropic3D(1.0, 2.0, 3.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6),
+    Anisotropic3D(ORTHOTROPIC.C, 450.0).turned(np.linalg.qr(np.vander([1.0, 2.0, 3.0]))[0]),
     *(law for law, _ in LAWS),
 ]
 LINEAR = {name for name in ELEMENTS if name.endswith(("3D4N", "3D5N", "3D6N", "3D8N"))}

@@ -204,7 +204,8 @@ class Deck:
         if card.options.get("AMPLITUDE", "RAMP").upper() not in ("RAMP", "STEP"):
             card.wrong("AMPLITUDE is RAMP or STEP")
         large = card.options.get("NLGEOM", "NO" if "NLGEOM" not in card.options else "YES").upper() != "NO"
-        self.open = Step(card, large)
+        rubber = any("HYPERELASTIC" in material.cards for material in self.materials.values())
+        self.open = Step(card, large or rubber)
 
     def procedure(self, card: Card) -> None:
         """Read the kind of a step, such as *STATIC, and its data line."""

@@ -20,7 +20,10 @@ from kratos_lite.mesh import mask_of, with_rows
 from kratos_lite.model.loads.body import BodyForce, Gravity
 from kratos_lite.typing import Array
 
-ELASTIC = {name for law in MATERIALS.values() for name in law.variables.values()} - {"DENSITY"}
+ELASTIC = {name for law in MATERIALS.values() for name in law.variables.values()} - {
+    "DENSITY",
+    "ELASTICITY_TENSOR",
+}
 """Variables that say what material a Properties block means."""
 BODY_LOADS = ("VOLUME_ACCELERATION", "GRAVITY", "BODY_FORCE")
 USED = ELASTIC | {

@@ -22,7 +22,10 @@ from kratos_lite.solvers.constraints import Constraints
 from kratos_lite.tabular import names_of
 from kratos_lite.typing import Array, Ints, Mask
 
-KRATOS_LAW = {"Isotropic3D": "LinearElastic3DLaw", "Orthotropic3D": USER_LAW}
+KRATOS_LAW = {
+    "Isotropic3D": "LinearElastic3DLaw",
+    **dict.fromkeys(("Orthotropic3D", "Anisotropic3D"), USER_LAW),
+}
 
 
 def document_from(model: Model) -> Document:
@@ -130,7 +133,9 @@ def _values(material: Material, gravity: Array, at_rest: Array) -> dict[str, Any
     name, prestress, reference = type(material).__name__, at_rest[:6], at_rest[6]
     if name not in KRATOS_LAW:
         raise InputError(f"material {name} has no name in Kratos; model files hold {', '.join(KRATOS_LAW)}")
-    constants = names_of(type(material))
+    constants = [c for c in names_of(type(material)) if c not in material.tables]
+    if "alpha" in material.tables and material.expansion.any():
+        raise InputError(f"the thermal expansion of {name} cannot be written; Kratos has {THERMAL_LAW} alone")
     stated = {material.variables[c]: float(getattr(material, c)) for c in constants}
     values: dict[str, Any] = {name: v for name, v in stated.items() if v or "THERMAL" not in name}
     values["CONSTITUTIVE_LAW"] = KRATOS_LAW[name]

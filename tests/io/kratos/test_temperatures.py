@@ -199,6 +199,20 @@ def test_kratos_has_no_orthotropic_law_with_thermal_strain(tmp_path):
         kl.write(tmp_path / "a.mdpa", model)
 
 
+def test_a_crystal_is_written_with_its_c_but_not_with_its_expansion(tmp_path):
+    C = kl.Orthotropic3D(11e9, 2e9, 1e9, 0.4, 0.3, 0.35, 0.7e9, 0.2e9, 0.6e9).C
+    crystal = kl.Anisotropic3D(C, 500.0).turned(kl.Cartesian((1, 2, 3)).directions((0, 0, 0)))
+    model = kl.Model(kl.box(), crystal)
+    model.fix("z-")
+    kl.write(tmp_path / "a.mdpa", model)
+    again = kl.read(tmp_path / "a.mdpa")
+    assert again.element_groups()[0].material == crystal
+    assert not again.notes
+    model.assign(kl.Anisotropic3D(C, alpha=[1e-5, 0, 0, 0, 0, 0]))
+    with pytest.raises(InputError, match="the thermal expansion of Anisotropic3D cannot be written"):
+        kl.write(tmp_path / "a.mdpa", model)
+
+
 def test_a_law_that_flows_is_heated_step_by_step(case):
     """Heated by 200 K and cooled again: what has flowed stays, as with an amplitude in a script."""
     own = {"YIELD_STRESS": 1e6, "THERMAL_EXPANSION_COEFFICIENT": ALPHA, "REFERENCE_TEMPERATURE": 20.0}

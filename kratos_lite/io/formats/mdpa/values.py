@@ -49,7 +49,7 @@ KINDS: dict[str, str] = {
     **dict.fromkeys(FLAGS, "flag"),
     "INTEGRATION_ORDER": "integer",
     "CONSTITUTIVE_LAW": "word",
-    "LOCAL_INERTIA_TENSOR": "matrix",
+    **dict.fromkeys(("LOCAL_INERTIA_TENSOR", "ELASTICITY_TENSOR"), "matrix"),
 }
 """What the value of a known variable is."""
 
