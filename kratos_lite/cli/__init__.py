@@ -1,4 +1,4 @@
-"""The command line: ``kratos-lite solve | info | check | convert | verify | bench``."""
+"""The command line: ``kratos-lite solve | info | check | convert | verify | ccx | bench``."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def _run(words: Sequence[str]) -> int:
     parser = build_parser()
     options, rest = parser.parse_known_args(words)
     options.rest = rest
-    if rest and options.command != "bench":
+    if rest and options.command not in ("bench", "ccx"):
         parser.refuse(options.command, rest)
     code = int(getattr(commands, options.command)(options))
     if sys.stdout:

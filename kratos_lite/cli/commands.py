@@ -308,3 +308,10 @@ def bench(options: Namespace) -> int:
         )
     words = [sys.executable, "-m", "benchmarks", *options.rest]
     return subprocess.run(words, cwd=ROOT, check=False).returncode
+
+
+def ccx(options: Namespace) -> int:
+    """Solve a deck in place of CalculiX, with all further words."""
+    from kratos_lite.cli.ccx import main
+
+    return main(options.rest)

@@ -119,6 +119,7 @@ def build_parser() -> Parser:
         _add(command, (*(OF_VERIFY if name == "verify" else [LENIENT]), DEBUG))
     # All its words, also --help, are for the program that it runs.
     subparsers.add_parser("bench", help="run the benchmarks of a source checkout", add_help=False)
+    subparsers.add_parser("ccx", help="solve a deck in place of CalculiX: -i JOB", add_help=False)
     return parser
 
 

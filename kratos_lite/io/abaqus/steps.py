@@ -23,11 +23,15 @@ from kratos_lite.time_series import Factor, TimeSeries
 
 def read_deck(path: Path) -> Case:
     """Return the case of the first step of a deck, which names those that follow."""
-    deck = Deck(path)
-    with naming(str(path)):
-        cases = _Building(deck).cases()
+    cases = [case for case, _ in cases_of(Deck(path))]
     cases[0].then = cases[1:]
     return cases[0]
+
+
+def cases_of(deck: Deck) -> list[tuple[Case, list[Step]]]:
+    """Return the cases of a deck, each with its steps; nonlinear ones at rest in turn are one case."""
+    with naming(str(deck.path)):
+        return _Building(deck).cases()
 
 
 class _Building:
@@ -40,22 +44,19 @@ class _Building:
         name = "SurfaceLoadCondition" if large else "SmallDisplacementSurfaceLoadCondition"
         self.mesh, self.number = with_faces(deck.mesh, faces, name)
 
-    def cases(self) -> list[Case]:
-        """Return a case for each step; nonlinear ones at rest that follow each other are one."""
-        cases, i, steps = list[Case](), 0, self.deck.steps
-        while i < len(steps):
-            step = steps[i]
-            if step.kind == "STATIC" and self._is_nonlinear(step):
-                last = i + 1
-                while last < len(steps) and steps[last].kind == "STATIC" and not steps[last].perturbs:
-                    last += 1
-                cases.append(self._nonlinear(steps[i:last]))
-                i = last
-                continue
-            cases.append(getattr(self, f"_{step.kind.lower()}")(step))
-            i += 1
-        for case in cases:
+    def cases(self) -> list[tuple[Case, list[Step]]]:
+        """Return the cases with their steps; nonlinear ones at rest that follow each other are one."""
+        cases, steps = list[tuple[Case, list[Step]]](), self.deck.steps
+        while steps:
+            count, case = 1, None
+            if steps[0].kind == "STATIC" and self._is_nonlinear(steps[0]):
+                while count < len(steps) and steps[count].kind == "STATIC" and not steps[count].perturbs:
+                    count += 1
+                case = self._nonlinear(steps[:count])
+            case = case or getattr(self, f"_{steps[0].kind.lower()}")(steps[0])
             case.files = [self.deck.path]
+            cases.append((case, steps[:count]))
+            steps = steps[count:]
         return cases
 
     def _model(self, large: bool = False) -> Model:

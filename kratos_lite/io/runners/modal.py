@@ -51,7 +51,7 @@ def run(case: Case, progress: Progress | None = None) -> Outcome:
             for i, z in enumerate(values.tolist(), 1)
         ]
     _write(case, values, shapes)
-    return Outcome(case, [], lines=[head, *rows])
+    return Outcome(case, [], lines=[head, *rows], modes=(values, shapes))
 
 
 def _write(case: Case, values: Any, shapes: Any) -> None:

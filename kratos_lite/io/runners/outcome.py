@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 from kratos_lite.analysis.result import Result
 from kratos_lite.io.case import Case
@@ -24,6 +25,7 @@ class Outcome:
     result : of a model at its end, or None.
     lines : a table instead of the summary, as of natural frequencies.
     found : what comparisons found after steps, by their numbers.
+    modes : ω in rad/s, complex λ in 1/s or factors of buckling (k,), and shapes (k, n, 3); or None.
     """
 
     case: Case
@@ -31,6 +33,7 @@ class Outcome:
     result: Result | None = None
     lines: list[str] = field(default_factory=list)
     found: dict[int, list[tuple[float, str]]] = field(default_factory=dict)
+    modes: tuple[Any, Any] | None = None
 
     def __str__(self) -> str:
         return "\n".join(self.summary())

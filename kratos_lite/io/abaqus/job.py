@@ -1,0 +1,130 @@
+"""A deck run in place of ccx: `.frd`, `.dat` and `.sta` are written as CalculiX does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kratos_lite.atomic import all_or_none, write_whole
+from kratos_lite.io.abaqus.cards import Card
+from kratos_lite.io.abaqus.deck import Deck, Step
+from kratos_lite.io.abaqus.loads import with_faces
+from kratos_lite.io.abaqus.steps import cases_of
+from kratos_lite.io.abaqus.supports import node_rows
+from kratos_lite.io.case import Case
+from kratos_lite.io.run import prepare, run
+from kratos_lite.io.writers import dat
+from kratos_lite.io.writers.calculix import at_nodes
+from kratos_lite.io.writers.frd import FrdStep, steps_of_modes, write_frd
+from kratos_lite.io.writers.recorded import recorded
+from kratos_lite.mesh import rows_of_ids
+
+FILED = {
+    "U": "DISP", "RF": "FORC", "NT": "NDTEMP", "V": "VELO", "S": "STRESS", "E": "TOSTRAIN", "ME": "MESTRAIN",
+    "PEEQ": "PE", "ENER": "ENER", "ERR": "ERROR",
+}  # fmt: skip
+"""Fields of `.frd` files by the words of *NODE FILE and *EL FILE."""
+STATUS = (
+    "SUMMARY OF JOB INFORMATION\n  STEP      INC     ATT  ITRS     TOT TIME     STEP TIME      INC TIME\n"
+)
+
+
+class Job:
+    """The steps of a deck, and what they write."""
+
+    def __init__(self, path: Path, tell: Callable[[str], None]) -> None:
+        self.deck, self.tell = Deck(path), tell
+        self.frd, self.dat, self.sta = list[FrdStep](), list[str](), [STATUS]
+        self.asked = dict[str, list[Card]]()  # cards of output; each kind holds until it is given anew
+        self.fields = list[str]()
+
+    def run(self) -> None:
+        """Run all steps, and write the files, or none of them."""
+        done = 0
+        for case, steps in cases_of(self.deck):
+            self._ask(steps[-1])
+            for line in self._run(case, done + 1):
+                self.tell(line)
+            done += len(steps)
+        path = self.deck.path
+        with all_or_none():
+            write_frd(path.with_suffix(".frd"), case.model.mesh, self.frd)
+            write_whole(path.with_suffix(".dat"), "\n".join([*self.dat, ""]).encode())
+            write_whole(path.with_suffix(".sta"), "".join(self.sta).encode())
+
+    def _ask(self, step: Step) -> None:
+        """Take the cards of output of a step."""
+        for kind in {card.keyword for card in step.outputs}:
+            self.asked[kind] = [card for card in step.outputs if card.keyword == kind]
+        words = [w.upper() for k in ("NODEFILE", "ELFILE") for c in self.asked.get(k, []) for w in _words(c)]
+        words += ["ERR"] if "S" in words else []  # as CalculiX does
+        self.fields = list(dict.fromkeys(["DISP", *(FILED[word] for word in words if word in FILED)]))
+
+    def _run(self, case: Case, step: int) -> Iterable[str]:
+        """Run a case, keep what the files get, and return the lines of its summary."""
+        if case.time is not None:
+            return self._in_time(case, step)
+        outcome = run(case)
+        if outcome.result is not None:
+            self._keep(outcome.result, 1.0, step, 1)
+            return outcome.summary()
+        values, shapes = outcome.modes
+        self.frd += steps_of_modes(values, shapes, case.buckling)
+        self.dat += dat.buckling(values) if case.buckling else self._frequencies(case, values, shapes)
+        return outcome.summary()
+
+    def _in_time(self, case: Case, step: int) -> Iterable[str]:
+        """Take the steps of a case in time."""
+        subject, states = prepare(case)
+        record = recorded(subject, self.deck.path)
+        for number, state in enumerate(states, 1):
+            fields = {k: v for k, v in record.at_nodes(state).items() if k in self.fields}
+            self.frd.append(FrdStep(fields, state.time, record.kind, step, number))
+            self._print(subject.result(state), state.time)
+            self.sta.append(_status(step, number, state.time, case.time.step if case.time else 0.0))
+        return [f"{number} increments to {state.time:g} s"]
+
+    def _keep(self, result: Any, time: float, step: int, increment: int) -> None:
+        """Keep the fields of a result at rest, and what is printed of it."""
+        self.frd.append(FrdStep(at_nodes(result, self.fields), float(step), "static", step, increment))
+        self._print(result, float(step))
+        self.sta.append(_status(step, increment, float(step), 1.0))
+
+    def _print(self, result: Any, time: float) -> None:
+        """Print tables of a result."""
+        cards, mesh = self.deck.cards, result.mesh
+        for kind, name in (("NODEPRINT", "NSET"), ("ELPRINT", "ELSET")):
+            for card in self.asked.get(kind, []):
+                where, totals = card.option(name).upper(), card.options.get("TOTALS", "NO").upper()
+                if name == "NSET":
+                    rows = node_rows(where, card, cards, mesh)
+                else:
+                    rows = rows_of_ids(mesh.element_ids, cards.elements_of(where, card))
+                for word in _words(card):
+                    if word in dat.VARIABLES:
+                        self.dat += dat.prints(result, rows, word, where, time, totals)
+        for card in self.asked.get("SECTIONPRINT", []):
+            surface = cards.surfaces[card.option("SURFACE").upper()]
+            loads, faces = self.deck.loads, []
+            for face in np.unique(surface.faces).tolist():
+                faces += loads.faces(surface.elements[surface.faces == face], face, card)
+            blocks = with_faces(mesh.replace(conditions=()), faces, "SurfaceCondition")[0].conditions
+            self.dat += dat.section_print(result, blocks, card.option("SURFACE").upper(), time)
+
+    def _frequencies(self, case: Case, omega: Any, shapes: Any) -> list[str]:
+        """Return the tables of frequencies."""
+        matrices = case.model.matrices()
+        free = np.flatnonzero(~case.model.supports.fixed.ravel())
+        return dat.frequencies(omega, shapes, matrices.M, case.model.mesh.points, free)
+
+
+def _words(card: Card) -> list[str]:
+    """Return the words on the data lines of a card."""
+    return [word.upper() for row in card.rows() for word in row.fields if word]
+
+
+def _status(step: int, increment: int, time: float, length: float) -> str:
+    return f"{step:6d}{increment:11d}{1:7d}{1:6d}{time:14.6E}{time:14.6E}{length:14.6E}\n"
