@@ -187,6 +187,9 @@ class Case:
     time : how it moves through time, or None where it rests.
     modes : number of requested natural frequencies, or 0.
     buckling : whether the modes are shapes of buckling, with factors of the loads.
+    preload : whether the stress of the loads stiffens or softens in natural frequencies.
+    harmonic : options of `Model.harmonic` for the response to loads that swing, or None; its frequencies may
+        also be a function of the model.
     solver, tolerance, error, backend, petsc : of a model at rest, as for `Model.solve`.
     outputs : files to write.
     expected : comparisons of the end of a model with expected values, each of which returns a line, or a
@@ -199,6 +202,8 @@ class Case:
     time: TimeIntegration | None = None
     modes: int = 0
     buckling: bool = False
+    preload: bool = False
+    harmonic: dict[str, Any] | None = None
     solver: str = "auto"
     tolerance: float = 1e-10
     error: float | None = None
@@ -211,11 +216,13 @@ class Case:
 
     @property
     def analysis(self) -> str:
-        """The analysis: ``static``, ``steady``, ``quasi_static``, ``transient``, ``modal`` or ``bodies``."""
+        """``static``, ``steady``, ``quasi_static``, ``transient``, ``modal``, ``harmonic`` or ``bodies``."""
         if not self.is_of_model:
             return "bodies"
         if self.modes:
             return "modal"
+        if self.harmonic is not None:
+            return "harmonic"
         if self.time is not None:
             return "transient" if self.time.quasi_static is None else "quasi_static"
         return "static" if self.model.motion is None else "steady"

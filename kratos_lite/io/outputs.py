@@ -24,13 +24,7 @@ def check_outputs(case: Case) -> None:
     outputs, restart = case.outputs, case.time.restart if case.time else None
     read = [*case.files, *([Path(restart)] if restart else [])]
     check_targets(read, outputs.paths(), new_folders=case.time is not None)
-    for path in outputs.results:
-        if case.modes:
-            check_modes(path)
-        elif case.time is None:
-            check_result(path, outputs.mode)
-        else:
-            check_series(path)
+    _check_results(case)
     of_many = bool(case.time or case.modes)
     if outputs.mode and not any(not of_many or ending(path) == ".pvd" for path in outputs.results):
         kind = "OUT.pvd" if of_many else "OUT.vtu"
@@ -43,12 +37,28 @@ def check_outputs(case: Case) -> None:
     if outputs.sections:
         from kratos_lite.analysis.section import cut_of  # a quick start without
 
-        if case.modes or not case.is_of_model:
+        if case.modes or case.harmonic is not None or not case.is_of_model:
             raise InputError("a section is that of a result of a model; leave it out")
         for where in outputs.sections:
             cut_of(case.model.mesh, where)
     if not case.is_of_model and outputs.json is not None:
         raise InputError(f"{outputs.json}: a body has no summary in .json; write .csv or .npz")
+
+
+def _check_results(case: Case) -> None:
+    """Raise InputError for results that the analysis of a case does not have."""
+    outputs = case.outputs
+    if case.harmonic is not None and outputs.paths() != outputs.results:
+        raise InputError("a harmonic response is written as .csv alone; leave json, picture and state out")
+    for path in outputs.results:
+        if case.modes:
+            check_modes(path)
+        elif case.harmonic is not None:
+            check_ending(path, ".csv")
+        elif case.time is None:
+            check_result(path, outputs.mode)
+        else:
+            check_series(path)
 
 
 def write_at_end(outputs: Outputs, result: Result, *, in_time: bool) -> None:

@@ -19,6 +19,7 @@ ANALYSES = {
     "static": "at_rest",
     "steady": "at_rest",
     "modal": "modal",
+    "harmonic": "harmonic",
     "transient": "transient",
     "quasi_static": "quasi_static",
     "bodies": "bodies",
@@ -30,6 +31,7 @@ NOT_OF_PETSC = {
     "transient": "an integration in time",
     "quasi_static": "quasi-static steps",
     "modal": "natural frequencies",
+    "harmonic": "a harmonic response",
 }
 """What cases are that the backend PETSc does not solve."""
 
@@ -85,11 +87,7 @@ def check_case(case: Case) -> None:
         raise InputError(f"a case is run, such as kl.read_case or kl.Case gives; got {type(case).__name__}")
     if not isinstance(case.outputs.results, list):
         raise InputError(f"the results of a case are a list of paths; got {case.outputs.results!r}")
-    if case.modes and case.time is not None:
-        raise InputError("a case has natural frequencies or a time integration; give one of them")
-    if case.buckling and not case.modes:
-        cure = "kl.Case(model, modes=5, buckling=True)"
-        raise InputError(f"buckling of a case needs the number of its modes: {cure}")
+    _check_analysis(case)
     if case.backend == "petsc":
         if case.analysis in NOT_OF_PETSC:
             what = NOT_OF_PETSC[case.analysis]
@@ -104,12 +102,25 @@ def check_case(case: Case) -> None:
 
     if not isinstance(case.subject, Body):
         raise InputError(f"a case needs a model or a body; got {type(case.subject).__name__}")
-    if case.modes or case.time is None:
+    if case.modes or case.harmonic is not None or case.time is None:
         raise InputError(
             "a body needs a time integration, and has no natural frequencies: kl.Case(body, time=…)"
         )
     if _moves(case.time):
         raise InputError("a body has its own integrator, damping and mass: set them on the body")
+
+
+def _check_analysis(case: Case) -> None:
+    """Raise InputError for analyses that exclude each other."""
+    if case.modes and case.time is not None:
+        raise InputError("a case has natural frequencies or a time integration; give one of them")
+    if case.harmonic is not None and (case.modes or case.time is not None):
+        raise InputError("a harmonic response goes with no modes and no time integration; leave them out")
+    if case.preload and (not case.modes or case.buckling):
+        raise InputError("a preload is that of natural frequencies: kl.Case(model, modes=5, preload=True)")
+    if case.buckling and not case.modes:
+        cure = "kl.Case(model, modes=5, buckling=True)"
+        raise InputError(f"buckling of a case needs the number of its modes: {cure}")
 
 
 def _moves(time: TimeIntegration) -> bool:

@@ -14,9 +14,9 @@ from kratos_lite.io.abaqus.loads import Acting, LoadCards
 from kratos_lite.io.abaqus.materials import Definition, orientation
 from kratos_lite.io.abaqus.mesh import MeshCards
 from kratos_lite.io.abaqus.supports import Axes, Equation, Nodal, boundary, equations, node_rows
-from kratos_lite.mesh import Mesh
 from kratos_lite.model.local_axes import LocalAxes
 from kratos_lite.time_series import TimeSeries
+from kratos_lite.typing import Array
 
 NO_EFFECT = frozenset(
     "HEADING PREPRINT RESTART NODEOUTPUT ELEMENTOUTPUT OUTPUT CONTROLS CONDUCTIVITY SPECIFICHEAT FILTER "
@@ -52,6 +52,8 @@ PROCEDURES = {
     "FREQUENCY": ("SOLVER", "STORAGE", "GLOBAL"),
     "BUCKLE": ("SOLVER",),
     "DYNAMIC": ("SOLVER", "DIRECT", "ALPHA"),
+    "MODALDYNAMIC": ("SOLVER", "DIRECT", "DELTMX"),
+    "STEADYSTATEDYNAMICS": ("SOLVER", "HARMONIC"),
 }
 """Kinds of steps, and their options."""
 
@@ -62,7 +64,9 @@ class Step:
 
     card: Card
     large: bool  # NLGEOM
+    start: float  # total time at which it begins
     procedure: Card | None = None
+    damping: Card | None = None  # *MODAL DAMPING
     outputs: list[Card] = field(default_factory=list)
     held: Nodal = field(init=False)
     acting: Acting = field(init=False)
@@ -76,6 +80,24 @@ class Step:
         """Return the numbers of its data line, or none."""
         row = next(self.procedure.rows(), None) if self.procedure else None
         return [row.number(i, 0.0) for i in range(len(row.fields))] if row else []
+
+    @property
+    def is_direct(self) -> bool:
+        """Whether its increments are those given."""
+        options = self.procedure.options if self.procedure else {}
+        return options.get("DIRECT", "YES" if self.kind == "MODALDYNAMIC" else "NO").upper() != "NO"
+
+    @property
+    def period(self) -> float:
+        """Its duration; 0 of modes and the like, which take no time."""
+        numbers = [*self.numbers(), 1.0, 1.0] if len(self.numbers()) != 1 else [1.0, 1.0]
+        return numbers[1] if self.kind in ("STATIC", "DYNAMIC", "MODALDYNAMIC") else 0.0
+
+    @property
+    def ramps(self) -> bool:
+        """Whether what has no amplitude grows over the step, in place of acting at once."""
+        default = "RAMP" if self.kind == "STATIC" else "STEP"
+        return self.card.options.get("AMPLITUDE", default).upper() == "RAMP"
 
     @property
     def perturbs(self) -> bool:
@@ -99,7 +121,10 @@ class Deck:
         self.sections = list[tuple[str, str, str, Card]]()  # ELSET, MATERIAL, ORIENTATION
         self.orientations = dict[str, LocalAxes]()
         self.amplitudes = dict[str, TimeSeries]()
-        self.held, self.acting = Nodal.none(n), Acting(Nodal.none(n), Nodal.none(n, 1))
+        self.in_total_time = set[str]()  # amplitudes
+        self.start = dict[str, Array]()  # DISPLACEMENT and VELOCITY (n, 3) at the beginning
+        self.stresses = list[Card]()  # at the beginning
+        self.held, self.acting = Nodal.none(n), Acting.none(n)
         self.axes, self.equations = Axes(of_node=np.full(n, -1)), list[Equation]()
         self.initial = np.zeros(n)  # temperatures
         self.loads = LoadCards(self.cards, mesh)
@@ -129,8 +154,6 @@ class Deck:
                 CARDS[keyword](self, card)
         if self.open is not None:
             self.open.card.wrong("the step is not ended by *END STEP")
-        if not self.steps:
-            raise InputError(f"{self.path}: there is no *STEP; a mesh alone is read by kl.read")
         if ignored:
             self.notes.append(f"cards without effect here: {', '.join(sorted(ignored))}")
 
@@ -168,9 +191,12 @@ class Deck:
         if pairs.size % 2 or not pairs.size:
             card.wrong(f"times and factors come in pairs; got {pairs.size} numbers")
         try:
-            self.amplitudes[card.option("NAME").upper()] = TimeSeries(pairs[::2], pairs[1::2])
+            name = card.option("NAME").upper()
+            self.amplitudes[name] = TimeSeries(pairs[::2], pairs[1::2])
         except InputError as error:
             card.wrong(str(error))
+        if card.option("TIME", "STEP TIME").upper().startswith("TOTAL"):
+            self.in_total_time.add(name)
 
     def transform(self, card: Card) -> None:
         """Read *TRANSFORM."""
@@ -179,10 +205,20 @@ class Deck:
     def initial_conditions(self, card: Card) -> None:
         """Read *INITIAL CONDITIONS."""
         card.check_options(("TYPE",))
-        if (kind := card.option("TYPE").upper()) != "TEMPERATURE":
-            card.wrong(f"TYPE={kind} is not supported; TEMPERATURE is")
-        for row in card.rows():
-            self.initial[node_rows(row.text(0), row, self.cards, self.mesh)] = row.number(1)
+        kind, mesh = card.option("TYPE").upper(), self.mesh
+        if kind == "STRESS":
+            self.stresses.append(card)
+        elif kind == "TEMPERATURE":
+            for row in card.rows():
+                self.initial[node_rows(row.text(0), row, self.cards, mesh)] = row.number(1)
+        elif kind in ("DISPLACEMENT", "VELOCITY"):
+            field = self.start.setdefault(kind, np.zeros((mesh.n_nodes, 3)))
+            for row in card.rows():
+                if (axis := row.integer(1)) not in (1, 2, 3):
+                    row.wrong(f"directions are 1, 2 and 3; got {axis}")
+                field[node_rows(row.text(0), row, self.cards, mesh), axis - 1] = row.number(2)
+        else:
+            card.wrong(f"TYPE={kind} is not supported; TEMPERATURE, STRESS, DISPLACEMENT and VELOCITY are")
 
     def equation(self, card: Card) -> None:
         """Read *EQUATION."""
@@ -203,9 +239,13 @@ class Deck:
             card.wrong(f"the step of {self.open.card.place} is not ended by *END STEP")
         if card.options.get("AMPLITUDE", "RAMP").upper() not in ("RAMP", "STEP"):
             card.wrong("AMPLITUDE is RAMP or STEP")
-        large = card.options.get("NLGEOM", "NO" if "NLGEOM" not in card.options else "YES").upper() != "NO"
-        rubber = any("HYPERELASTIC" in material.cards for material in self.materials.values())
-        self.open = Step(card, large or rubber)
+        # Rubber and an earlier step turn NLGEOM on, as in CalculiX.
+        large = any(step.large for step in self.steps[-1:])
+        large |= any("HYPERELASTIC" in material.cards for material in self.materials.values())
+        if "NLGEOM" in card.options:
+            large = card.options["NLGEOM"].upper() != "NO"
+        start = sum(step.period for step in self.steps)
+        self.open = Step(card, large, start)
 
     def procedure(self, card: Card) -> None:
         """Read the kind of a step, such as *STATIC, and its data line."""
@@ -213,11 +253,21 @@ class Deck:
         if step.procedure is not None:
             card.wrong(f"the step has *{step.procedure.keyword} already; write another *STEP")
         card.check_options(PROCEDURES[card.keyword])
+        if step.perturbs and card.keyword != "FREQUENCY":
+            step.card.wrong(f"PERTURBATION is supported with *FREQUENCY; got *{card.keyword}")
         step.procedure = card
+        if card.keyword == "BUCKLE":  # under its own loads alone
+            self.acting = Acting.none(self.mesh.n_nodes)
+
+    def modal_damping(self, card: Card) -> None:
+        """Read *MODAL DAMPING."""
+        card.check_options(("RAYLEIGH",))
+        self._in_step(card).damping = card
 
     def load(self, card: Card) -> None:
         """Read a card of loads."""
-        self._in_step(card)
+        if self._in_step(card).procedure is None:
+            card.wrong("it belongs after the procedure of the step, such as *STATIC")
         read = getattr(self.loads, card.keyword.lower())
         read(card, self.acting, len(self.steps) + 1)
 
@@ -230,9 +280,19 @@ class Deck:
         step = self._in_step(card)
         if step.procedure is None:
             step.card.wrong("the step has no procedure such as *STATIC")
+        if self.acting.imaginary.given.any() and step.kind != "STEADYSTATEDYNAMICS":
+            step.card.wrong(f"LOAD CASE=2 belongs to *STEADY STATE DYNAMICS; got *{step.kind}")
+        if step.large and any(kind == "CENTRIF" for kind, _, _ in self.acting.bodies):
+            step.card.wrong("CENTRIF with NLGEOM is not supported")
         step.held, step.acting = self.held.copy(), self.acting.copy()
         self.steps.append(step)
         self.open = None
+        # What a later step does not give again keeps the value that it has at the end of this one.
+        end = {
+            name: self.amplitudes[name](step.period) for name in self.amplitudes.keys() - self.in_total_time
+        }
+        self.acting.settle(end)
+        self.held.settle(end)
 
     def _in_step(self, card: Card) -> Step:
         if self.open is None:
@@ -243,7 +303,8 @@ class Deck:
 CARDS: dict[str, Callable[[Deck, Card], None]] = {
     "MATERIAL": Deck.material, "SOLIDSECTION": Deck.section, "ORIENTATION": Deck.orientation,
     "AMPLITUDE": Deck.amplitude, "TRANSFORM": Deck.transform, "INITIALCONDITIONS": Deck.initial_conditions,
-    "EQUATION": Deck.equation, "BOUNDARY": Deck.boundary, "STEP": Deck.step, "ENDSTEP": Deck.end_step,
+    "MODALDAMPING": Deck.modal_damping, "EQUATION": Deck.equation, "BOUNDARY": Deck.boundary,
+    "STEP": Deck.step, "ENDSTEP": Deck.end_step,
     **dict.fromkeys(PROCEDURES, Deck.procedure),
     **dict.fromkeys(("CLOAD", "DLOAD", "DSLOAD", "TEMPERATURE"), Deck.load),
     **dict.fromkeys(("NODEFILE", "ELFILE", "NODEPRINT", "ELPRINT", "SECTIONPRINT", "FACEPRINT"), Deck.output),

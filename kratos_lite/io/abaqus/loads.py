@@ -33,6 +33,13 @@ class Term:
     amplitude: str
     step: int
 
+    def settled(self, factors: dict[str, float], count: int) -> Term:
+        """Return the load whose first numbers the end of its amplitude has multiplied."""
+        if self.amplitude not in factors:
+            return self
+        factor = factors[self.amplitude]
+        return Term((*(factor * v for v in self.values[:count]), *self.values[count:]), "", self.step)
+
 
 @dataclass
 class Acting:
@@ -40,16 +47,37 @@ class Acting:
 
     forces: Nodal
     temperatures: Nodal  # (n, 1)
+    imaginary: Nodal  # forces that are a quarter of a period ahead, in *STEADY STATE DYNAMICS
     faces: dict[tuple[str, Face], Term] = field(default_factory=dict)  # P: a pressure, T: a traction
     bodies: dict[tuple[str, str, tuple[float, ...]], Term] = field(default_factory=dict)  # GRAV and CENTRIF
 
+    @classmethod
+    def none(cls, n: int) -> Acting:
+        """Return no load on n nodes."""
+        return cls(Nodal.none(n), Nodal.none(n, 1), Nodal.none(n))
+
+    @property
+    def nodal(self) -> tuple[Nodal, ...]:
+        """What is given at nodes."""
+        return self.forces, self.temperatures, self.imaginary
+
     def copy(self) -> Acting:
         """Return a copy."""
-        return Acting(self.forces.copy(), self.temperatures.copy(), dict(self.faces), dict(self.bodies))
+        forces, temperatures, imaginary = (some.copy() for some in self.nodal)
+        return Acting(forces, temperatures, imaginary, dict(self.faces), dict(self.bodies))
+
+    def settle(self, factors: dict[str, float]) -> None:
+        """Let amplitudes end at factors."""
+        for some in self.nodal:
+            some.settle(factors)
+        for key, term in self.faces.items():
+            self.faces[key] = term.settled(factors, len(term.values))
+        for body, term in self.bodies.items():  # a size, then directions and places
+            self.bodies[body] = term.settled(factors, 1)
 
     def names(self) -> set[str]:
         """Return the amplitudes of the loads."""
-        of_nodes = (set(some.amplitudes[some.given]) for some in (self.forces, self.temperatures))
+        of_nodes = (set(some.amplitudes[some.given]) for some in self.nodal)
         terms = (term.amplitude for term in (*self.faces.values(), *self.bodies.values()))
         return set().union(*of_nodes, terms) - {""}
 
@@ -73,16 +101,17 @@ class LoadCards:
 
     def cload(self, card: Card, acting: Acting, step: int) -> None:
         """Read *CLOAD."""
-        card.check_options(("OP", "AMPLITUDE"))
+        card.check_options(("OP", "AMPLITUDE", "LOADCASE"))
+        forces = acting.imaginary if card.options.get("LOADCASE") == "2" else acting.forces
         if _op(card) == "NEW":
-            acting.forces.clear()
+            forces.clear()
         name = card.options.get("AMPLITUDE", "").upper()
         for row in card.rows():
             axis = row.integer(1)
             if axis not in (1, 2, 3):
                 row.wrong(f"a force on solids has direction 1, 2 or 3; got {axis}")
             nodes = node_rows(row.text(0), row, self.cards, self.mesh)
-            acting.forces.add(nodes, axis - 1, row.number(2), name, step)
+            forces.add(nodes, axis - 1, row.number(2), name, step)
 
     def dload(self, card: Card, acting: Acting, step: int) -> None:
         """Read *DLOAD."""

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from kratos_lite.elements import ELEMENTS
-from kratos_lite.errors import InputError, MeshError, nearest
+from kratos_lite.errors import InputError, nearest
 from kratos_lite.io.abaqus.cards import Card, Row
 from kratos_lite.mesh import Block, Mesh, Part, distinct, ids_of, rows_of_ids
 from kratos_lite.shapes import Shape
@@ -20,7 +20,9 @@ ELEMENT_TYPES = {
     "C3D20": "KinematicLinear3D20N", "C3D20R": "Reduced3D20N",
 }  # fmt: skip
 """Our element of each solid of CalculiX."""
-FINITE = {k: f"TotalLagrangianElement3D{k[3:]}N" for k in ELEMENT_TYPES if k[3:].isdigit()}
+FINITE = {
+    kind: f"TotalLagrangianElement3D{kind[3:].rstrip('R')}N" for kind in ELEMENT_TYPES if kind != "C3D8I"
+}
 """Our element of each where displacements are large (NLGEOM)."""
 FACES = {
     "tetrahedron": ((0, 1, 2), (0, 1, 3), (1, 2, 3), (0, 2, 3)),
@@ -168,6 +170,8 @@ class MeshCards:
         points = np.concatenate([c[1] for c in self.node_cards])
         ids, last = _last(ids)
         points = points[last]
+        for found in self.node_sets.values():
+            found[:] = [nodes[rows_of_ids(ids, nodes) >= 0] for nodes in found]  # a range may skip nodes
         blocks = []
         for cells in self.cells:
             name = ELEMENT_TYPES[cells.kind]
@@ -179,18 +183,15 @@ class MeshCards:
                 raise InputError(f"{cells.place}: {text}")
             order = np.argsort(shape.to_vtk)
             blocks.append(Block(name, rows[:, order], cells.ids))
-        return Mesh(points, blocks, node_ids=ids, source=source, parts=self._parts(ids, blocks, source))
+        return Mesh(points, blocks, node_ids=ids, source=source, parts=self._parts(ids, blocks))
 
-    def _parts(self, ids: Ints, blocks: list[Block], source: str) -> dict[str, Part]:
+    def _parts(self, ids: Ints, blocks: list[Block]) -> dict[str, Part]:
         """Return the sets as parts; one of nodes and one of elements of the same name are one part."""
         parts, of_elements = {}, ids_of(blocks)
         for name in dict.fromkeys([*self.node_sets, *self.element_sets]):
             nodes = np.concatenate([np.zeros(0, dtype=np.int64), *self.node_sets.get(name, [])])
             cells = np.concatenate([np.zeros(0, dtype=np.int64), *self.element_sets.get(name, [])])
             rows = rows_of_ids(ids, distinct(nodes))
-            if (rows < 0).any():
-                missing = distinct(nodes)[rows < 0][0]
-                raise MeshError(f"{source}: NSET {name} holds node {missing}, which is not there")
             elements = rows_of_ids(of_elements, distinct(cells))
             elements = elements[elements >= 0]  # springs and masses are no elements of the mesh
             if len(elements) and not len(rows):

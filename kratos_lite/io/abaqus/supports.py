@@ -40,6 +40,13 @@ class Nodal:
         """Remove everything."""
         self.given[:], self.values[:], self.steps[:] = False, 0.0, 0
 
+    def settle(self, factors: dict[str, float]) -> None:
+        """Let amplitudes end at factors."""
+        for name in factors.keys() & set(self.amplitudes[self.given]):
+            at = self.given & (self.amplitudes == name)
+            self.values[at] *= factors[name]
+            self.amplitudes[at] = ""
+
     def put(self, rows: Ints, axes: int | slice, value: float, amplitude: str) -> None:
         """Give a value to nodes."""
         self.given[rows, axes], self.values[rows, axes] = True, value

@@ -39,7 +39,7 @@ def run(case: Case, progress: Progress | None = None) -> Outcome:
         values, shapes = model.buckling(count, progress=progress)
         rows = [f"{i:>4}  {factor:>14.8g}" for i, factor in enumerate(values.tolist(), 1)]
     elif model.motion is None:
-        values, shapes = model.modes(count, progress=progress)
+        values, shapes = model.modes(count, preload=case.preload or None, progress=progress)
         rows = [f"{i:>4}  {w / (2 * pi):>14.8g}  {w:>14.8g}" for i, w in enumerate(values.tolist(), 1)]
     else:
         head += f"  {'growth 1/s':>14}"

@@ -1,0 +1,112 @@
+"""The model that a deck describes, without the loads of its steps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from kratos_lite.analysis.model import Model
+from kratos_lite.errors import InputError
+from kratos_lite.io.abaqus.deck import Deck, Step
+from kratos_lite.io.abaqus.loads import Acting, loads_of, with_faces
+from kratos_lite.io.abaqus.materials import OURS, material_of
+from kratos_lite.io.abaqus.mesh import ELEMENT_TYPES, FINITE
+from kratos_lite.io.abaqus.supports import Nodal, apply, constrain
+from kratos_lite.mesh import Mesh, rows_of_ids, with_rows
+from kratos_lite.model.loads.base import Load
+from kratos_lite.time_series import TimeSeries
+
+
+class Building:
+    """Makes models of a deck."""
+
+    def __init__(self, deck: Deck) -> None:
+        self.deck = deck
+        faces = [face for step in deck.steps for _, face in step.acting.faces]
+        self.mesh, self.number = with_faces(deck.mesh, faces, "SmallDisplacementSurfaceLoadCondition")
+
+    def model(self, large: bool = False) -> Model:
+        """Return the model without its loads and supports."""
+        deck = self.deck
+        mesh = self._finite() if large else self.mesh
+        model = Model(mesh)
+        if large:
+            for block, at in with_rows(self.mesh.blocks):
+                if block.name == ELEMENT_TYPES["C3D20R"]:
+                    model.use_rule(2, np.arange(at.start, at.stop))
+        assigned = np.zeros(mesh.n_elements, dtype=bool)
+        for elset, name, axes, card in deck.sections:
+            if name not in deck.materials:
+                card.wrong(f"there is no *MATERIAL {name}")
+            if axes and axes not in deck.orientations:
+                card.wrong(f"there is no *ORIENTATION {axes}")
+            if large and (plastic := deck.materials[name].cards.get("PLASTIC")):
+                plastic.wrong("plastic flow at large strains is not supported; leave NLGEOM out")
+            deck.cards.elements_of(elset, card)
+            rows = mesh.parts[elset].elements if elset in mesh.parts else np.zeros(0, dtype=np.int64)
+            material = material_of(deck.materials[name], deck.orientations.get(axes), finite=large)
+            model.assign(material, rows)
+            assigned[rows] = True
+        if not assigned.all():
+            missing = mesh.element_ids[~assigned][0]
+            raise InputError(f"{deck.path}: element {missing} is in no *SOLID SECTION")
+        self._stress(model)
+        model.notes += deck.notes
+        return model
+
+    def held_model(self) -> Model:
+        """Return the model with the supports of a deck without steps."""
+        model = self.model()
+        self.hold(model, self.deck.held)
+        return model
+
+    def hold(self, model: Model, held: Nodal, series: dict[str, TimeSeries] | None = None) -> None:
+        """Add supports and equations to a model."""
+        apply(model, held, self.deck.axes, series or {})
+        constrain(model, self.deck.equations, self.deck.axes)
+
+    def loads(self, model: Model, acting: Acting) -> Iterable[tuple[Load, str]]:
+        """Yield the loads that act, each with the name of its amplitude."""
+        return loads_of(model, acting, self.number, self.deck.axes, self.deck.initial)
+
+    def is_nonlinear(self, step: Step) -> bool:
+        """Return whether a step has large displacements or laws that are not linear."""
+        names = {name for _, name, _, _ in self.deck.sections}
+        laws = {k for n in names if n in self.deck.materials for k in self.deck.materials[n].cards}
+        return step.large or bool(laws & {"PLASTIC", "HYPERELASTIC"})
+
+    def count(self, step: Step) -> int:
+        """Return the number of modes of a step."""
+        numbers = step.numbers()
+        if not numbers or numbers[0] != int(numbers[0]) or numbers[0] < 1:
+            step.card.wrong(f"*{step.kind} needs the number of modes on its data line")
+        return int(numbers[0])
+
+    def earlier(self, step: Step) -> list[Step]:
+        """Return the steps before one."""
+        return self.deck.steps[: self.deck.steps.index(step)]
+
+    def _finite(self) -> Mesh:
+        """Return the mesh with elements and loads of large displacements."""
+        names = {ELEMENT_TYPES[kind]: name for kind, name in FINITE.items()}
+        kinds = {name: kind for kind, name in ELEMENT_TYPES.items()}
+        for block in self.mesh.blocks:
+            if block.name not in names:
+                raise InputError(f"{self.deck.path}: NLGEOM with {kinds[block.name]} is not supported")
+        blocks = [replace(b, name=names[b.name]) for b in self.mesh.blocks]
+        faces = [replace(b, name=b.name.removeprefix("SmallDisplacement")) for b in self.mesh.conditions]
+        return self.mesh.replace(blocks=blocks, conditions=faces)
+
+    def _stress(self, model: Model) -> None:
+        """Add the stress of *INITIAL CONDITIONS, which is the same at all points of an element."""
+        for card in self.deck.stresses:
+            table = np.array([row.numbers(8) for row in card.rows()])
+            rows = rows_of_ids(model.mesh.element_ids, table[:, 0].astype(np.int64))
+            if (rows < 0).any():
+                card.wrong(f"there is no element {table[rows < 0, 0][0]:g}")
+            some, first, each = np.unique(rows, return_index=True, return_inverse=True)
+            if np.abs(table[:, 2:] - table[first[each], 2:]).max() > 0:
+                card.wrong("a stress that differs between the points of an element is not supported")
+            model.add_prestress(table[first, 2:][:, OURS], some)

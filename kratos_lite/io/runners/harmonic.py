@@ -1,0 +1,55 @@
+"""Harmonic response of models: the steady motion under loads that swing."""
+
+from __future__ import annotations
+
+from math import pi
+from typing import Any
+
+import numpy as np
+
+from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
+from kratos_lite.analysis.fields import labelled
+from kratos_lite.analysis.harmonic import HarmonicResponse
+from kratos_lite.io.case import Case
+from kratos_lite.io.runners.outcome import Outcome
+from kratos_lite.io.writers.table import write_table
+from kratos_lite.typing import Progress
+
+
+def check(case: Case) -> list[str]:
+    """Return the warnings of the model; no mode is looked for."""
+    case.model.require_linear("harmonic response")
+    return EquationsOfMotion(case.model).warnings
+
+
+def run(case: Case, progress: Progress | None = None) -> Outcome:
+    """Find the response at each frequency, and write amplitudes and phases of all nodes."""
+    response = respond(case, progress)
+    rows = [f"{'frequency Hz':>14}  {'rad/s':>14}  {'amplitude m':>14}  {'at node':>9}"]
+    for i, omega in enumerate(response.frequencies.tolist()):
+        size = np.linalg.norm(response.displacement(i), axis=1)
+        at = int(size.argmax())
+        node = case.model.mesh.node_ids[at]
+        rows.append(f"{omega / (2 * pi):>14.8g}  {omega:>14.8g}  {size[at]:>14.6e}  {node:>9}")
+    for path in case.outputs.results:
+        write_table(path, _columns(response))
+    return Outcome(case, [], lines=rows)
+
+
+def respond(case: Case, progress: Progress | None = None) -> HarmonicResponse:
+    """Return the response that a case asks for."""
+    options = dict(case.harmonic or {})
+    if callable(options["frequencies"]):
+        options["frequencies"] = options["frequencies"](case.model)
+    return case.model.harmonic(**options, progress=progress)
+
+
+def _columns(response: HarmonicResponse) -> dict[str, Any]:
+    """Return amplitudes and phases by headers, of all nodes at the first frequency and so on."""
+    mesh, omega = response.mesh, response.frequencies
+    u = np.concatenate([response.displacement(i) for i in range(len(omega))])
+    made: dict[str, Any] = {"frequency [rad/s]": np.repeat(omega, mesh.n_nodes)}
+    made["node"] = np.tile(mesh.node_ids, len(omega))
+    for i, axis in enumerate("xyz"):
+        made |= {f"amplitude {axis} [m]": np.abs(u[:, i]), f"phase {axis} [rad]": np.angle(u[:, i])}
+    return labelled(made, response.units)
