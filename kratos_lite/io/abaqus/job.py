@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from math import pi
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,10 +18,13 @@ from kratos_lite.io.abaqus.supports import node_rows
 from kratos_lite.io.case import Case
 from kratos_lite.io.run import prepare, run
 from kratos_lite.io.writers import dat
-from kratos_lite.io.writers.calculix import at_nodes
+from kratos_lite.io.writers.calculix import at_nodes, averaged
 from kratos_lite.io.writers.frd import FrdStep, steps_of_modes, write_frd
 from kratos_lite.io.writers.recorded import recorded
 from kratos_lite.mesh import rows_of_ids
+
+if TYPE_CHECKING:
+    from kratos_lite.analysis.harmonic import HarmonicResponse
 
 FILED = {
     "U": "DISP", "RF": "FORC", "NT": "NDTEMP", "V": "VELO", "S": "STRESS", "E": "TOSTRAIN", "ME": "MESTRAIN",
@@ -71,10 +75,22 @@ class Job:
         if outcome.result is not None:
             self._keep(outcome.result, 1.0, step, 1)
             return outcome.summary()
-        values, shapes = outcome.modes
-        self.frd += steps_of_modes(values, shapes, case.buckling)
-        self.dat += dat.buckling(values) if case.buckling else self._frequencies(case, values, shapes)
+        if outcome.modes is not None:
+            values, shapes = outcome.modes
+            self.frd += steps_of_modes(values, shapes, case.buckling)
+            self.dat += dat.buckling(values) if case.buckling else self._frequencies(case, values, shapes)
+        elif outcome.response is not None:
+            self._swing(outcome.response, step)
         return outcome.summary()
+
+    def _swing(self, response: HarmonicResponse, step: int) -> None:
+        """Keep displacements and stresses at each frequency, complex."""
+        for i, omega in enumerate(response.frequencies.tolist()):
+            fields: dict[str, Any] = {"DISP": response.displacement(i)}
+            if "STRESS" in self.fields:
+                parts: Any = [averaged(response.fields(i, phase), "stress") for phase in (0.0, -pi / 2)]
+                fields["STRESS"] = parts[0] + 1j * parts[1]
+            self.frd.append(FrdStep(fields, omega / (2 * pi), "time", step, 0))
 
     def _in_time(self, case: Case, step: int) -> Iterable[str]:
         """Take the steps of a case in time."""

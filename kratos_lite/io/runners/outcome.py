@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from kratos_lite.analysis.result import Result
 from kratos_lite.io.case import Case
 from kratos_lite.io.outputs import write_at_end
 from kratos_lite.tabular import in_units
+
+if TYPE_CHECKING:
+    from kratos_lite.analysis.harmonic import HarmonicResponse
 
 WIDTH = 22
 """Of the left column of tables."""
@@ -26,6 +29,7 @@ class Outcome:
     lines : a table instead of the summary, as of natural frequencies.
     found : what comparisons found after steps, by their numbers.
     modes : ω in rad/s, complex λ in 1/s or factors of buckling (k,), and shapes (k, n, 3); or None.
+    response : to loads that swing, or None.
     """
 
     case: Case
@@ -34,6 +38,7 @@ class Outcome:
     lines: list[str] = field(default_factory=list)
     found: dict[int, list[tuple[float, str]]] = field(default_factory=dict)
     modes: tuple[Any, Any] | None = None
+    response: HarmonicResponse | None = None
 
     def __str__(self) -> str:
         return "\n".join(self.summary())

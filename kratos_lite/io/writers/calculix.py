@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 
 from kratos_lite import voigt
+from kratos_lite.analysis.element_fields import ElementFields
 from kratos_lite.analysis.fields import GaussPoints, known
 from kratos_lite.analysis.result import Result
 from kratos_lite.assembly import nodal_values
@@ -62,7 +63,7 @@ OF_POINTS: dict[str, Callable[[GaussPoints], Array]] = {
 """Fields that are not in our table, or whose strains are the components of tensors there."""
 
 
-def at_gauss(result: Result, name: str) -> list[Array]:
+def at_gauss(result: ElementFields, name: str) -> list[Array]:
     """Return a field (m, g, c) at the Gauss points of each group; none if the result has none."""
     field = known(result.groups).get(name)
     function = OF_POINTS.get(name, field.at if field else None)
@@ -70,7 +71,7 @@ def at_gauss(result: Result, name: str) -> list[Array]:
     return [value.reshape(*value.shape[:2], -1) for value in values]
 
 
-def averaged(result: Result, name: str) -> Array | None:
+def averaged(result: ElementFields, name: str) -> Array | None:
     """Return a field (n, c), extrapolated and averaged at nodes."""
     values, how = at_gauss(result, name), (result.mesh.n_nodes, extrapolation)
     return nodal_values.averaged(result.groups, values, *how) if values else None
