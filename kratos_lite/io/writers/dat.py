@@ -91,14 +91,13 @@ def section_print(result: Result, faces: Sequence[Block], where: str, time: floa
     moment = M - np.cross(center, F)
     tension, torque = F @ normal, moment @ normal
     shear, bending = np.linalg.norm([F - tension * normal, moment - torque * normal], axis=1)
+    forces = [*area, tension, shear, torque, bending]
     tables: dict[str, Any] = {
         "total surface force (fx,fy,fz) and moment about the origin(mx,my,mz)": [*F, *M],
         "center of gravity and mean normal": [*center, *normal],
         "moment about the center of gravity(mx,my,mz)": moment,
-        "area, normal force (+ = tension), shear force (size), torque and bending moment (size)": [
-            *area, tension, shear, torque, bending,
-        ],
-    }  # fmt: skip
+        "area, normal force (+ = tension), shear force (size), torque and bending moment (size)": forces,
+    }
     lines = ["", "", "", f" statistics for surface set {where} and time{_fortran(time):>15}"]
     for title, values in tables.items():
         lines += ["", f"   {title}", "", "  " + "".join(f"{value:14.6E}" for value in values)]
@@ -112,7 +111,7 @@ def frequencies(omega: Array, shapes: Array, M: Any, points: Array, free: Ints) 
     rigid[:, free] = motions.reshape(6, -1)[:, free]
     masses = np.einsum("ki,ik->k", flat, M @ flat.T)
     factors = flat @ (M @ rigid.T) / np.sqrt(masses)[:, None]
-    effective, total = factors**2, np.einsum("ki,ik->k", rigid, M @ rigid.T)
+    effective, total = [*factors**2, (factors**2).sum(axis=0)], np.einsum("ki,ik->k", rigid, M @ rigid.T)
     head = [
         " MODE NO    EIGENVALUE                       FREQUENCY   ",
         f"{'REAL PART':>46}{'IMAGINARY PART':>26}",
@@ -122,9 +121,7 @@ def frequencies(omega: Array, shapes: Array, M: Any, points: Array, free: Ints) 
     return [
         *_titled("E I G E N V A L U E   O U T P U T", head, values),
         *_titled("P A R T I C I P A T I O N   F A C T O R S", HEAD, factors),
-        *_titled(
-            "E F F E C T I V E   M O D A L   M A S S", HEAD, [*effective, effective.sum(axis=0)], "TOTAL"
-        ),
+        *_titled("E F F E C T I V E   M O D A L   M A S S", HEAD, effective, "TOTAL"),
         *_titled("T O T A L   E F F E C T I V E   M A S S", HEAD, [total], ""),
     ]
 
