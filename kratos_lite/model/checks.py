@@ -6,6 +6,7 @@ Each check either raises one clear error or returns warnings for the report.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -146,9 +147,10 @@ def check_scales(mesh: Mesh, groups: Sequence[ElementGroup]) -> Iterator[str]:
     yield from check_wave_speeds((group.material for group in groups), mesh.units)
 
 
-def check_nodes(mesh: Mesh) -> Iterator[str]:
-    """Warn of nodes that no element uses."""
+def check_nodes(mesh: Mesh, references: Any = None) -> Iterator[str]:
+    """Warn of nodes that no element uses, but for reference nodes."""
     unused = mesh.node_ids[~mesh.used_nodes()]
+    unused = unused if references is None else np.setdiff1d(unused, mesh.node_ids[references.nodes])
     if len(unused):
         shown = " ".join(map(str, unused[:5])) + (" …" if len(unused) > 5 else "")
         yield f"{len(unused)} nodes belong to no element and carry no equations: {shown}"

@@ -116,10 +116,10 @@ class Tie(PartTie):
         rest = R @ S - diags_array(D[free]) @ own @ S @ own.T @ own
         on_all = csr_array((np.ones(len(dofs)), (np.arange(len(dofs)), dofs)), shape=(len(dofs), size))
         rows = T[free][:, free] @ diags_array(1 / D[free]) @ (R @ self.W - rest @ on_all)
-        return _constraints(dofs[free], csr_array(rows))
+        return constraints_of(dofs[free], csr_array(rows))
 
 
-def _constraints(dependents: Ints, rows: Any) -> Constraints:
+def constraints_of(dependents: Ints, rows: Any) -> Constraints:
     """Return u[dependents] = rows u."""
     rows.data[np.abs(rows.data) < 1e-14] = 0.0
     rows.eliminate_zeros()

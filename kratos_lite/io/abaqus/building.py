@@ -13,7 +13,7 @@ from kratos_lite.io.abaqus.deck import Deck, Step
 from kratos_lite.io.abaqus.loads import Acting, loads_of, with_faces
 from kratos_lite.io.abaqus.materials import OURS, material_of
 from kratos_lite.io.abaqus.mesh import ELEMENT_TYPES, FINITE
-from kratos_lite.io.abaqus.supports import Nodal, apply, constrain
+from kratos_lite.io.abaqus.supports import Nodal, apply
 from kratos_lite.mesh import Mesh, rows_of_ids, with_rows
 from kratos_lite.model.loads.base import Load
 from kratos_lite.time_series import TimeSeries
@@ -63,13 +63,13 @@ class Building:
         return model
 
     def hold(self, model: Model, held: Nodal, series: dict[str, TimeSeries] | None = None) -> None:
-        """Add supports and equations to a model."""
+        """Add supports and connections to a model."""
         apply(model, held, self.deck.axes, series or {})
-        constrain(model, self.deck.equations, self.deck.axes)
+        self.deck.connections.connect(model)
 
     def loads(self, model: Model, acting: Acting) -> Iterable[tuple[Load, str]]:
         """Yield the loads that act, each with the name of its amplitude."""
-        return loads_of(model, acting, self.number, self.deck.axes, self.deck.initial)
+        return loads_of(model, acting, self.number, self.deck.axes, self.deck.initial, self.deck.cards)
 
     def is_nonlinear(self, step: Step) -> bool:
         """Return whether a step has large displacements or laws that are not linear."""

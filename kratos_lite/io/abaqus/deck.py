@@ -10,10 +10,11 @@ import numpy as np
 
 from kratos_lite.errors import InputError, naming, nearest
 from kratos_lite.io.abaqus.cards import Card, read_cards
+from kratos_lite.io.abaqus.couplings import Connections
 from kratos_lite.io.abaqus.loads import Acting, LoadCards
 from kratos_lite.io.abaqus.materials import Definition, orientation
 from kratos_lite.io.abaqus.mesh import MeshCards
-from kratos_lite.io.abaqus.supports import Axes, Equation, Nodal, boundary, equations, node_rows
+from kratos_lite.io.abaqus.supports import Axes, Nodal, boundary, node_rows
 from kratos_lite.model.local_axes import LocalAxes
 from kratos_lite.time_series import TimeSeries
 from kratos_lite.typing import Array
@@ -114,8 +115,12 @@ class Deck:
         for card in cards:
             if card.keyword in OF_MESH:
                 getattr(self.cards, card.keyword.lower())(card)
+            elif card.keyword in ("RIGIDBODY", "COUPLING"):
+                self.cards.reference(card)
         with naming(str(path)):
-            mesh = self.mesh = self.cards.mesh(path.name)
+            cuts = [card for card in cards if card.keyword == "PRE-TENSIONSECTION"]
+            self.connections = Connections(self.cards, self.cards.mesh(path.name), cuts)
+        mesh = self.mesh = self.connections.mesh
         n = mesh.n_nodes
         self.materials = dict[str, Definition]()
         self.sections = list[tuple[str, str, str, Card]]()  # ELSET, MATERIAL, ORIENTATION
@@ -125,7 +130,7 @@ class Deck:
         self.start = dict[str, Array]()  # DISPLACEMENT and VELOCITY (n, 3) at the beginning
         self.stresses = list[Card]()  # at the beginning
         self.held, self.acting = Nodal.none(n), Acting.none(n)
-        self.axes, self.equations = Axes(of_node=np.full(n, -1)), list[Equation]()
+        self.axes = Axes(of_node=np.full(n, -1))
         self.initial = np.zeros(n)  # temperatures
         self.loads = LoadCards(self.cards, mesh)
         self.steps = list[Step]()
@@ -222,7 +227,11 @@ class Deck:
 
     def equation(self, card: Card) -> None:
         """Read *EQUATION."""
-        self.equations += equations(card, self.cards, self.mesh)
+        self.connections.equation(card, self.axes)
+
+    def connection(self, card: Card) -> None:
+        """Read a card that connects nodes."""
+        getattr(self.connections, card.keyword.lower())(card)
 
     def boundary(self, card: Card) -> None:
         """Read *BOUNDARY, of the model or of a step."""
@@ -306,6 +315,9 @@ CARDS: dict[str, Callable[[Deck, Card], None]] = {
     "MODALDAMPING": Deck.modal_damping, "EQUATION": Deck.equation, "BOUNDARY": Deck.boundary,
     "STEP": Deck.step, "ENDSTEP": Deck.end_step,
     **dict.fromkeys(PROCEDURES, Deck.procedure),
+    "PRE-TENSIONSECTION": lambda deck, card: None,  # read with the mesh
+    **dict.fromkeys("RIGIDBODY COUPLING KINEMATIC DISTRIBUTING".split(), Deck.connection),
+    **dict.fromkeys("DISTRIBUTINGCOUPLING TIE SPRING MASS".split(), Deck.connection),
     **dict.fromkeys(("CLOAD", "DLOAD", "DSLOAD", "TEMPERATURE"), Deck.load),
     **dict.fromkeys(("NODEFILE", "ELFILE", "NODEPRINT", "ELPRINT", "SECTIONPRINT", "FACEPRINT"), Deck.output),
 }  # fmt: skip

@@ -158,13 +158,13 @@ class Dynamics(Building):
             end if step.ramps else start + AT_ONCE * (end - start)
             for start, end, step in zip(times, times[1:], steps, strict=False)
         ]
+        self._move(model, steps, times, reached)
         for k, step in enumerate(steps):
             if k and step.ramps and step.acting.names():
                 step.card.wrong("amplitudes after the first of several nonlinear steps are not supported")
             factor = {name: _window(times, reached, k, each) for name, each in self._series(step).items()}
             for load, name in self.loads(model, step.acting):
                 model.add(load, amplitude=factor[name])
-        self._move(model, steps, times, reached)
         return model
 
     def _series(self, step: Step) -> dict[str, TimeSeries | None]:

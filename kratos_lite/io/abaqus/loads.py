@@ -9,9 +9,10 @@ from typing import TypeAlias
 import numpy as np
 
 from kratos_lite.analysis.model import Model
+from kratos_lite.errors import ModelError
 from kratos_lite.io.abaqus.cards import Card, Row
 from kratos_lite.io.abaqus.mesh import MeshCards, face_number, face_rows
-from kratos_lite.io.abaqus.supports import Axes, Nodal, node_rows
+from kratos_lite.io.abaqus.supports import Axes, Nodal, node_rows, rotation_rows
 from kratos_lite.mesh import Block, Mesh, rows_of_ids, with_rows
 from kratos_lite.model.loads.base import Load
 from kratos_lite.model.loads.body import Gravity
@@ -108,10 +109,12 @@ class LoadCards:
         name = card.options.get("AMPLITUDE", "").upper()
         for row in card.rows():
             axis = row.integer(1)
-            if axis not in (1, 2, 3):
-                row.wrong(f"a force on solids has direction 1, 2 or 3; got {axis}")
             nodes = node_rows(row.text(0), row, self.cards, self.mesh)
-            forces.add(nodes, axis - 1, row.number(2), name, step)
+            if axis in (4, 5, 6):
+                nodes = rotation_rows(nodes, self.cards, self.mesh, row)
+            if axis not in range(1, 7) or not len(nodes):
+                row.wrong(f"a force on solids has direction 1, 2 or 3, on reference nodes 1 … 6; got {axis}")
+            forces.add(nodes, (axis - 1) % 3, row.number(2), name, step)
 
     def dload(self, card: Card, acting: Acting, step: int) -> None:
         """Read *DLOAD."""
@@ -142,12 +145,8 @@ class LoadCards:
         for row in card.rows():
             if row.text(1).upper() != "P":
                 row.wrong(f"a load on a surface is P, a pressure; got {row.text(1)}")
-            surface = self.cards.surfaces.get(row.text(0).upper())
-            if surface is None or surface.nodes is not None:
-                row.wrong(f"there is no *SURFACE {row.text(0)} of faces")
-            for face in np.unique(surface.faces).tolist():
-                for key in self.faces(surface.elements[surface.faces == face], face, row):
-                    acting.put(("P", key), (row.number(2),), name, step)
+            for key in self.surface(row.text(0), row):
+                acting.put(("P", key), (row.number(2),), name, step)
 
     def temperature(self, card: Card, acting: Acting, step: int) -> None:
         """Read *TEMPERATURE."""
@@ -158,6 +157,14 @@ class LoadCards:
         for row in card.rows():
             nodes = node_rows(row.text(0), row, self.cards, self.mesh)
             acting.temperatures.put(nodes, 0, row.number(1), name)
+
+    def surface(self, name: str, at: Row | Card) -> list[Face]:
+        """Return the faces of a surface."""
+        found = self.cards.surfaces.get(name.upper())
+        if found is None or found.nodes is not None:
+            at.wrong(f"there is no *SURFACE {name} of faces")
+        numbers = np.unique(found.faces).tolist()
+        return [face for k in numbers for face in self.faces(found.elements[found.faces == k], k, at)]
 
     def faces(self, ids: Ints, face: int, at: Row | Card) -> list[Face]:
         """Return a face of elements."""
@@ -197,16 +204,21 @@ def with_faces(mesh: Mesh, every: Iterable[Face], name: str) -> tuple[Mesh, dict
 
 
 def loads_of(
-    model: Model, acting: Acting, number: dict[Face, int], axes: Axes, initial: Array
+    model: Model,
+    acting: Acting,
+    number: dict[Face, int],
+    axes: Axes,
+    initial: Array,
+    cards: MeshCards,
 ) -> Iterable[tuple[Load, str]]:
     """Yield the loads of a model, each with the name of its amplitude."""
     mesh, n = model.mesh, model.mesh.n_nodes
-    F = acting.forces
+    F, carried = acting.forces, np.asarray if model.references is None else model.references.carried
     for name in sorted(set(F.amplitudes[F.given])):
         values = np.where(F.given & (F.amplitudes == name), F.values, 0.0)
         turned = np.flatnonzero(values.any(axis=1) & (axes.of_node >= 0))
         values[turned] = np.einsum("ni,nij->nj", values[turned], axes.directions(mesh, turned))
-        yield NodalForces(values), name
+        yield NodalForces(carried(values)), name
     for name in sorted({term.amplitude for term in acting.faces.values()}):
         pressure = np.zeros(len(number))
         for (_, face), term in acting.faces.items():
@@ -215,16 +227,22 @@ def loads_of(
         none = {cell: np.zeros((n, 3)) for cell in ("point", "line", "triangle", "quadrilateral")}
         yield ConditionLoads(np.zeros((len(number), 3)), none, pressure, np.zeros(n)), name
     for (kind, at, _), term in acting.bodies.items():
-        where = at if at in mesh.parts else rows_of_ids(mesh.element_ids, np.array([int(at)]))
+        where = rows_of_ids(mesh.element_ids, np.unique(cards.elements_in(at)))
+        where, masses = where[where >= 0], cards.masses_of(at)
         if kind == "GRAV":
             size, *direction = term.values
-            yield Gravity(size * np.array(direction), where), term.amplitude
+            force = size * np.array(direction)
+            if masses.any():
+                yield NodalForces(carried(masses[:, None] * force)), term.amplitude
+            yield Gravity(force, where), term.amplitude
+        elif masses.any():
+            raise ModelError("*DLOAD: CENTRIF on masses is not supported; give their force by *CLOAD")
         else:
             yield Gravity(_centrifugal(term.values), where), term.amplitude
     T = acting.temperatures
     for name in sorted(set(T.amplitudes[T.given])):
         of = T.given[:, 0] & (T.amplitudes[:, 0] == name)
-        yield Temperature(np.where(of, T.values[:, 0] - initial, 0.0)), name
+        yield Temperature(np.where(of, T.values[:, 0] - initial, 0.0)[cards.twin]), name
 
 
 def _centrifugal(values: tuple[float, ...]) -> Callable[[Array], Array]:

@@ -63,6 +63,10 @@ class MeshCards:
         self.node_sets: dict[str, list[Ints]] = {}
         self.element_sets: dict[str, list[Ints]] = {}
         self.surfaces: dict[str, Surface] = {}
+        self.rotation: dict[int, int] = {}  # ids of reference nodes, and of those that are their rotations
+        self.rigid: set[int] = set()  # those of rigid bodies
+        self.masses: list[tuple[Ints, Ints, float]] = []  # ids of elements, rows of nodes, kg
+        self.twin: Ints  # the row of the node of which each is a copy
 
     def node(self, card: Card) -> None:
         """Read *NODE."""
@@ -86,7 +90,7 @@ class MeshCards:
         """Read *ELEMENT."""
         card.check_options(("TYPE", "ELSET"))
         kind = card.option("TYPE").upper()
-        width = {"SPRINGA": 2, "SPRING2": 2, "SPRING1": 1, "MASS": 1}.get(kind)
+        width = {"SPRINGA": 2, "SPRING2": 2, "SPRING1": 1, "MASS": 1, "DCOUP3D": 1}.get(kind)
         if width is None and kind not in ELEMENT_TYPES:
             solids = ", ".join(ELEMENT_TYPES)
             card.wrong(f"element {kind} is not supported.{nearest(kind, ELEMENT_TYPES)} There are {solids}")
@@ -102,9 +106,8 @@ class MeshCards:
         """Read *NSET."""
         card.check_options(("NSET", "GENERATE", "ELSET"))
         if "ELSET" in card.options:
-            members = self.elements_of(card.option("ELSET"), card)
-            found = [c.nodes[np.isin(c.ids, members)].ravel() for c in self.cells]
-            self.node_sets.setdefault(card.option("NSET").upper(), []).append(np.concatenate(found))
+            found = self.nodes_of_elements(self.elements_of(card.option("ELSET"), card))
+            self.node_sets.setdefault(card.option("NSET").upper(), []).append(found)
         else:
             self._add(card, self.node_sets, "NSET")
 
@@ -161,6 +164,41 @@ class MeshCards:
         """Return the ids of elements that a number or the name of a set means."""
         return np.array([int(word)]) if word.isdigit() else self.members(word, self.element_sets, at, "ELSET")
 
+    def nodes_of_elements(self, members: Ints) -> Ints:
+        """Return the ids of the nodes of solids."""
+        found = [c.nodes[np.isin(c.ids, members)].ravel() for c in self.cells]
+        return np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *found]))
+
+    def masses_of(self, name: str | None) -> Array:
+        """Return the masses (n,) in kg at nodes, of all elements or those of a set or number."""
+        masses = np.zeros(len(self.twin))
+        for ids, nodes, mass in self.masses:
+            some = np.isin(ids, ids if name is None else self.elements_in(name))
+            np.add.at(masses, nodes[some], mass)
+        return masses
+
+    def elements_in(self, name: str) -> Ints:
+        """Return the ids of elements that a number or the name of a set means, which is known."""
+        return np.array([int(name)]) if name.isdigit() else np.concatenate(self.element_sets[name])
+
+    def reference(self, card: Card) -> None:
+        """Note the reference node of *RIGID BODY or *COUPLING, and the node of its rotations, or 0."""
+        words = card.option("REFNODE"), card.option("ROTNODE", "0")
+        if not all(word.isdigit() for word in words):
+            card.wrong(f"REF NODE and ROT NODE are numbers of nodes; got {', '.join(words)}")
+        ref, rotation = map(int, words)
+        self.rotation[ref] = rotation or self.rotation.get(ref, 0)
+        if card.keyword == "RIGIDBODY":
+            self.rigid.add(ref)
+
+    def _rotations(self, ids: Ints, points: Array) -> tuple[Ints, Array]:
+        """Return ids and places of all nodes, with further ones where reference nodes have no ROT NODE."""
+        new = np.array([ref for ref, rotation in self.rotation.items() if not rotation], dtype=np.int64)
+        at = rows_of_ids(ids, new)
+        more = ids.max() + 1 + np.arange(len(new))
+        self.rotation |= dict(zip(new.tolist(), more.tolist(), strict=True))
+        return np.append(ids, more), np.vstack([points, points[at]])
+
     def mesh(self, source: str) -> Mesh:
         """Return the mesh with a part for each set; solids alone are its elements."""
         if not self.node_cards or not self.cells:
@@ -169,7 +207,7 @@ class MeshCards:
         ids = np.concatenate([c[0] for c in self.node_cards])
         points = np.concatenate([c[1] for c in self.node_cards])
         ids, last = _last(ids)
-        points = points[last]
+        ids, points = self._rotations(ids, points[last])
         for found in self.node_sets.values():
             found[:] = [nodes[rows_of_ids(ids, nodes) >= 0] for nodes in found]  # a range may skip nodes
         blocks = []

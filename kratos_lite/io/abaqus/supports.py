@@ -97,6 +97,15 @@ def node_rows(word: str, at: Row | Card, cards: MeshCards, mesh: Mesh) -> Ints:
     return rows
 
 
+def rotation_rows(rows: Ints, cards: MeshCards, mesh: Mesh, row: Row) -> Ints:
+    """Return the nodes whose displacements are the rotations of reference nodes among some nodes."""
+    known = np.array(list(cards.rotation), dtype=np.int64)
+    refs = known[np.isin(known, mesh.node_ids[rows])].tolist()
+    if alone := set(refs) & cards.rigid:
+        row.wrong(f"rotations of the rigid body of node {min(alone)} are directions 1, 2, 3 of its ROT NODE")
+    return mesh.node_rows(np.array([cards.rotation[ref] for ref in refs], dtype=np.int64))
+
+
 def boundary(card: Card, held: Nodal, cards: MeshCards, mesh: Mesh) -> None:
     """Read *BOUNDARY."""
     card.check_options(("OP", "AMPLITUDE", "FIXED"))
@@ -110,12 +119,13 @@ def boundary(card: Card, held: Nodal, cards: MeshCards, mesh: Mesh) -> None:
         first, last = row.integer(1), row.integer(2, row.integer(1))
         if not 1 <= first <= last:
             row.wrong(f"directions {first} to {last}: give the first and the last of 1, 2, 3")
-        if first > 3:
-            if first == 11:
-                row.wrong("temperatures are given by *TEMPERATURE; degree of freedom 11 is not supported")
-            continue  # rotations, which solids do not have
-        axes = slice(first - 1, min(last, 3))
-        held.put(rows, axes, row.number(3, 0.0), card.options.get("AMPLITUDE", "").upper())
+        if first == 11:
+            row.wrong("temperatures are given by *TEMPERATURE; degree of freedom 11 is not supported")
+        value, name = row.number(3, 0.0), card.options.get("AMPLITUDE", "").upper()
+        held.put(rows, slice(first - 1, min(last, 3)), value, name)
+        if last > 3:  # rotations, which solids do not have
+            turned = rotation_rows(rows, cards, mesh, row)
+            held.put(turned, slice(max(first, 4) - 4, min(last, 6) - 3), value, name)
 
 
 def equations(card: Card, cards: MeshCards, mesh: Mesh) -> list[Equation]:
@@ -159,18 +169,3 @@ def apply(model: Model, held: Nodal, axes: Axes, series: dict[str, TimeSeries]) 
                     continue
                 for value in np.unique(values).tolist():
                     model.fix(some[values == value], letter, scaled(series[name], value), local=frame)
-
-
-def constrain(model: Model, rows: list[Equation], axes: Axes) -> None:
-    """Add equations; those of as many terms are one call."""
-    mesh, by_size = model.mesh, dict[int, list[tuple[Ints, Array]]]()
-    for nodes, directions, factors, _ in rows:
-        weights = factors[:, None] * axes.directions(mesh, nodes)[range(len(nodes)), directions]
-        term, axis = np.nonzero(np.abs(weights) > 1e-12 * np.abs(weights).max())
-        dofs, w = 3 * nodes[term] + axis, weights[term, axis]
-        first = int(np.argmax(np.abs(w * (term == 0))))
-        order = np.r_[first, np.delete(np.arange(len(dofs)), first)]
-        by_size.setdefault(len(dofs), []).append((dofs[order], w[order]))
-    for found in by_size.values():
-        dofs, w = np.array([d for d, _ in found]), np.array([x for _, x in found])
-        model.constrain(dofs[:, 0], dofs[:, 1:], weights=-w[:, 1:] / w[:, :1])

@@ -112,7 +112,7 @@ WRONG = {  # what is added to the cube, and the message, which begins with the l
     "*CONTACT PAIR, INTERACTION=A\n" + STEP: "*CONTACTPAIR: contact is not supported",
     "*STEP\n*STATIC\n*CLOAD\n99,1,1.\n*END STEP\n": "3: there is no node 99",
     "*STEP\n*STATIC\n*CLOAD\nTOPP,1,1.\n*END STEP\n": "3: there is no NSET 'TOPP'. Did you mean TOP",
-    "*STEP\n*STATIC\n*CLOAD\nTOP,7,1.\n*END STEP\n": "3: a force on solids has direction 1, 2 or 3; got 7",
+    "*STEP\n*STATIC\n*CLOAD\nTOP,7,1.\n*END STEP\n": "3: a force on solids has direction 1, 2 or 3, on",
     "*STEP\n*STATIC\n*DLOAD\nEALL,P7,1.\n*END STEP\n": "3: a face is P1, P2, … P6; got 'P7'",
     "*STEP\n*STATIC\n*DLOAD\nEALL,BX,1.\n*END STEP\n": "3: a face is P1",
     "*CLOAD\nTOP,1,1.\n" + STEP: "0: *CLOAD: it belongs between *STEP and *END STEP",

@@ -1,0 +1,367 @@
+"""What connects the nodes of a deck: rigid bodies, couplings, cuts, equations, ties, springs and masses.
+
+All but ties are equations E u = 0, also of nodes that no element uses: reference nodes, and nodes whose
+displacements are the rotations of these.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kratos_lite.analysis.model import Model
+from kratos_lite.assembly.sparsity_pattern import dofs_of
+from kratos_lite.elements.surface import area_vectors, face_rule
+from kratos_lite.elements.tables import tabulate
+from kratos_lite.errors import ModelError
+from kratos_lite.io.abaqus.cards import Card, Row
+from kratos_lite.io.abaqus.loads import LoadCards, with_faces
+from kratos_lite.io.abaqus.mesh import FINITE, Cells, MeshCards
+from kratos_lite.io.abaqus.supports import Axes, equations, node_rows
+from kratos_lite.mesh import Block, Mesh
+from kratos_lite.mesh.hanging import is_corner
+from kratos_lite.mesh.join import split
+from kratos_lite.model.attachments import AttachedMatrix
+from kratos_lite.model.ties import constraints_of
+from kratos_lite.solvers.constraints import independent_rows, rigid_modes
+from kratos_lite.typing import Array, Csr, Ints, Mask
+
+if TYPE_CHECKING:
+    from kratos_lite.mesh.refined_mesh import RefinedMesh
+
+
+HELD, CORNER, MIDDLE = 1.0, 0.3, 0.1
+"""What equations count from which reference nodes follow: of supported, corner and other nodes."""
+
+
+class Connections:
+    """Reads the cards that connect nodes."""
+
+    def __init__(self, cards: MeshCards, mesh: Mesh, cuts: Sequence[Card]) -> None:
+        self.cards, self.mesh = cards, mesh
+        self.rows = list[tuple[Ints, Array]]()  # dofs (m, k) and weights of equations Σ weights u[dofs] = 0
+        self.ties = list[tuple[Ints, Ints, float | None]]()
+        self.springs = list[tuple[Card, Ints, Array, float]]()  # dofs (m, k), directions (m, k), N/m
+        self.turning = list[tuple[Ints, Card]]()  # rotations (3,) of rigid parts
+        cards.twin = np.arange(mesh.n_nodes)
+        self._coupling: tuple[int, Card] | None = None
+        for card in cuts:
+            self._cut(card)
+
+    # ---- cards -------------------------------------------------------------------------------------------
+
+    def rigidbody(self, card: Card) -> None:
+        """Read *RIGID BODY."""
+        card.check_options(("NSET", "ELSET", "REFNODE", "ROTNODE"))
+        if "NSET" in card.options:
+            nodes = node_rows(card.option("NSET"), card, self.cards, self.mesh)
+        else:
+            elements = self.cards.elements_of(card.option("ELSET"), card)
+            nodes = self.mesh.node_rows(self.cards.nodes_of_elements(elements))
+        self._rigid(np.unique(nodes), self._node(card, "REFNODE"), [0, 1, 2], card)
+
+    def coupling(self, card: Card) -> None:
+        """Read *COUPLING; the card that follows says its kind."""
+        card.check_options(("REFNODE", "SURFACE", "CONSTRAINTNAME"))
+        self._coupling = self._node(card, "REFNODE"), card
+
+    def kinematic(self, card: Card) -> None:
+        """Read *KINEMATIC: nodes follow their reference node along some axes."""
+        ref, of, axes = self._coupled(card)
+        self._rigid(
+            self._surface_nodes(of.option("SURFACE"), of), ref, [axis for axis in axes if axis < 3], card
+        )
+
+    def distributing(self, card: Card) -> None:
+        """Read *DISTRIBUTING: a reference node moves as the nodes of faces do in the mean, by their areas."""
+        # Σ w |u - u_ref - θ × (x - x_ref)|² is least, so that forces and moments go to nodes as in CalculiX.
+        ref, of, axes = self._coupled(card)
+        w, X = np.zeros(self.mesh.n_nodes), self.mesh.points
+        for block in self._faces(of.option("SURFACE"), of):
+            rule = face_rule(block.known_shape)
+            dA = np.linalg.norm(area_vectors(block.known_shape, X[block.nodes], rule), axis=-1)
+            np.add.at(w, block.nodes, dA @ tabulate(block.known_shape, rule)[0])
+        nodes, some = np.flatnonzero(w), np.unique([0, 1, 2, *axes])
+        R = rigid_modes(X[nodes], X[ref])
+        B = R.T * np.repeat(w[nodes], 3)
+        self._follow(
+            self._six(ref)[some], np.tile(dofs_of(nodes), (len(some), 1)), (np.linalg.pinv(B @ R) @ B)[some]
+        )
+
+    def distributingcoupling(self, card: Card) -> None:
+        """Read *DISTRIBUTING COUPLING: a reference node follows nodes in the mean, by their weights."""
+        card.check_options(("ELSET",))
+        each = [(node_rows(r.text(0), r, self.cards, self.mesh), r.number(1, 1.0)) for r in card.rows()]
+        nodes = np.concatenate([rows for rows, _ in each])
+        w = np.concatenate([np.full(len(rows), weight) for rows, weight in each])
+        for cells in self._others(card, ("DCOUP3D",)):
+            for ref in dofs_of(self.mesh.node_rows(cells.nodes[:, 0])).reshape(-1, 3):
+                self._follow(ref, 3 * nodes + np.arange(3)[:, None], np.tile(w / w.sum(), (3, 1)))
+
+    def tie(self, card: Card) -> None:
+        """Read *TIE."""
+        card.check_options(("NAME", "POSITIONTOLERANCE", "ADJUST"))
+        word = card.options.get("POSITIONTOLERANCE", "")
+        tolerance = Row(card.place, (word,)).number(0) if word else None
+        for row in card.rows():
+            slave, master = (self._surface_nodes(row.text(i), row) for i in (0, 1))
+            self.ties.append((master, slave, tolerance))
+
+    def spring(self, card: Card) -> None:
+        """Read *SPRING: a line of directions, which SPRINGA lacks, and a stiffness."""
+        card.check_options(("ELSET",))
+        rows = [row for row in card.rows() if any(row.fields)]
+        for cells in self._others(card, ("SPRINGA", "SPRING1", "SPRING2")):
+            nodes = self.mesh.node_rows(cells.nodes.ravel()).reshape(cells.nodes.shape)
+            if len(rows) != 1 + (cells.kind != "SPRINGA"):
+                card.wrong(
+                    "a spring has a line of directions, which SPRINGA lacks, and a line with one stiffness"
+                )
+            if cells.kind == "SPRINGA":
+                way = self.mesh.points[nodes[:, 1]] - self.mesh.points[nodes[:, 0]]
+                way /= np.linalg.norm(way, axis=1)[:, None]
+                dofs, b = dofs_of(nodes.ravel()).reshape(-1, 6), np.hstack([way, -way])
+            else:
+                axes = [rows[0].integer(i) - 1 for i in range(1 + (cells.kind == "SPRING2"))]
+                if not set(axes) <= {0, 1, 2}:
+                    rows[0].wrong("a spring has directions 1, 2, 3 of solids")
+                dofs, b = 3 * nodes + axes, np.tile([1.0, -1.0][: len(axes)], (len(nodes), 1))
+            self.springs.append((card, np.asarray(dofs), b, rows[-1].number(0)))
+
+    def mass(self, card: Card) -> None:
+        """Read *MASS."""
+        card.check_options(("ELSET",))
+        line = next(card.rows(), None) or card.wrong("a mass is needed on its data line")
+        for cells in self._others(card, ("MASS",)):
+            self.cards.masses.append((cells.ids, self.mesh.node_rows(cells.nodes[:, 0]), line.number(0)))
+
+    def equation(self, card: Card, axes: Axes) -> None:
+        """Read *EQUATION, along local axes."""
+        for nodes, directions, factors, _ in equations(card, self.cards, self.mesh):
+            w = factors[:, None] * axes.directions(self.mesh, nodes)[range(len(nodes)), directions]
+            order = np.argsort(-np.abs(w[0]), kind="stable")  # the first has the largest weight of its node
+            dofs = 3 * nodes[:, None] + np.arange(3)
+            dofs[0], w[0] = dofs[0, order], w[0, order]
+            self.rows.append((dofs.reshape(1, -1), w.reshape(1, -1)))
+
+    # ---- what they say -----------------------------------------------------------------------------------
+
+    def _node(self, card: Card, option: str) -> int:
+        return int(node_rows(card.option(option), card, self.cards, self.mesh)[0])
+
+    def _six(self, ref: int) -> Ints:
+        """Return the degrees of freedom (6,) of a reference node, those of its rotations last."""
+        rotation = self.cards.rotation[int(self.mesh.node_ids[ref])]
+        return dofs_of(np.append(ref, self.mesh.node_rows(np.array([rotation]))))
+
+    def _coupled(self, card: Card) -> tuple[int, Card, list[int]]:
+        """Return the reference node of the coupling that a card belongs to, its card, and its axes from 0."""
+        if self._coupling is None:
+            card.wrong("it belongs after *COUPLING")
+        card.check_options(())
+        axes = [
+            i - 1 for row in card.rows() for i in range(row.integer(0), row.integer(1, row.integer(0)) + 1)
+        ]
+        if not axes or not set(axes) <= set(range(6)):
+            card.wrong("its lines have the first and the last degree of freedom, of 1 … 6")
+        return *self._coupling, axes
+
+    def _others(self, card: Card, kinds: Sequence[str]) -> list[Cells]:
+        """Return the elements of a card, which are no solids."""
+        ids = self.cards.elements_of(card.option("ELSET"), card)
+        found = [(c, np.isin(c.ids, ids)) for c in self.cards.others if c.kind in kinds]
+        if sum(some.sum() for _, some in found) < len(ids):
+            card.wrong(f"{card.option('ELSET')} has other elements than {', '.join(kinds)}")
+        return [replace(c, ids=c.ids[some], nodes=c.nodes[some]) for c, some in found if some.any()]
+
+    def _faces(self, name: str, at: Row | Card) -> list[Block]:
+        """Return the faces of a surface."""
+        faces = LoadCards(self.cards, self.mesh).surface(name, at)
+        return list(with_faces(self.mesh, faces, "SurfaceCondition")[0].conditions)
+
+    def _surface_nodes(self, name: str, at: Row | Card) -> Ints:
+        surface = self.cards.surfaces.get(name.upper())
+        if surface is not None and surface.nodes is not None:
+            return np.unique(self.mesh.node_rows(surface.nodes))
+        return np.unique(np.concatenate([block.nodes.ravel() for block in self._faces(name, at)]))
+
+    def _follow(self, dofs: Ints, others: Ints, weights: Array) -> None:
+        """Let u[dofs] = Σ weights u[others]."""
+        self.rows.append((np.column_stack([dofs, others]), np.column_stack([np.ones(len(dofs)), -weights])))
+
+    def _rigid(self, nodes: Ints, ref: int, axes: list[int], card: Card) -> None:
+        """Let nodes follow a reference node along some axes, u = u_ref + θ × (x - x_ref)."""
+        six = self._six(ref)
+        nodes = nodes[~np.isin(nodes, six // 3)]
+        some = np.isin(np.tile(range(3), len(nodes)), axes)
+        R = rigid_modes(self.mesh.points[nodes], self.mesh.points[ref])[some]
+        self._follow(dofs_of(nodes)[some], np.tile(six, (len(R), 1)), R)
+        self.turning.append((six[3:], card))
+
+    def _cut(self, card: Card) -> None:
+        """Cut the mesh for *PRE-TENSION SECTION: the way between both sides is the displacement of a node."""
+        card.check_options(("SURFACE", "NODE", "NAME"))
+        mesh, blocks = self.mesh, self._faces(card.option("SURFACE"), card)
+        rows = np.unique(np.concatenate([block.nodes.ravel() for block in blocks]))
+        areas = [area_vectors(b.known_shape, mesh.points[b.nodes]).sum(axis=(0, 1)) for b in blocks]
+        n = np.sum(areas, axis=0)
+        new, copies = split(mesh, rows), mesh.n_nodes + np.arange(len(rows))
+        order = np.arange(new.n_nodes)
+        if n[np.abs(n).argmax()] > 0:  # as in CalculiX the elements of the surface get the copies
+            order[rows], order[copies] = copies, rows
+        cells = [replace(block, nodes=order[block.nodes].astype(np.int32)) for block in new.blocks]
+        parts = {name: part for name, part in new.parts.items() if name not in ("cut-", "cut+")}
+        self.mesh, self.cards.twin = new.replace(blocks=cells, parts=parts), np.append(self.cards.twin, rows)
+        line = next(card.rows(), None)
+        n = n if line is None else np.array(line.numbers(3))
+        others = np.column_stack([dofs_of(rows), np.full(3 * len(rows), 3 * self._node(card, "NODE"))])
+        along = np.tile(n / np.linalg.norm(n), len(rows))
+        self._follow(dofs_of(copies), others, np.column_stack([np.ones(len(others)), along]))
+
+    # ---- a model -----------------------------------------------------------------------------------------
+
+    def connect(self, model: Model) -> None:
+        """Connect the nodes of a model that has its supports."""
+        from scipy.sparse import csr_array, diags_array
+
+        if not (self.rows or self.ties or self.springs or self.cards.masses):
+            return
+        fixed, size = model.supports.fixed.ravel(), model.mesh.points.size
+        large = any(block.name in FINITE.values() for block in model.mesh.blocks)
+        moves = model.supports.values.ravel() != 0
+        moves = np.any([moves, *(mask.ravel() for _, mask in model.supports.motions)], axis=0)
+        for rotations, card in self.turning if large else ():
+            if not fixed[rotations].all() or moves[rotations].any():
+                card.wrong("with NLGEOM its rotation must be held at 0, as large rotations are not supported")
+        references = model.references = self._constrain(model, fixed)
+        for master, slave, tolerance in self.ties:
+            model.tie(master, slave, tolerance=tolerance)
+        if self.ties:
+            model.notes.append("*TIE holds in the mean over faces (mortar), in CalculiX node by node")
+        loose = ~np.repeat(self.mesh.used_nodes(), 3) & (~fixed | moves)
+        K: Any = csr_array((size, size))
+        real = diags_array(1.0 * ~references.held)
+        for card, dofs, b, k in self.springs:
+            if large and (~fixed[dofs] & (np.abs(b) < 1 - 1e-9)).any():
+                card.wrong("with NLGEOM ends of a spring must move along its line alone")
+            start = np.arange(len(b) + 1) * b.shape[1]
+            A = csr_array((b.ravel(), dofs.ravel(), start), shape=(len(b), size)) @ references.P
+            if abs(A[:, np.flatnonzero(loose)]).sum() > 0:
+                card.wrong("a spring ends at a node of no element that nothing holds, or that is moved")
+            K = K + k * (real @ A.T @ A @ real)
+        masses = diags_array(np.repeat(self.cards.masses_of(None), 3))
+        M = references.P.T @ masses @ references.P @ real
+        for made in (Springs(csr_array(K)), Masses(csr_array(M))):
+            if abs(made.A).sum() > 0:
+                model.add(made)
+
+    def _constrain(self, model: Model, fixed: Mask) -> References:
+        """Add the equations without free reference nodes, which follow what equations choose for them."""
+        from scipy.sparse import csr_array, diags_array
+
+        mesh, size = self.mesh, len(fixed)
+        counts = np.concatenate([[0], *(np.full(len(c), c.shape[1]) for c, _ in self.rows)])
+        dofs, w = (np.concatenate([[], *(row[i].ravel() for row in self.rows)]) for i in (0, 1))
+        E = csr_array((w, dofs.astype(np.int64), np.cumsum(counts)), shape=(len(counts) - 1, size))
+        first = E.indices[E.indptr[:-1]]
+        E.sum_duplicates()
+        E.eliminate_zeros()
+        used = np.repeat(mesh.used_nodes(), 3)
+        gone = ~used & ~fixed & (abs(E).sum(axis=0) > 0)
+        q, stays = np.flatnonzero(gone), diags_array(1.0 * ~gone)
+        corner = np.where(is_corner(mesh.blocks, mesh.n_nodes), CORNER, MIDDLE)
+        S = _solved(E[:, q], np.where(fixed, HELD, np.repeat(corner, 3))[first], model.supports.name, q)
+        P = stays + csr_array(diags_array(1.0 * gone))[:, q] @ S @ E @ stays
+        left, sizes = csr_array(E @ P), abs(E).max(axis=1).toarray().ravel()
+        keep = (np.diff(S.tocsc().indptr) == 0) & (abs(left).max(axis=1).toarray().ravel() > 1e-12 * sizes)
+        if keep.any():
+            _depend(model, left[keep], first[keep])
+        return References(csr_array(P), ~used & fixed, np.unique(E.indices // 3))
+
+
+@dataclass(frozen=True, eq=False)
+class References:
+    """Reference nodes, which follow others: all displacements are P u."""
+
+    P: Csr  # (3n, 3n)
+    held: Mask  # (3n,), what is prescribed at nodes that no element uses
+    nodes: Ints  # of equations
+
+    def carried(self, forces: Array) -> Array:
+        """Return forces (n, 3) with those on reference nodes passed on to what they follow."""
+        return np.where(self.held, 0.0, self.P.T @ forces.ravel()).reshape(-1, 3)
+
+    def displacements(self, model: Model, u: Array, time: float = 0.0) -> Array:
+        """Return displacements (n, 3) at a time with those of the reference nodes."""
+        values = model.supports.values.copy()
+        for function, mask in model.supports.motions:
+            values[mask] = function(time)
+        return np.asarray(self.P @ np.where(self.held, values.ravel(), u.ravel())).reshape(-1, 3)
+
+
+def _solved(B: Csr, worth: Array, name: Callable[[int], str], q: Ints) -> Csr:
+    """Return S (k, m) with which q = S r solves k of B q + r = 0 (m, k), chosen by what they are worth."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    label, some = connected_components(abs(B).T @ abs(B))[1], np.flatnonzero(np.diff(B.indptr))
+    of_row = label[B.indices[B.indptr[some]]]
+    rows, columns, entries = (list[Array]() for _ in range(3))
+    for i in np.unique(label):
+        r, c = some[of_row == i], np.flatnonzero(label == i)
+        A = B[r][:, c].toarray()
+        sizes = np.linalg.norm(A, axis=0)
+        chosen = independent_rows(A / sizes * worth[r, None])
+        if len(chosen) < len(c):
+            at = name(int(q[c[0]]))
+            raise ModelError(f"equations leave {at} free, a reference node; hold its rotations")
+        rows.append(np.repeat(c, len(c)))
+        columns.append(np.tile(r[chosen], len(c)))
+        entries.append(-np.linalg.inv(A[chosen]).ravel())
+    places = tuple(np.concatenate([[], *parts]).astype(np.int64) for parts in (rows, columns))
+    return coo_array((np.concatenate([[], *entries]), places), shape=B.shape[::-1]).tocsr()
+
+
+def _depend(model: Model, E: Csr, first: Ints) -> None:
+    """Add equations, of which that depends on the others which they say first, unless its weight is small."""
+    from scipy.sparse import csr_array, diags_array
+
+    def at(dofs: Ints) -> Csr:
+        return csr_array((np.ones(len(dofs)), dofs, np.arange(len(dofs) + 1)), shape=E.shape)
+
+    free = diags_array(np.where(model.supports.fixed.ravel(), 1e-3, 1.0))
+    first = np.asarray(((abs(E) + 9 * abs(E).multiply(at(first))) @ free).argmax(axis=1)).ravel()
+    rows = at(first) - diags_array(1 / E.multiply(at(first)).sum(axis=1)) @ E
+    model.supports.add_constraints(constraints_of(first, csr_array(rows)))
+
+
+class Springs(AttachedMatrix):
+    """Springs between nodes of a deck, by their matrix (3n, 3n)."""
+
+    what = "a spring of a deck"
+
+    def __init__(self, A: Csr) -> None:
+        self.A = A
+
+    def matrix(self, mesh: Mesh) -> Csr:
+        """Return the matrix (3n, 3n)."""
+        return self.A
+
+    def _weights(self, vectors: Array) -> Array:
+        raise NotImplementedError
+
+    def refined(self, finer: RefinedMesh, *points: object) -> AttachedMatrix:
+        """Raise ModelError."""
+        raise ModelError("springs and masses of a deck are of its nodes, and have none on a finer mesh")
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__} of {len(np.unique(self.A.nonzero()[0] // 3))} nodes"
+
+
+class Masses(Springs):
+    """Masses at nodes of a deck."""
+
+    what, is_mass = "a mass of a deck", True
