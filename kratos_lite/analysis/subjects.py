@@ -13,11 +13,13 @@ from kratos_lite.analysis.peak import peak
 from kratos_lite.analysis.state import ModelInTime, State
 from kratos_lite.errors import InputError, nearest
 from kratos_lite.mesh import Mesh
+from kratos_lite.model.attachments import MARKS, AttachedMatrix
 from kratos_lite.model.local_axes import LocalAxes
 from kratos_lite.model.structure import Structure
 from kratos_lite.tabular import unit_name
 from kratos_lite.typing import Array, Numbers
 from kratos_lite.validation import finite, number, short
+from kratos_lite.view.marks import Marks
 from kratos_lite.view.scene import Options, Subject, Values, factor_of
 
 DEFAULT = "von_mises"  # what colors a result
@@ -124,7 +126,28 @@ def _subject(thing: Any, given: dict[str, Any]) -> Subject:
     u = None if result is None else result.u
     if given["displacement"] is not None:
         u = finite(given["displacement"], "displacement", (mesh.n_nodes, 3))
-    return Subject(mesh, u, _values(result, mesh, u, given))
+    marks = _marks(thing) if isinstance(thing, Structure) else None
+    return Subject(mesh, u, _values(result, mesh, u, given), marks=marks)
+
+
+def _marks(structure: Structure) -> Marks | None:
+    """Return the marks of springs, added masses and remote points; None if there are none."""
+    shown, X = structure.attachments, structure.mesh.points
+    spokes = [np.zeros((0, 2, 3))]
+    for tie in structure.remote_points:
+        nodes = structure.mesh.nodes(tie.where)
+        some = X[nodes[np.linspace(0, len(nodes) - 1, MARKS).round().astype(int)]]
+        spokes.append(np.stack([np.broadcast_to(tie.point, some.shape), some], axis=1))
+    if not shown and len(spokes) == 1:
+        return None
+
+    def lines(chosen: Sequence[AttachedMatrix]) -> Array:
+        return np.concatenate([spokes[0], *(each.drawn(structure.mesh) for each in chosen)])
+
+    springs, masses = ([each for each in shown if each.is_mass == mass] for mass in (False, True))
+    ground, between = ([each for each in springs if (each.to is None) == free] for free in (True, False))
+    marks = lines(ground), spokes[0][:, 0], lines(between), lines(masses)[:, 0], np.concatenate(spokes)
+    return Marks(spokes[0], *marks)
 
 
 def _values(result: Fields | None, mesh: Mesh, u: Array | None, given: dict[str, Any]) -> Values | None:

@@ -20,6 +20,8 @@ from kratos_lite.validation import finite, number, short
 if TYPE_CHECKING:
     from kratos_lite.mesh.refined_mesh import RefinedMesh
 
+MARKS, SHOWN = 9, 0.1
+"""Marks that show what is on faces, nodes that show what follows a remote point; springs, of the size."""
 Place: TypeAlias = "Where | RemotePoint"
 """A part, a point (x, y, z) in m, or a remote point."""
 
@@ -80,6 +82,22 @@ class AttachedMatrix(Attachment):
         A = csr_array(J.T @ bsr_array((W, np.arange(p), np.arange(p + 1)), shape=(p * r, p * r)) @ J)
         A.eliminate_zeros()
         return A
+
+    def drawn(self, mesh: Mesh) -> Array:
+        """Return lines (k, 2, 3) in m: from a point, or some of faces, to another or along the stiffness."""
+        one, other, X = _point_of(self.where), _point_of(self.to), mesh.points
+        size = SHOWN * np.linalg.norm(np.ptp(X[mesh.used_nodes()], axis=0))
+        if one is None:
+            J, vectors = _places(mesh, self.where, self.what)
+            assert vectors is not None
+            some = np.unique(np.linspace(0, len(vectors) - 1, MARKS).round().astype(int))
+            places, ways = (J @ X.ravel()).reshape(-1, 3)[some], vectors[some]
+            return np.stack([places, places + size * ways / np.linalg.norm(ways, axis=1)[:, None]], axis=1)
+        if other is None:
+            way = np.linalg.eigh(self.W[:3, :3])[1][:, -1]
+            away = -1.0 if way @ (one - X.mean(axis=0)) < 0 else 1.0
+            other = one + size * away * way
+        return np.stack([one, other])[None]
 
     @abstractmethod
     def _weights(self, vectors: Array) -> Array:
