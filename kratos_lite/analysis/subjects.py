@@ -13,7 +13,7 @@ from kratos_lite.analysis.peak import peak
 from kratos_lite.analysis.state import ModelInTime, State
 from kratos_lite.errors import InputError, nearest
 from kratos_lite.mesh import Mesh
-from kratos_lite.model.attachments import MARKS, AttachedMatrix
+from kratos_lite.model.attachments import MARKS
 from kratos_lite.model.local_axes import LocalAxes
 from kratos_lite.model.structure import Structure
 from kratos_lite.tabular import unit_name
@@ -132,22 +132,21 @@ def _subject(thing: Any, given: dict[str, Any]) -> Subject:
 
 def _marks(structure: Structure) -> Marks | None:
     """Return the marks of springs, added masses and remote points; None if there are none."""
-    shown, X = structure.attachments, structure.mesh.points
-    spokes = [np.zeros((0, 2, 3))]
-    for tie in structure.remote_points:
-        nodes = structure.mesh.nodes(tie.where)
-        some = X[nodes[np.linspace(0, len(nodes) - 1, MARKS).round().astype(int)]]
-        spokes.append(np.stack([np.broadcast_to(tie.point, some.shape), some], axis=1))
-    if not shown and len(spokes) == 1:
+    shown, mesh, none = structure.attachments, structure.mesh, np.zeros((0, 2, 3))
+    if not shown and not structure.remote_points:
         return None
+    spokes = [none]
+    for point in structure.remote_points:
+        nodes = mesh.nodes(point.where)
+        some = mesh.points[nodes[np.linspace(0, len(nodes) - 1, MARKS).round().astype(int)]]
+        spokes.append(np.stack([np.broadcast_to(point.point, some.shape), some], axis=1))
 
-    def lines(chosen: Sequence[AttachedMatrix]) -> Array:
-        return np.concatenate([spokes[0], *(each.drawn(structure.mesh) for each in chosen)])
+    def lines(mass: bool, inside: bool) -> Array:
+        some = (one.drawn(mesh) for one in shown if one.is_mass == mass and (one.to is not None) == inside)
+        return np.concatenate([none, *some])
 
-    springs, masses = ([each for each in shown if each.is_mass == mass] for mass in (False, True))
-    ground, between = ([each for each in springs if (each.to is None) == free] for free in (True, False))
-    marks = lines(ground), spokes[0][:, 0], lines(between), lines(masses)[:, 0], np.concatenate(spokes)
-    return Marks(spokes[0], *marks)
+    springs = lines(mass=False, inside=False), none[:, 0], lines(mass=False, inside=True)
+    return Marks(none, *springs, lines(mass=True, inside=False)[:, 0], np.concatenate(spokes))
 
 
 def _values(result: Fields | None, mesh: Mesh, u: Array | None, given: dict[str, Any]) -> Values | None:
