@@ -190,8 +190,7 @@ class ElasticSupport(AttachedMatrix):
 class AddedMass(AttachedMatrix):
     """Mass on a point, over faces, or on a remote point; see `Structure.add_mass`."""
 
-    what = "an added mass"
-    is_mass = True
+    what, is_mass = "an added mass", True
 
     def __init__(self, where: Place, mass: float, inertia: ArrayLike | None = None) -> None:
         self.where, self.mass = where, number(mass, "an added mass", above=0, unit="kg")

@@ -27,9 +27,8 @@ def set_apart(document: Document) -> Document:
     for number in {*np.concatenate([block.properties for block in points])} & document.properties.keys():
         block = document.properties[number]
         if wrong := [name for name in block.values if name.startswith("NODAL_")]:
-            problems.add(
-                f"{wrong[0]} of Properties {number} is unknown to {POINT_ELEMENT}: {known}", block.line
-            )
+            text = f"{wrong[0]} of Properties {number} is unknown to {POINT_ELEMENT}: {known}"
+            problems.add(text, block.line)
     for given in document.element_data:
         at = rows_of_ids(ids, given.ids)
         mine = at >= 0
@@ -41,11 +40,8 @@ def set_apart(document: Document) -> Document:
             data.append(given)
     problems.raise_if_any()
     solid = ~np.isin(mesh.element_ids, ids)
-    number_of, solids = np.cumsum(solid) - 1, [b for b in mesh.blocks if b.name != POINT_ELEMENT]
-    parts = {
-        name: replace(part, elements=number_of[part.elements[solid[part.elements]]])
-        for name, part in mesh.parts.items()
-    }
+    row, solids = np.cumsum(solid) - 1, [b for b in mesh.blocks if b.name != POINT_ELEMENT]
+    parts = {n: replace(p, elements=row[p.elements[solid[p.elements]]]) for n, p in mesh.parts.items()}
     attached = [OnNodes(nodes, value, name == MASS) for name, value in values.items() if value.any()]
     made = mesh.replace(blocks=solids, parts=parts)
     return replace(document, mesh=made, element_data=data, attached=attached)
