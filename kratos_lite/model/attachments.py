@@ -227,6 +227,11 @@ class OnNodes(AttachedMatrix):
         dofs, values = dofs_of(self.nodes), np.einsum("kii->ki", self.W).ravel()
         return coo_array((values, (dofs, dofs)), shape=(mesh.points.size,) * 2).tocsr()
 
+    def __repr__(self) -> str:
+        x, y, z = self.W.sum(axis=0).diagonal()
+        total = f"mass {x:g} kg" if self.is_mass else f"stiffness ({x:g}, {y:g}, {z:g}) N/m"
+        return f"{total} on {len(self.nodes)} nodes in all"
+
     def _points(self, mesh: Mesh) -> Array:
         return mesh.points[self.nodes]
 

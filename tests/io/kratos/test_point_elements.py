@@ -75,7 +75,8 @@ def test_springs_and_masses_on_nodes_carry_a_solid_and_are_written_again(tmp_pat
     below = result.displacement([0, 1, 2, 3])[:, 2]
     assert np.abs(result.reaction([0, 1, 2, 3])[:, 2] + 3e4 * below).max() < 1e-6
     assert abs(below.sum() + 13500.0 / 3e4) < 1e-9
-    assert "OnNodes" in str(model)
+    assert "stiffness (40000, 80000, 120000) N/m on 4 nodes in all" in str(model)
+    assert "mass 150 kg on 4 nodes in all" in str(model)
     path = tmp_path / "again.mdpa"
     kl.write(path, model)
     again = kl.read(path)
