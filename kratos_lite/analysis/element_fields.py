@@ -451,5 +451,5 @@ class ElementFields:
         """The energy norm √(∫ ε:C:ε dV) in √J of the strains, thermal ones among them."""
         cold = [replace(group, heating=None) for group in self.groups]
         hot = any(group.heating is not None for group in self.groups)
-        energy = totals(self.mesh.points, cold, self._strained)[0] if hot else self.energy()
+        energy = totals(self.mesh.points, cold, self._strained)[0] if hot else self._totals[0]
         return float(np.sqrt(2 * energy))

@@ -39,7 +39,7 @@ FIRST = 20
 """Modes that are looked for first."""
 SINGULAR = 1e-8
 """Of ω² - Ω² beside ω², as frequencies of modes are known to 1e-9."""
-UNDAMPED = "a frequency is that of an undamped mode; give damping, or leave it out"
+UNDAMPED = "the frequency {:g} rad/s is that of an undamped mode; give damping, or leave it out"
 TOLERANCE = 1e-12
 """Relative residual of the static solutions."""
 
@@ -127,16 +127,17 @@ class HarmonicResponse(Tabular):
         return ElementFields(self.mesh, self.groups, np.ascontiguousarray(u))
 
     def table(self) -> list[tuple[str, str]]:
-        """Return the rows of a summary: frequencies, method, and the largest amplitude of all nodes."""
-        every = map(self.displacement, range(len(self.frequencies)))
-        size = [float(np.linalg.norm(u, axis=1).max()) for u in every]
+        """Return the rows of a summary: frequencies, method, and about the largest amplitude."""
+        nodes = np.unique(np.linalg.norm(self.basis, axis=2).argmax(axis=1))  # where each part is largest
+        size = np.linalg.norm(np.tensordot(self.factors, self.basis[:, nodes], axes=1), axis=2).max(axis=1)
         top = int(np.argmax(size))
+        largest = np.linalg.norm(self.displacement(top), axis=1).max()
         method = f"{len(self.natural)} modes with static correction" if len(self.natural) else "direct"
         low, high = self.frequencies.min(), self.frequencies.max()
         return [
             ("frequencies", f"{len(size)}, {low:g} … {high:g} rad/s"),
             ("method", method),
-            ("largest amplitude", f"{size[top]:.6e} m at {self.frequencies[top]:g} rad/s"),
+            ("largest amplitude", f"{largest:.6e} m at {self.frequencies[top]:g} rad/s"),
         ]
 
     def columns(self, point: ArrayLike) -> dict[str, Array]:
@@ -191,9 +192,11 @@ def harmonic_response(
 ) -> HarmonicResponse:
     """Return the harmonic response of a model; see `Model.harmonic`."""
     omega, zeta = np.atleast_1d(finite(frequencies, "frequencies")), finite(damping, "damping")
-    if omega.ndim != 1 or not omega.size or (omega < 0).any() or (zeta < 0).any():
-        given = f"{short(frequencies)} and {short(damping)}"
-        raise InputError(f"frequencies (f,) in rad/s and damping are ≥ 0; got {given}")
+    if omega.ndim != 1 or not omega.size or (omega < 0).any():
+        raise InputError(f"frequencies (f,) in rad/s are ≥ 0; got {short(frequencies)}")
+    if not ((zeta >= 0) & (zeta < 1)).all():
+        text = "damping is a ratio of the critical one, ≥ 0 and < 1, such as 0.02 for 2 per cent"
+        raise InputError(f"{text}; got {short(damping)}")
     eta, by_modes = number(hysteretic, "hysteretic", least=0), choice(method, "method", METHODS) == "modes"
     if not by_modes and (zeta.any() or modes is not None):
         raise InputError("damping of modes and their number belong to method='modes'; take rayleigh=…")
@@ -206,7 +209,9 @@ def harmonic_response(
         raise ModelError(f"the frequency 0 needs supports that hold the body; {e.free_motions.described()}")
     alpha, beta = e.rayleigh
     f, c = _forces(model, e, loads), e.prescribed(0.0)
-    vectors = np.stack([f.real, f.imag, e.K @ c, e.mass.times(c)])
+    if by_modes and c.any():  # supports move all of the body statically: what its inertia adds is smoother
+        c = e.system.equations.solve(0 * c, TOLERANCE, progress, c).x
+    vectors = np.stack([f.real, f.imag, 0 * c if by_modes else e.K @ c, e.mass.times(c)])
     k, m = 1 + 1j * (eta + omega * beta), omega * (1j * alpha - omega)  # factors of K and M
     factors = np.stack([1 + 0 * k, 1j + 0 * k, -k, -m], axis=1)  # of the vectors
     here = vectors.any(axis=1)
@@ -216,20 +221,26 @@ def harmonic_response(
     return HarmonicResponse(model.mesh, e.groups, omega, full, np.hstack([made, ones]), natural)
 
 
-def _directly(e: EquationsOfMotion, R: Array, s: Complexes, factors: Any, _: Any) -> tuple[Any, Any, Array]:
+def _directly(
+    e: EquationsOfMotion, R: Array, s: Complexes, factors: Any, given: Any
+) -> tuple[Any, Any, Array]:
     """Return the displacements (f, n, 3) at each frequency, by a factorization each."""
-    from scipy.sparse.linalg import spsolve
+    from scipy.sparse.linalg import splu
 
-    constraints, n = e.system.constraint_map, len(e.system.constraint_map.free)
+    constraints, n, omega = e.system.constraint_map, len(e.system.constraint_map.free), given[0]
     if n > FALLBACK_LIMIT:
         raise InputError(f"method='direct' factorizes up to {FALLBACK_LIMIT} unknowns; got {n}; take modes")
     K, M = (constraints.reduce_matrix(A).tocsc() for A in (e.K.scipy().tocsr(), e.mass.matrix()))
     r, out = np.stack([constraints.reduce(vector) for vector in R] or [np.zeros(n)]), []
     s = s if len(R) else np.zeros((len(s), 1), dtype=complex)
-    for k, m, some in zip(*factors, s, strict=True):
-        q = spsolve(k * K + m * M, some @ r)
-        if not np.isfinite(q).all():
-            raise SolveError(UNDAMPED)
+    for k, m, some, rate in zip(*factors, s, omega, strict=True):
+        try:
+            A = splu((k * K + m * M).astype(complex))
+        except RuntimeError:  # exactly singular
+            raise SolveError(UNDAMPED.format(rate)) from None
+        q = A.solve(some @ r)
+        if np.linalg.norm(q) < SINGULAR * abs(m) * np.linalg.norm(A.solve(M @ q)):
+            raise SolveError(UNDAMPED.format(rate))
         u = constraints.transform(q)
         out.append(e.system.scatter(u.real) + 1j * e.system.scatter(u.imag))
     return np.array(out), np.eye(len(s)), np.zeros(0)
@@ -248,8 +259,8 @@ def _by_modes(
     loads = np.stack([e.system.scatter(r) for r in R]) if len(R) else np.zeros((0, *shapes.shape[1:]))
     P = np.einsum("lni,jni->lj", loads, shapes)
     denominators = k[:, None] * natural**2 + m[:, None] + 2j * zeta * natural * omega[:, None]
-    if (np.abs(denominators) < SINGULAR * natural**2).any():
-        raise SolveError(UNDAMPED)
+    if (singular := np.abs(denominators) < SINGULAR * natural**2).any():
+        raise SolveError(UNDAMPED.format(omega[singular.any(axis=1)][0]))
     zero = np.zeros(e.size)
     statics = [e.system.equations.solve(r, TOLERANCE, e.system.progress, zero).x for r in R]
     rest = np.array([e.system.scatter(u) for u in statics]).reshape(-1, *shapes.shape[1:])

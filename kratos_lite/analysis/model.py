@@ -366,7 +366,7 @@ class Model(Structure):
         Parameters
         ----------
         frequencies : Ω (f,) in rad/s.
-        damping : ratio ζ of all modes, or of each, (modes,); by modes alone.
+        damping : ratio ζ < 1 of all modes, or of each, (modes,), 0.02 for 2 per cent; by modes alone.
         rayleigh : α in 1/s and β in s of the damping α M + β K.
         hysteretic : loss factor η of the stiffness (1 + iη) K.
         loads : each alone or with a complex factor, ``(load, 1j)``; those of the model if not given.
@@ -386,7 +386,7 @@ class Model(Structure):
             If the model is broken, has no mass, is not linear or has a motion; a load or support is no
             amplitude; its supports leave rigid motions free, by modes; or it is too large to factorize.
         SolveError
-            If a frequency is that of an undamped mode, or the modes do not converge.
+            If a frequency is that of an undamped mode, which it names, or the modes do not converge.
 
         Examples
         --------

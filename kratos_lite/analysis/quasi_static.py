@@ -15,6 +15,7 @@ from kratos_lite.analysis.report import Report, StepReport
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.state import ModelInTime, State, check_state
 from kratos_lite.assembly.block_matrix import BlockMatrix
+from kratos_lite.assembly.gauss_point_fields import internal_load
 from kratos_lite.assembly.nonlinear_assembly import NonlinearAssembly, States, named, unnamed
 from kratos_lite.errors import InputError, ModelError, SolveError
 from kratos_lite.mesh.mesh import place_of
@@ -308,6 +309,10 @@ class QuasiStaticAnalysis(ModelInTime):
             assert K is not None
             first, r = len(residuals) == 1, force - internal
             moved = jump if first else 0.0 * jump
+            if first and not self.u.any() and self.model.prestress is not None:
+                # A prestress beyond yield is first relieved elastically: its forces are those of no law yet.
+                K, rest = self.system.assembled(), np.zeros_like(self.assembly.points)
+                r = force - internal_load(self.assembly.points, self.system.groups, rest).ravel()
             (du,) = self.tangents.solve(K, tangent, [r], moved, residuals, self.tolerance)
             exact = moved.any() or not self.line_search
             return du if exact else self._shortened(u, du, reduce(r), load, dt)
@@ -417,7 +422,9 @@ class QuasiStaticAnalysis(ModelInTime):
         groups = [replace(g, states=s) for g, s in zip(self.groups, self.states, strict=True)]
         groups = heated(model.mesh, groups, self.temperatures)
         u0 = model.initial_displacement
-        return Result(model.mesh, groups, self._whole(self.u).copy(), reactions, loads, report, u0)
+        result = Result(model.mesh, groups, self._whole(self.u).copy(), reactions, loads, report, u0)
+        result._springs = model.supports.springs
+        return result
 
 
 def assembly_of(model: Structure, system: ConstrainedSystem) -> NonlinearAssembly:

@@ -19,7 +19,7 @@ from kratos_lite.model.loads import Load
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.linear_solver import Solution
 from kratos_lite.tabular import Tabular, in_units
-from kratos_lite.typing import Array, ArrayLike, Numbers
+from kratos_lite.typing import Array, ArrayLike, Csr, Numbers
 from kratos_lite.validation import finite, flag, instance, whole_number
 
 if TYPE_CHECKING:
@@ -86,6 +86,7 @@ class Result(ElementFields, Tabular):
         self._analysis = analysis
         self._version = analysis.model.version if analysis else None
         self._acting: Sequence[Load] = ()  # loads of a static analysis
+        self._springs: Csr | None = None  # (3n, 3n) N/m
 
     @property
     def units(self) -> str:  # type: ignore[override]
@@ -245,6 +246,11 @@ class Result(ElementFields, Tabular):
         from kratos_lite.analysis.section import section  # a quick start for results
 
         return section(self, where, flag(recovered, "recovered"))
+
+    def energy(self) -> float:
+        """Return the strain energy ½ ∫ ε:C:ε dV in J, of the elastic strain, and ½ u·K u of springs."""
+        u = self.u.ravel()
+        return super().energy() + (0.0 if self._springs is None else float(u @ (self._springs @ u)) / 2)
 
     def _located(self, points: ArrayLike | Located) -> Located:
         """Return where points lie in the mesh; raise MeshError if one lies outside."""
@@ -537,7 +543,7 @@ class Result(ElementFields, Tabular):
             ("elements", ", ".join(f"{count} {name}" for name, count in counts[1].items())),
             *self.report.load_rows(size),
             ("largest displacement", f"{length:.6e} m at node {node}, {vector(u)} m"),
-            ("strain energy", f"{energy:.6e} J"),
+            ("strain energy", f"{energy:.6e} J{', with springs' * (self._springs is not None)}"),
             *error,
             ("largest von Mises", f"{mises:.6e} Pa (at a Gauss point) {place}"),
             *self.report.solution_rows(),
@@ -574,4 +580,6 @@ def result_of(
         formulation=model.chosen(groups),
         **{**report, "notes": [*model.remarks(), *report.get("notes", ())]},
     )
-    return kind(model.mesh, groups, u, reactions, loads, made, model.initial_displacement, analysis)
+    result = kind(model.mesh, groups, u, reactions, loads, made, model.initial_displacement, analysis)
+    result._springs = model.supports.springs
+    return result

@@ -14,6 +14,7 @@ SOLIDS = {
     8: "Hexahedron8", 20: "Hexahedron20", 27: "Hexahedron27",
 }  # fmt: skip
 """Names of solid shapes by their number of nodes."""
+POINT_ELEMENT = "NodalConcentratedElement3D1N"
 LINES: dict[int, type[Shape]] = {2: Line2, 3: Line3}
 CARRIERS = ("Load", "Face3D", "FacePressure", "SurfaceCondition", "PointCondition", "LineCondition")
 """Words in the names of conditions that carry loads."""

@@ -10,7 +10,7 @@ import numpy as np
 from kratos_lite.errors import InputError, MaterialError
 from kratos_lite.materials.material import MATERIALS, GaussState, Material, Response
 from kratos_lite.typing import Array
-from kratos_lite.validation import finite
+from kratos_lite.validation import finite, reals
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -86,18 +86,18 @@ class LinearMaterial(Material, family=True):
         MaterialError
             If the compliance is singular, or not (6, 6).
         """
-        S = np.asarray(self.compliance(), dtype=float)
+        S = reals(self.compliance(), f"{type(self).__name__}: the compliance", MaterialError)
         if S.shape != (6, 6):
             raise MaterialError(f"{type(self).__name__}: the compliance must be (6, 6); got shape {S.shape}")
         try:
-            return np.linalg.inv(S)
+            return np.asarray(np.linalg.inv(S), dtype=float)
         except np.linalg.LinAlgError:
             raise MaterialError(f"{type(self).__name__}: the compliance is singular") from None
 
     @cached_property
     def C(self) -> Array:
         """Elasticity matrix (6, 6) in Pa, read-only."""
-        C = np.asarray(self.elasticity(), dtype=float)
+        C = reals(self.elasticity(), f"{type(self).__name__}: C", MaterialError, copy=True)
         C.setflags(write=False)
         return C
 

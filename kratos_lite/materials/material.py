@@ -120,6 +120,8 @@ class Material:
             hint = nearest(unknown[0], known)
             raise MaterialError(f"{cls.__name__} has no {unknown[0]!r}.{hint} It has {', '.join(known)}")
         if (constants or named) and cls.__init__ is object.__init__:
+            if cls.__name__ not in MATERIALS:
+                raise MaterialError(f"{cls.__name__} is a base of laws; derive one with the constants it has")
             raise TypeError(f"{cls.__name__}() takes no arguments")  # as Python says it
         return super().__new__(cls)
 

@@ -10,16 +10,19 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 import numpy as np
 
 from kratos_lite.assembly.attached import Attached
+from kratos_lite.assembly.sparsity_pattern import dofs_of
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh, Where
 from kratos_lite.mesh.selection import point_of
 from kratos_lite.model.remote_point import RemotePoint
-from kratos_lite.typing import Array, ArrayLike, Csr
+from kratos_lite.typing import Array, ArrayLike, Csr, Ints
 from kratos_lite.validation import finite, number, short
 
 if TYPE_CHECKING:
     from kratos_lite.mesh.refined_mesh import RefinedMesh
 
+MARKS, SHOWN = 9, 0.1
+"""Marks that show what is on faces, nodes that show what follows a remote point; springs, of the size."""
 Place: TypeAlias = "Where | RemotePoint"
 """A part, a point (x, y, z) in m, or a remote point."""
 
@@ -46,7 +49,7 @@ class AttachedMatrix(Attachment):
     """A matrix Jᵀ W J on what moves by J u, integrated over faces."""
 
     what: ClassVar[str]
-    is_mass: ClassVar[bool] = False
+    is_mass: bool = False
     where: Place
     to: Place | None = None
     W: Array
@@ -80,6 +83,27 @@ class AttachedMatrix(Attachment):
         A = csr_array(J.T @ bsr_array((W, np.arange(p), np.arange(p + 1)), shape=(p * r, p * r)) @ J)
         A.eliminate_zeros()
         return A
+
+    def drawn(self, mesh: Mesh) -> Array:
+        """Return lines (k, 2, 3) in m: from points, or some of faces, to another or along the stiffness."""
+        places, other, X = self._points(mesh), _point_of(self.to), mesh.points
+        if places is None:
+            J, normals = _places(mesh, self.where, self.what)
+            assert normals is not None
+            ways, places = normals, (J @ X.ravel()).reshape(-1, 3)
+        else:
+            ways = np.linalg.eigh(self.W[..., :3, :3])[1][..., -1].reshape(-1, 3)
+            ways = ways * np.where(((places - X.mean(axis=0)) * ways).sum(axis=1) < 0, -1, 1)[:, None]
+        some = np.unique(np.linspace(0, len(places) - 1, MARKS).round().astype(int))
+        size = SHOWN * np.linalg.norm(np.ptp(X[mesh.used_nodes()], axis=0))
+        ways = size * ways[some] / np.linalg.norm(ways[some], axis=1)[:, None]
+        ends = places[some] + ways if other is None else other[None]
+        return np.stack([places[some], ends], axis=1)
+
+    def _points(self, mesh: Mesh) -> Array | None:
+        """Return the points (k, 3) that it is on; None for faces."""
+        point = _point_of(self.where)
+        return None if point is None else point[None]
 
     @abstractmethod
     def _weights(self, vectors: Array) -> Array:
@@ -181,6 +205,38 @@ class AddedMass(AttachedMatrix):
         """Return the mass at places of faces, by area."""
         areas = np.linalg.norm(vectors, axis=1)[:, None, None]
         return areas / areas.sum() * self.W
+
+
+class OnNodes(AttachedMatrix):
+    """Springs to ground, or masses, on nodes (k,) along x, y, z: values (k, 3) in N/m or kg."""
+
+    what = "an element of one node"
+    where = None  # type: ignore[assignment]
+
+    def __init__(self, nodes: Ints, values: Array, is_mass: bool) -> None:
+        if (values < 0).any():
+            raise InputError(f"{self.what} has stiffness and mass ≥ 0; got {values.min():g}")
+        self.nodes, self.W, self.is_mass = nodes, values[:, None] * np.eye(3), is_mass
+
+    def matrix(self, mesh: Mesh) -> Csr:
+        """Return the matrix (3n, 3n) on a mesh."""
+        from scipy.sparse import coo_array
+
+        if len(idle := self.nodes[~mesh.used_nodes()[self.nodes]]):
+            raise ModelError(f"{self.what} is at node {mesh.node_ids[idle[0]]}, which no solid has")
+        dofs, values = dofs_of(self.nodes), np.einsum("kii->ki", self.W).ravel()
+        return coo_array((values, (dofs, dofs)), shape=(mesh.points.size,) * 2).tocsr()
+
+    def __repr__(self) -> str:
+        x, y, z = self.W.sum(axis=0).diagonal()
+        total = f"mass {x:g} kg" if self.is_mass else f"stiffness ({x:g}, {y:g}, {z:g}) N/m"
+        return f"{total} on {len(self.nodes)} nodes in all"
+
+    def _points(self, mesh: Mesh) -> Array:
+        return mesh.points[self.nodes]
+
+    def _weights(self, vectors: Array) -> Array:
+        return self.W
 
 
 def _semidefinite(W: Array, what: str) -> Array:

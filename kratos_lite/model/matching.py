@@ -22,6 +22,7 @@ from kratos_lite.validation import number
 if TYPE_CHECKING:
     from kratos_lite.mesh.refined_mesh import RefinedMesh
 
+TWICE = "cells and cuts need one node at each place; nodes {} are at one: mesh all bodies with common nodes"
 FLAT = 1e-6
 """Fraction of the size of the mesh by which nodes may be off the places opposite."""
 
@@ -37,8 +38,11 @@ def opposite(mesh: Mesh, a: Ints, b: Ints, shift: Array | None = None) -> Ints:
     if len(a) and len(a) == len(b):
         way = Y.min(axis=0) - X.min(axis=0) if shift is None else shift
         apart, at = map(np.asarray, cKDTree(X + way).query(Y))
-        if apart.max() <= FLAT * np.ptp(mesh.extent, axis=0).max() and len(np.unique(at)) == len(a):
+        count, near = np.bincount(at), apart.max() <= FLAT * np.ptp(mesh.extent, axis=0).max()
+        if near and count.max() == 1:
             return np.asarray(a[at])
+        if near:
+            raise ModelError(TWICE.format(", ".join(map(str, mesh.node_ids[b[at == count.argmax()]]))))
     raise ModelError(
         "periodic boundaries and cuts need nodes that lie opposite one another; "
         f"there are {len(a)} and {len(b)}, not in the same places: mesh both faces alike, in Gmsh by "

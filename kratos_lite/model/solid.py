@@ -114,7 +114,8 @@ class Solid(Tabular):
     def scale_stiffness(self, factors: ArrayLike, where: WhereElements = None) -> None:
         """Multiply the stiffness of each element by a factor of its own: σ = factor · C ε + prestress.
 
-        Density stays.  `Result.gradient` has the derivative by these factors.
+        Density stays.  `Result.gradient` has the derivative by these factors.  Recovered stresses, those at
+        nodes, are smooth across them: where stresses jump, give each part a material of its own.
 
         Parameters
         ----------

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from kratos_lite.mesh.hanging import HangingNodes
     from kratos_lite.solvers.multigrid import Solver
 
+WIDE, MOST_MEANS = 100, 24
+"""Independents of a dependent that is a mean over a part, and how many such are treated by themselves."""
 RESTART, MAX_RESTARTS = 30, 20
 """Iterations of GMRES after which it starts anew, and how often."""
 
@@ -103,6 +105,8 @@ class LinearSolver:
         """Return about K⁻¹ r of free degrees of freedom (q,): a cycle of multigrid, or a solution."""
         if not self.plan.iterates:
             return self.factors.apply(r)
+        if self._without_means is not None:
+            return self._without_means.precondition(r)
         forces = np.zeros(len(self.constraint_map.c))
         forces[self.constraint_map.free] = r
         return self._multigrid.precondition(forces)[self.constraint_map.free]
@@ -166,6 +170,21 @@ class LinearSolver:
         return replace(self.K, A=constrained(self.K.A, T, free), D=D)
 
     @cached_property
+    def _without_means(self) -> LinearSolver | None:
+        """What holds the dependents of means: their rows of T join all nodes of a part, and spoil cycles."""
+        # Beside it the reduced matrix has two other eigenvalues for each row: as many further iterations.
+        map, T = self.constraint_map, self.constraint_map.T
+        if T is None or not self.symmetric or self.plan.method != "amg":
+            return None
+        wide = np.diff(T.indptr) >= WIDE
+        if not 0 < wide.sum() <= MOST_MEANS:
+            return None
+        rest = T.multiply(~wide[:, None]).tocsr()
+        rest.eliminate_zeros()
+        held = replace(map, T=None if rest.nnz == len(map.free) else rest)
+        return replace(self, constraint_map=held, near=None)
+
+    @cached_property
     def _multigrid(self) -> Solver:
         from kratos_lite.solvers.coarse_level import apply_ties, p_coarse_level  # a quick start
 
@@ -195,8 +214,8 @@ class LinearSolver:
         free, rhs = self.constraint_map.free, np.zeros(len(self.constraint_map.c))
         rhs[free] = b
         aim = tolerance if continued else tolerance_of(tolerance, len(b))
-        if self.near is not None:
-            q, iterations, good = self._by_near(b, tolerance, self.near, progress)
+        if (near := self.near or self._without_means) is not None:
+            q, iterations, good = self._by_near(b, aim if self.near is None else tolerance, near, progress)
             if good:
                 return q, iterations, self.plan
             self.near = None  # not near enough

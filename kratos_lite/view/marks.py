@@ -1,8 +1,8 @@
-"""Marks: what holds a body: anchors in space, rods and springs to them, and pivots."""
+"""Marks: what holds a body, anchors in space, rods and springs to them, pivots; masses and remote points."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -16,28 +16,37 @@ COILS = 7
 
 @dataclass(frozen=True, eq=False)
 class Marks:
-    """What holds a body."""
+    """What holds a body, and what is attached to it."""
 
     rods: Array  # (k, 2, 3) m, from a point of the body to an anchor in space
     springs: Array  # the same
     pivots: Array  # (k, 3) m, points of the body that are fixed
+    between: Array = field(default_factory=lambda: np.zeros((0, 2, 3)))  # springs inside
+    masses: Array = field(default_factory=lambda: np.zeros((0, 3)))  # (k, 3) m, points
+    spokes: Array = field(default_factory=lambda: np.zeros((0, 2, 3)))  # from remote points
 
     def points(self) -> Array:
         """Return all that must be in the picture, (k, 3) m."""
-        return np.concatenate([self.rods.reshape(-1, 3), self.springs.reshape(-1, 3), self.pivots])
+        lines = np.concatenate([self.rods, self.springs, self.between, self.spokes])
+        return np.concatenate([lines.reshape(-1, 3), self.pivots, self.masses])
 
 
 def draw_marks(axes: Any, rows: Array, marks: Marks, inch: float, strength: float = 1.0) -> list[Any]:
     """Draw marks over the bodies; return what was drawn.  `inch` is that many m in the picture."""
     flat = rows[:2].T
     curves = [(ends, 2.0) for ends in marks.rods @ flat]
-    curves += [(_coil(a, b, 0.06 * inch), 1.0) for a, b in marks.springs @ flat]
+    coils = np.concatenate([marks.springs, marks.between]) @ flat
+    curves += [(_coil(a, b, 0.06 * inch), 1.0) for a, b in coils]
+    curves += [(ends, 0.5) for ends in marks.spokes @ flat]
     style = {"color": DARK, "alpha": strength, "zorder": 4, "clip_on": False}
     drawn = [line for points, width in curves for line in axes.plot(*points.T, lw=width, **style)]
     anchors = np.concatenate([marks.rods[:, 1], marks.springs[:, 1]]) @ flat
-    joints = np.concatenate([marks.rods[:, 0], marks.springs[:, 0], marks.pivots]) @ flat
+    ends = [marks.rods[:, 0], marks.springs[:, 0], *marks.between.transpose(1, 0, 2), marks.pivots]
+    joints = np.concatenate(ends) @ flat
     drawn += _dots(axes, anchors, "s", 7, DARK, 1.0)
     drawn += _dots(axes, joints, "o", 5, "w", strength)
+    drawn += _dots(axes, marks.masses @ flat, "o", 8, DARK, strength)
+    drawn += _dots(axes, np.unique(marks.spokes[:, 0], axis=0) @ flat, "x", 12, DARK, strength)
     return drawn
 
 

@@ -132,6 +132,7 @@ def carried():
         (cantilever, {"frequencies": -1.0}, InputError, "≥ 0"),
         (cantilever, {"frequencies": []}, InputError, "frequencies"),
         (cantilever, {"damping": -0.1}, InputError, "≥ 0"),
+        (cantilever, {"damping": 2.0}, InputError, "0.02 for 2 per cent; got 2"),
         (cantilever, {"damping": [0.1, 0.2], "modes": 3}, InputError, "one of each of 3 modes"),
         (cantilever, {"damping": 0.1, "method": "direct"}, InputError, "belong to method='modes'"),
         (cantilever, {"modes": 4, "method": "direct"}, InputError, "belong to method='modes'"),
@@ -170,11 +171,40 @@ def test_what_is_read_is_checked():
         response.fields(0, "x")
 
 
-def test_an_undamped_mode_has_no_response_at_its_frequency():
+def test_moved_supports_are_as_exact_as_loads():
+    """What their inertia adds to the quasi-static motion is left of the modes beyond; e = (Ω / ω)⁴."""
+    model, omega = bar(), np.array([10.0, 60.0, 150.0])
+    model.fix("x-", "x", 2e-3, override=True)
+    direct = model.harmonic(omega, hysteretic=0.02, method="direct").at((1, 0, 0))[:, 0]
+    found = model.harmonic(omega, hysteretic=0.02).at((1, 0, 0))[:, 0]
+    assert np.abs(found / direct - 1).max() < 1e-5
+
+
+@pytest.mark.parametrize("method", ["modes", "direct"])
+def test_an_undamped_mode_has_no_response_at_its_frequency(method):
     model = bar(1, "KinematicLinear3D8N")
     model.add(kl.Traction("x+", (2.0, 0, 0)))
-    with pytest.raises(SolveError, match="undamped mode"):
-        model.harmonic(model.modes(1)[0])
+    omega = model.modes(1)[0]
+    with pytest.raises(SolveError, match=f"frequency {omega[0]:g} rad/s is that of an undamped mode"):
+        model.harmonic([omega[0] / 2, omega[0]], method=method)
+    near = model.harmonic(omega * (1 + 1e-6), method=method).at((1, 0, 0))[0, 0]
+    k = E * 0.01
+    assert abs(near / (-0.02 / (2e-6 * k)) - 1) < 1e-3
+    assert np.isfinite(model.harmonic(omega, method=method, rayleigh=(1.0, 0.0)).at((1, 0, 0))).all()
+
+
+@pytest.mark.parametrize("method", ["modes", "direct"])
+def test_the_summary_finds_the_peak_without_all_displacements(method, monkeypatch):
+    model = bar(2)
+    model.add(kl.Traction("x+", (2.0, 0, 0)))
+    omega = np.linspace(0.0, 150.0, 31)
+    response = model.harmonic(omega, hysteretic=0.1, method=method)
+    size = [np.linalg.norm(response.displacement(i), axis=1).max() for i in range(31)]
+    asked, plain = [], type(response).displacement
+    monkeypatch.setattr(type(response), "displacement", lambda *a: asked.append(a) or plain(*a))
+    top = int(np.argmax(size))
+    assert f"{size[top]:.6e} m at {omega[top]:g} rad/s" in str(response)
+    assert len(asked) == 1
 
 
 def test_a_free_body_swings_directly():

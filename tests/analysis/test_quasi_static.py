@@ -156,6 +156,19 @@ def test_prestress_and_linear_parts_beside_a_law():
     assert np.abs(linear.solve().stress("element") - stress).max() < 1e-6 * Y  # nothing has yielded
 
 
+@pytest.mark.parametrize("beyond", [1.5, 3.0, 10.0])
+def test_a_prestress_beyond_yield_is_relieved_elastically(beyond):
+    """A body on rollers becomes shorter by s / E and has no stress left; held, it yields along its axis."""
+    model = bar(STEEL)
+    model.add_prestress((0, 0, beyond * Y, 0, 0, 0))
+    result = model.solve()
+    assert np.abs(result.stress("element")).max() < 1e-6 * Y
+    assert np.abs(result.displacement("z+")[:, 2] / (-2 * beyond * Y / E) - 1).max() < 1e-9
+    model.fix("z+", "z")
+    exact = Y + (beyond - 1) * Y * H / (E + H)
+    assert np.abs(model.solve().stress("element")[:, 2] / exact - 1).max() < 1e-6
+
+
 @pytest.mark.parametrize("law", [kl.NeoHookean3D(1e6, 0.3), kl.SaintVenantKirchhoff3D(1e6, 0.3)])
 def test_an_element_turned_inside_out_is_named(law):
     model = bar(law, "Element3D8N")

@@ -129,7 +129,8 @@ def answer(job):
     found = describe(part)
     if job.get("write"):
         KM.ModelPartIO(stem(job["write"]), KM.IO.WRITE | KM.IO.SCIENTIFIC_PRECISION).WriteModelPart(part)
-    found["elements"] = {one.Id: element(one, part.ProcessInfo) for one in part.Elements}
+    solids = [one for one in part.Elements if len(one.GetNodes()) > 1]
+    found["elements"] = {one.Id: element(one, part.ProcessInfo) for one in solids}
     if job.get("solve"):
         solve(part)
         found["displacement"] = vectors(part, KM.DISPLACEMENT)

@@ -501,3 +501,18 @@ def test_mean_dilatation_is_that_of_kratos(tmp_path):
         close(model.local_system(element).K, np.array(found["elements"][str(element)]["K"]), 1e-12)
     close(model.solve().u, by_node(model.mesh, found["displacement"]), 1e-9)
     assert [group.element for group in kl.read(tmp_path / "cube.mdpa").element_groups()] == [kl.BBar3D8N]
+
+
+def test_springs_and_masses_on_nodes_are_those_of_kratos(tmp_path):
+    """A block that stands on four springs, with the weight of masses, and a horizontal force."""
+    model = kl.Model(sheared_cube(8, 2), STEEL)
+    corners = model.mesh.points[[0, 2, 6, 8]]
+    for k, corner in zip((1e5, 2e5, 3e5, 4e5), corners, strict=True):
+        model.add(kl.ElasticSupport(corner, (k, 2 * k, 3 * k)))
+    model.add_mass(corners[0], 1e3)
+    model.add_mass(model.mesh.points[-1], 2e3)
+    model.add(GRAVITY)
+    found = solved_by_kratos(tmp_path / "springs.mdpa", model)
+    u = by_node(model.mesh, found["displacement"])
+    assert np.abs(model.solve().u - u).max() < 1e-8 * np.abs(u).max()
+    assert np.abs(kl.read(tmp_path / "springs.mdpa").solve().u - u).max() < 1e-8 * np.abs(u).max()

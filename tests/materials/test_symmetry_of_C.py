@@ -54,6 +54,14 @@ def test_a_C_of_another_shape_or_without_numbers_is_refused(C, told):
         law(C)
 
 
+@pytest.mark.parametrize("C", [[[1.0, 2.0], [3.0]], "abc", None, 1j * np.eye(6)])
+def test_a_C_that_is_not_made_of_numbers_is_refused(C):
+    with pytest.raises(MaterialError, match=r"^Given3D: C must be made of real numbers"):
+        law(C)
+    with pytest.raises(MaterialError, match="LinearMaterial is a base of laws; derive"):
+        LinearMaterial(C)
+
+
 def test_a_compliance_of_another_shape_is_refused():
     @dataclass(frozen=True)
     class Thin3D(LinearMaterial):

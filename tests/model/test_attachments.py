@@ -103,6 +103,8 @@ def test_two_bodies_joined_by_a_spring():
     model.add(kl.ElasticSupport(ends[1], (0, 0, k), to=ends[0]))
     model.add(ends[1].load((0, 0, -1e4)))
     result = model.solve()
+    stored = kl.Compliance().value(result) / 2  # of blocks and springs, by the work of the loads
+    assert abs(result.energy() / stored - 1) < 1e-9
     gap = ends[1].displacement(result) - ends[0].displacement(result)
     assert abs(gap[2] + 1e4 / k) < 1e-12
     assert abs(ends[0].displacement(result)[2] + 1e4 / 1e9) < 1e-12
@@ -124,6 +126,8 @@ def test_a_plastic_bar_and_a_large_strain_bar_pull_on_a_spring():
     below = result.displacement("z-")[0, 2]
     strain = 200e6 / 200e9 + (stress - 200e6) * (1 / 200e9 + 1 / 2e9)
     assert abs(stress / (100e9 * below) - 1) < 1e-7
+    springs = 100e9 * below**2 / 2
+    assert abs(result.energy() - result.totals()[0] - springs) < 1e-9 * springs
     assert abs((below + strain) / 0.01 - 1) < 1e-6
     assert abs(result.reaction("z-")[:, 2].sum() + stress) < 1e-6 * stress
     large = block(cells=(1, 1, 1), law=kl.Isotropic3D(1e6, 0.0), formulation="total_lagrangian")

@@ -50,6 +50,28 @@ def words(figure):
     return [text.get_text() for axes in figure.axes for text in axes.texts]
 
 
+def test_springs_masses_and_remote_points_of_a_model_are_marked():
+    """Seen along y, x is to the right and z upwards; a spring to ground is a tenth of the body."""
+    model = kl.Model(kl.box((4, 1, 1), (4, 1, 1)), STEEL)
+    assert len(kl.plot(model, view="y-").axes[0].lines) == 2  # the rulers
+    model.rigid("x+", (5.0, 0.5, 0.5))
+    model.add(kl.ElasticSupport((2.0, 0, 1), (1e3, 1e3, 1e7)))
+    model.add(kl.ElasticSupport((0.0, 0, 0), (0, 0, 1e7), to=(0.0, 0, 1.0)))
+    model.add(kl.ElasticSupport("z-", 1e6))
+    model.add_mass((1.0, 1, 1), 5.0)
+    lines = [np.array(line.get_xydata()) for line in kl.plot(model, view="y-").axes[0].lines]
+    tenth = 0.1 * np.sqrt(18)
+    ends = [line[[0, -1]] for line in lines if len(line) > 2]
+    for exact in ([(2, 1), (2, 1 + tenth)], [(0, 0), (0, 1)]):
+        assert min(np.abs(pair - exact).max() for pair in ends) < 1e-12
+    below = [pair for pair in ends if abs(pair[0, 1]) < 1e-12 and abs(pair[1, 1] + tenth) < 1e-12]
+    assert len(below) == 9
+    dots = [tuple(line[0]) for line in lines if line.shape == (1, 2)]
+    assert {(1.0, 1.0), (5.0, 0.5)} <= set(dots)
+    spokes = [line for line in lines if line.shape == (2, 2) and (line[0] == (5.0, 0.5)).all()]
+    assert {tuple(spoke[1]) for spoke in spokes} == {(4.0, 0.0), (4.0, 1.0)}
+
+
 # ---- values ----------------------------------------------------------------------------------------
 
 

@@ -86,3 +86,4 @@ class Document:
     tables: dict[int, Any] = field(default_factory=dict)
     model_data: dict[str, Any] = field(default_factory=dict)
     notes: list[Note] = field(default_factory=list)
+    attached: list[Any] = field(default_factory=list)  # springs and masses, which are no elements here

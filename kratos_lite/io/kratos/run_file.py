@@ -21,6 +21,7 @@ from kratos_lite.io.kratos.expected_values import COMPARISONS
 from kratos_lite.io.kratos.initial_state import MODULE, initial_state_of
 from kratos_lite.io.kratos.laws import is_nonlinear, make_linear, notes_on_stress, quasi_static_of
 from kratos_lite.io.kratos.motion import add_motion
+from kratos_lite.io.kratos.point_elements import set_apart
 from kratos_lite.io.kratos.processes import PROCESSES, Action, actions_of, run
 from kratos_lite.io.kratos.properties import NO_EXPANSION, expanding, use_materials
 from kratos_lite.io.kratos.time_dependent import DYNAMIC, DYNAMIC_KEYS, ProcessesInTime, time_integration_of
@@ -67,7 +68,7 @@ def read_kratos_project(
     times = times_of(settings.section("problem_data", required=True), solver)
     dynamic = solver.text("solver_type") in DYNAMIC
     notes = _check_solver(solver) + _check_root(settings)
-    document = _read_mesh(solver, folder, allow_outside, notes, part)
+    document = set_apart(_read_mesh(solver, folder, allow_outside, notes, part))
     root, moved = solver.text("model_part_name", "Structure"), solver.flag("move_mesh_flag", True)
     context = RunContext(document.mesh, root, folder, times, moved, allow_outside)
     _use_materials(solver, context, document, notes)

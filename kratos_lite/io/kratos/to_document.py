@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.analysis.model import Model
+from kratos_lite.analysis.nodal_loads import external_loads
 from kratos_lite.errors import InputError
 from kratos_lite.io.formats.document import Constraint, Data, Document, Note, Properties
+from kratos_lite.io.kratos.point_elements import is_on_nodes, written
 from kratos_lite.io.kratos.properties import THERMAL_LAW, USER_LAW
 from kratos_lite.materials import Material
 from kratos_lite.mesh import Block, Mesh, Part, with_rows
@@ -37,7 +39,7 @@ def document_from(model: Model) -> Document:
     unwritten = {
         "a motion of the material": model.motion is not None,
         "a remote point": any(point.is_rigid or point.fixed.any() for point in model.remote_points),
-        "an elastic support or added mass": model.attached is not None,
+        "an elastic support or added mass": not is_on_nodes(model.attached),
         "a support that moves in time": bool(model.supports.motions),
         "a factor of the stiffness of each element": model.stiffness_factors is not None,
         "a load that changes in time": any(isinstance(load, TimeDependentLoad) for load in model.loads),
@@ -47,22 +49,25 @@ def document_from(model: Model) -> Document:
             raise InputError(f"{what} cannot be written to a file of a model; leave it to a script")
     mesh, supports, start = model.mesh, model.supports, _initial_displacement(model)
     whole = [g for g in model.loads if isinstance(g, Gravity) and g.where is None and np.ndim(g.force) == 1]
+    if model.attached and model.attached.M.count_nonzero():
+        whole = []  # elements of one node have no weight by Properties
     gravity, others = sum((g.force for g in whole), np.zeros(3)), [x for x in model.loads if x not in whole]
     temperature, references = _temperature(model)
     numbers, properties = _properties(model, gravity, references)
     blocks = _blocks(model, numbers)
-    forces = sum((load.forces(mesh, model.element_groups()) for load in others), np.zeros_like(mesh.points))
+    forces = external_loads(model, model.element_groups(), others)
     loaded, number = (forces != 0).any(axis=1, keepdims=True), next(iter(properties), 0)
     points = Block("PointLoadCondition3D1N", np.argwhere(loaded)[:, :1], properties=number, shape=Point1)
     conditions = [points] if len(points) else []
-    written = mesh.replace(blocks=blocks, conditions=conditions, parts=_parts(mesh))
+    more, values = written(model.attached, blocks, number)
+    whole_mesh = mesh.replace(blocks=[*blocks, *more], conditions=conditions, parts=_parts(mesh))
     data = _nodal_data(mesh, "DISPLACEMENT", supports.fixed, supports.values, fixed=True) + start
     data += _nodal_data(mesh, "POINT_LOAD", np.repeat(loaded, 3, axis=1), forces)
     if len(hot := np.flatnonzero(np.isfinite(temperature))):
         free = np.zeros(len(hot), dtype=bool)
         data.append(Data("TEMPERATURE", mesh.node_ids[hot], free, temperature[hot]))
     constraints = constraints_of(mesh, supports.constraints)
-    document = Document(written, properties, nodal_data=data, constraints=constraints)
+    document = Document(whole_mesh, properties, nodal_data=data, constraints=constraints, element_data=values)
     if mesh.conditions:
         document.notes.append(Note(0, "conditions are replaced by the nodal forces of their loads"))
     if mesh.units != "SI":

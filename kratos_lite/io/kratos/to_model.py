@@ -11,6 +11,7 @@ from kratos_lite.elements import ELEMENTS
 from kratos_lite.elements.formulations import is_unnamed
 from kratos_lite.errors import InputError, Problems, naming, nearest
 from kratos_lite.io.formats.document import Constraint, Data, Document, Note
+from kratos_lite.io.kratos.point_elements import set_apart
 from kratos_lite.io.kratos.properties import NO_EXPANSION, USED, apply_properties, expanding
 from kratos_lite.io.kratos.variables import LOADING, SPLIT, TEMPERATURE, VECTORS, Variables, components
 from kratos_lite.io.names import misspelt
@@ -38,6 +39,7 @@ def model_from(
     processes: Callable[[Variables], None] | None = None,
 ) -> Model:
     """Return the model that a document describes; `processes` may change the values, as a run file does."""
+    document = set_apart(document)
     _check_elements(document)
     _check_variables(document)
     model = Model(document.mesh)
@@ -60,6 +62,8 @@ def model_from(
         if initial_displacement:
             _activate(model, u0)
         _constrain(model, document)
+        for each in document.attached:
+            model.add(each)
     return model
 
 
