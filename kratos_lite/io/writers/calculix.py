@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -106,8 +107,14 @@ def error(result: Result) -> Array | None:
     return nodal_values.averaged(result.groups, values, result.mesh.n_nodes)
 
 
+def displacements(model: Any, u: Array, time: float = 0.0) -> Array:
+    """Return displacements (n, 3) with those of reference nodes, if the model is of a deck that has some."""
+    known = getattr(model, "references", None)
+    return u if known is None else np.asarray(known.displacements(model, u, time))
+
+
 AT_NODES: dict[str, Callable[[Result], Array | None]] = {
-    "DISP": lambda result: result.u,
+    "DISP": lambda result: displacements(getattr(result._analysis, "model", None), result.u),
     "NDTEMP": temperatures,
     "STRESS": partial(averaged, name="stress"),
     "TOSTRAIN": partial(averaged, name="strain"),

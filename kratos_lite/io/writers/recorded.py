@@ -117,10 +117,11 @@ class RecordedModel:
 
     def at_nodes(self, state: Any) -> dict[str, Array]:
         """Return the fields of the nodes by CalculiX's names, velocities among them where there are any."""
-        from kratos_lite.io.writers.calculix import at_nodes  # rarely needed
+        from kratos_lite.io.writers.calculix import at_nodes, displacements  # rarely needed
 
         result = self.transient.result(state)
         fields = {"DISP": state.u, **({"VELO": state.v} if self.kind == "time" else {}), **at_nodes(result)}
+        fields["DISP"] = displacements(self.transient.model, state.u, state.time)
         if self.kind == "time" and not result.is_linear:
             del fields["FORC"]  # internal forces are those of supports and loads at rest alone
         return fields

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import kratos_lite as kl
+from kratos_lite.io.abaqus.job import Job
 from tests.io.abaqus.conftest import CUBE
 
 Read = Callable[..., kl.Case]
@@ -113,6 +115,20 @@ def test_connections_are_those_of_ccx(cube: str, text: str, read: Read, ccx: Cal
             case.model, u, case.time.sizes[0] * 2 if case.time else 0.0
         )
         assert np.abs(moved[rows] - theirs[:, 1:]).max() < 1e-6 * np.abs(theirs[:, 1:]).max()
+
+
+@pytest.mark.parametrize("name", ["displacement of a rigid body", "force and moment on a rigid body"])
+def test_tables_have_reference_nodes_as_ccx_prints_them(
+    name: str, tmp_path: Path, ccx: Callable[..., str]
+) -> None:
+    cube, text = CASES[name]
+    (tmp_path / "job.inp").write_text(cube + text + END)
+    Job(tmp_path / "job.inp", print).run()
+    tables = [
+        np.array(re.findall(r"(?m)^ +(\d+) +(\S+) +(\S+) +(\S+)$", dat), dtype=float)
+        for dat in ((tmp_path / "job.dat").read_text(), ccx(text + END, cube))
+    ]
+    assert np.abs(tables[0] - tables[1]).max() < 1e-6 * np.abs(tables[1][:, 1:]).max()
 
 
 def test_masses_have_the_frequencies_of_ccx(read: Read, ccx: Callable[..., str]) -> None:
