@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.atomic import all_or_none, write_whole
+from kratos_lite.errors import InputError
 from kratos_lite.io.abaqus.cards import Card
 from kratos_lite.io.abaqus.deck import Deck, Step
 from kratos_lite.io.abaqus.loads import with_faces
@@ -71,6 +72,10 @@ class Job:
         if outcome.result is not None:
             self._keep(outcome.result, 1.0, step, 1)
             return outcome.summary()
+        if outcome.modes is None:
+            raise InputError(
+                "a response over frequencies is written by kratos-lite solve DECK.inp -o OUT.vtu"
+            )
         values, shapes = outcome.modes
         self.frd += steps_of_modes(values, shapes, case.buckling)
         self.dat += dat.buckling(values) if case.buckling else self._frequencies(case, values, shapes)
