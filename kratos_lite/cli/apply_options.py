@@ -65,8 +65,9 @@ def _apply(case: Case, options: Namespace, mark: str) -> None:
         setattr(case.outputs, name, _marked(path, mark))
     case.outputs.sections = options.section
     results = [_marked(path, mark) for path in options.output]
-    if mark and (case.modes or case.time):  # the other steps are at rest
-        results = [str(Path(path).with_suffix(".pvd")) if path.endswith(".vtu") else path for path in results]
+    if mark and (case.modes or case.time or case.harmonic):  # the other steps are at rest
+        of = ".csv" if case.harmonic else ".pvd"
+        results = [str(Path(path).with_suffix(of)) if path.endswith(".vtu") else path for path in results]
     case.outputs.results, case.outputs.mode = results or case.outputs.results, options.vtu
 
 

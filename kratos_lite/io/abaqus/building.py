@@ -56,12 +56,6 @@ class Building:
         model.notes += deck.notes
         return model
 
-    def held_model(self) -> Model:
-        """Return the model with the supports of a deck without steps."""
-        model = self.model()
-        self.hold(model, self.deck.held)
-        return model
-
     def hold(self, model: Model, held: Nodal, series: dict[str, TimeSeries] | None = None) -> None:
         """Add supports and connections to a model."""
         apply(model, held, self.deck.axes, series or {})
@@ -87,6 +81,10 @@ class Building:
     def earlier(self, step: Step) -> list[Step]:
         """Return the steps before one."""
         return self.deck.steps[: self.deck.steps.index(step)]
+
+    def last(self, kind: str, step: Step) -> Step | None:
+        """Return the last step of a kind before one, or None."""
+        return next((s for s in reversed(self.earlier(step)) if s.kind == kind), None)
 
     def _finite(self) -> Mesh:
         """Return the mesh with elements and loads of large displacements."""

@@ -23,7 +23,7 @@ AT_ONCE = 1e-9
 GROWTH = 1.5
 """Of automatic increments, from one to the next, as in CalculiX."""
 MOVING = ("DYNAMIC", "MODALDYNAMIC")
-FINER = 10
+FINER = 20
 """Our steps in an increment of *MODAL DYNAMIC, which answers exactly to loads that are linear in it."""
 
 
@@ -38,9 +38,9 @@ class Dynamics(Building):
 
     def _dynamic(self, *steps: Step) -> Case:
         model = self._in_turn(steps, any(step.large for step in steps))
-        row = steps[0].procedure
-        assert row is not None
-        alpha = Row(row.place, (row.option("ALPHA", "-0.05"),)).number(0)
+        card = steps[0].procedure
+        assert card is not None
+        alpha = Row(card.place, (card.option("ALPHA", "-0.05"),)).number(0)
         return Case(model, self._time(model, steps, 1, HHT(alpha), self._damping_of_materials()))
 
     def _modaldynamic(self, *steps: Step) -> Case:
@@ -59,10 +59,8 @@ class Dynamics(Building):
         assert step.procedure is not None
         if step.procedure.option("HARMONIC", "YES").upper() != "YES":
             step.procedure.wrong("HARMONIC=NO is not supported; loads are harmonic")
-        if step.acting.names() or step.held.amplitudes[step.held.given].any():
-            step.card.wrong("amplitudes over the frequency are not supported")
-        if step.held.values.any():
-            step.card.wrong("supports that move in *STEADY STATE DYNAMICS are not supported")
+        if step.acting.names() or step.held.values.any():
+            step.card.wrong("amplitudes over the frequency and supports that move are not supported")
         modes, model = self._modes(step), self.model()
         self.hold(model, step.held)
         quarter = Acting.none(model.mesh.n_nodes)
@@ -81,7 +79,7 @@ class Dynamics(Building):
 
     def _modes(self, step: Step) -> int:
         """Return how many modes the *FREQUENCY before a step finds."""
-        before = next((s for s in reversed(self.earlier(step)) if s.kind == "FREQUENCY"), None)
+        before = self.last("FREQUENCY", step)
         if before is None:
             step.card.wrong(f"*{step.kind} needs a step with *FREQUENCY before it")
         if before.perturbs:
@@ -99,15 +97,12 @@ class Dynamics(Building):
 
     def _damping_of_materials(self) -> tuple[float, float]:
         """Return α and β that all materials share."""
-        deck, found = self.deck, set[tuple[float, float]]()
-        for name in {name for _, name, _, _ in deck.sections}:
-            card = deck.materials[name].cards.get("DAMPING")
-            fields = tuple(card.option(k, "0") for k in ("ALPHA", "BETA")) if card else ("0", "0")
-            a, b = Row(card.place if card else "", fields).numbers(2)
-            found.add((a, b))
-        if len(found) > 1:
-            deck.steps[0].card.wrong("materials with different *DAMPING are not supported")
-        return found.pop()
+        cards = [self.deck.materials[name].cards.get("DAMPING") for _, name, _, _ in self.deck.sections]
+        every = [(c.option("ALPHA", "0"), c.option("BETA", "0")) if c else ("0", "0") for c in cards]
+        if len(set(every)) > 1:
+            self.deck.steps[0].card.wrong("materials with different *DAMPING are not supported")
+        alpha, beta = Row(cards[0].place if cards[0] else "", every[0]).numbers(2)
+        return alpha, beta
 
     def _increment(self, step: Step) -> float:
         """Return the first increment of a step."""
@@ -135,16 +130,9 @@ class Dynamics(Building):
         model.notes.append(f"steps of {h:g}, without automatic increments")
         if len(steps) > 1:
             model.notes.append("loads that change at once between steps are integrated with order 1")
-        start = self.deck.start
-        return TimeIntegration(
-            h,
-            finer * count,
-            every=finer,
-            integrator=integrator,
-            rayleigh=rayleigh,
-            displacement=start.get("DISPLACEMENT"),
-            velocity=start.get("VELOCITY"),
-        )
+        more: dict[str, Any] = {name.lower(): values for name, values in self.deck.start.items()}
+        more |= {"integrator": integrator, "rayleigh": rayleigh}
+        return TimeIntegration(h, finer * count, finer, **more)
 
     def _in_turn(self, steps: Sequence[Step], large: bool) -> Model:
         """Return the model whose loads and supports are those of steps in turn."""

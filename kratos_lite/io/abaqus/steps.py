@@ -32,7 +32,9 @@ class _Building(Dynamics):
         """Return the cases, each with its steps."""
         cases, steps = list[tuple[Case, list[Step]]](), self.deck.steps
         if not steps:
-            cases.append((Case(self.held_model()), []))
+            model = self.model()
+            self.hold(model, self.deck.held)
+            cases.append((Case(model), []))
         while steps:
             kind, many = steps[0].kind, self._takes_time(steps[0])
             alike = list(takewhile(lambda step: step.kind == kind, steps)) if many else steps[:1]  # noqa: B023
@@ -60,18 +62,15 @@ class _Building(Dynamics):
         return self.nonlinear(steps) if self.is_nonlinear(steps[0]) else Case(self._loaded(steps[0]))
 
     def _frequency(self, step: Step) -> Case:
-        count, (_, *limits) = self.count(step), [*step.numbers(), 0.0]
-        before = next((s for s in reversed(self.earlier(step)) if s.kind == "STATIC"), None)
-        preload = step.perturbs and before is not None
-        if before is not None and preload:
-            if self.is_nonlinear(before):
-                step.card.wrong("frequencies about the state of a nonlinear step are not supported")
-            if (before.held.given != step.held.given).any():
-                step.card.wrong("frequencies with other supports than their preload are not supported")
-        model = self._loaded(before if before is not None and preload else step)
-        if any(limits):
+        before = self.last("STATIC", step) if step.perturbs else None
+        if before is not None and self.is_nonlinear(before):
+            step.card.wrong("frequencies about the state of a nonlinear step are not supported")
+        if before is not None and (before.held.given != step.held.given).any():
+            step.card.wrong("frequencies with other supports than their preload are not supported")
+        model = self._loaded(before or step)
+        if any(step.numbers()[1:]):
             model.notes.append("bounds of frequencies are ignored: the lowest ones are found")
-        return Case(model, modes=count, preload=preload)
+        return Case(model, modes=self.count(step), preload=before is not None)
 
     def _buckle(self, step: Step) -> Case:
         return Case(self._loaded(step), modes=self.count(step), buckling=True)

@@ -28,12 +28,13 @@ def ending(path: str | Path) -> str:
 
 
 def describes_case(path: str | Path) -> bool:
-    """Return whether a file says more than a model: a run file, a script, or a deck with steps."""
+    """Return whether a file says more than a mesh or model: a run file, a script, or a deck of a model."""
     kind = ending(path)
     if kind == ".inp" and Path(path).is_file():
         from kratos_lite.io.text import read_bytes
 
-        return b"*STEP" in read_bytes(path).upper()
+        text = read_bytes(path).upper()
+        return b"*STEP" in text or b"*SOLID" in text
     return kind in (".json", ".py")
 
 

@@ -24,7 +24,10 @@ def check(case: Case) -> list[str]:
 
 def run(case: Case, progress: Progress | None = None) -> Outcome:
     """Find the response at each frequency, and write amplitudes and phases of all nodes."""
-    response = respond(case, progress)
+    options = dict(case.harmonic or {})
+    if callable(options["frequencies"]):
+        options["frequencies"] = options["frequencies"](case.model)
+    response = case.model.harmonic(**options, progress=progress)
     rows = [f"{'frequency Hz':>14}  {'rad/s':>14}  {'amplitude m':>14}  {'at node':>9}"]
     for i, omega in enumerate(response.frequencies.tolist()):
         size = np.linalg.norm(response.displacement(i), axis=1)
@@ -34,14 +37,6 @@ def run(case: Case, progress: Progress | None = None) -> Outcome:
     for path in case.outputs.results:
         write_table(path, _columns(response))
     return Outcome(case, [], lines=rows, response=response)
-
-
-def respond(case: Case, progress: Progress | None = None) -> HarmonicResponse:
-    """Return the response that a case asks for."""
-    options = dict(case.harmonic or {})
-    if callable(options["frequencies"]):
-        options["frequencies"] = options["frequencies"](case.model)
-    return case.model.harmonic(**options, progress=progress)
 
 
 def _columns(response: HarmonicResponse) -> dict[str, Any]:
