@@ -11,7 +11,7 @@ import numpy as np
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.sparsity_pattern import dofs_of
 from kratos_lite.errors import ModelError
-from kratos_lite.mesh import NO_ROWS, Block, Mesh, Where
+from kratos_lite.mesh import Block, Mesh, Where
 from kratos_lite.model.mortar import NEAR, Cells, Mortar, mortar
 from kratos_lite.solvers.constraints import Constraints
 from kratos_lite.tabular import in_units
@@ -38,12 +38,8 @@ class Coupling(ABC):
     moves_all: Sequence[Ints] = ()  # parts whose nodes it moves alone, which other ties leave to it
 
     @abstractmethod
-    def constraints(self, fixed: Mask, known: Mask) -> Constraints:
-        """Return the constraints of degrees of freedom that are not `known` (n, 3): fixed, or dependent."""
-
-    def held_twice(self, fixed: Mask) -> tuple[Ints, Ints, Array]:
-        """Return pairs of degrees of freedom that are fixed, both, and what must be between them in m."""
-        return NO_ROWS, NO_ROWS, np.zeros(0)
+    def constraints(self, known: Mask) -> Constraints:
+        """Return the constraints; others hold degrees of freedom `known` (n, 3): fixed, or dependent."""
 
     def _check(self, groups: Sequence[ElementGroup], motion: object) -> list[str]:
         """Return warnings of what elements and a motion of their material mean for it; raise ModelError."""
@@ -93,7 +89,7 @@ class Tie(PartTie):
         """Return the tie on a finer mesh."""
         return Tie(finer.mesh, finer.where(self.a), finer.where(self.b), self.tolerance)
 
-    def constraints(self, fixed: Mask, known: Mask) -> Constraints:
+    def constraints(self, known: Mask) -> Constraints:
         """Return them; multipliers of what is known go to neighbors, so that they still add up to 1."""
         # With R these sums it is R D (S u_a - W u) = 0, S the inverse of T, in which all that is free besides
         # S u_a of its own nodes goes to the right side.
