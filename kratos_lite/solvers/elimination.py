@@ -14,7 +14,7 @@ Luby, SIAM J. Comput. 15 (1986) 1036-1053 (independent sets by random order).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -80,22 +80,27 @@ class Redundant:
     """What is left of equations that follow from others: sums of fixed degrees of freedom that must be 0."""
 
     equations: Constraints  # (c,), the others among them
+    dofs: Ints  # (n,), the numbers of the degrees of freedom of these
     free: Mask  # (n,)
     rows: Ints  # (k,), which of these
     weights: Csr  # (k, n + 1), of degrees of freedom and of 1
 
     def check(self, values: Array, one: float, name: Callable[[int], str], said: str, cure: str) -> None:
-        """Raise ModelError where prescribed values (n,), and constants times one, contradict them."""
-        every = np.append(values, one)
+        """Raise ModelError where prescribed values, and constants times one, contradict them."""
+
+        def name_of(dof: int) -> str:
+            return name(int(self.dofs[dof]))
+
+        every = np.append(values[self.dofs], one)
         limit = REDUNDANT * max(np.abs(values).max(), one * np.abs(self.equations.constants).max())
         for i in np.flatnonzero(np.abs(self.weights @ every) > limit)[:1]:
             rows = self._from_which(int(self.rows[i]))
             equations = list(self.equations)
-            texts = [_text(equations[row], name) for row in rows[:SHOWN]]
+            texts = [_text(equations[row], name_of) for row in rows[:SHOWN]]
             texts += [f"and {len(rows) - SHOWN} more"] * (len(rows) > SHOWN)
             held = self.weights.indices[slice(*self.weights.indptr[i : i + 2])]
             held = np.sort(held[~np.append(self.free, True)[held]])
-            texts += [said.format(name(int(dof)), every[dof]) for dof in held[:SHOWN]]
+            texts += [said.format(name_of(dof), every[dof]) for dof in held[:SHOWN]]
             raise ModelError(f"what is prescribed contradicts itself: {'; '.join(texts)}: {cure}")
 
     def _from_which(self, row: int) -> Ints:
@@ -112,7 +117,7 @@ class Redundant:
 def _text(equation: tuple[int, Ints, Array, float], name: Callable[[int], str]) -> str:
     """Return an equation in words."""
     dependent, others, weights, constant = equation
-    terms = [f"{w:g} · " * int(w != 1) + name(int(dof)) for dof, w in zip(others, weights, strict=True)]
+    terms = [f"{w:g} · " * int(w != 1) + name(dof) for dof, w in zip(others, weights, strict=True)]
     more = [f"{constant:g} m"] * int(constant != 0 or not terms)
     return f"{name(dependent)} = {' + '.join(terms[:SHOWN] + ['…'] * (len(terms) > SHOWN) + more)}"
 
@@ -122,34 +127,44 @@ def independent(constraints: Constraints, fixed: Mask) -> tuple[Constraints, Red
 
     Where they are so already, they are returned as they are.
     """
-    hard = _hard(constraints, fixed.ravel()) if len(constraints) else None
-    if hard is None:
+    wrong = _wrong(constraints, fixed.ravel())
+    if not wrong.any():
         return constraints, None
-    solved, redundant = _solved(constraints.take(hard), ~fixed.ravel())
-    return constraints.take(~hard) + solved, redundant
+    used = np.bincount(np.concatenate([constraints.dependents, constraints.independents])) > 0
+    dofs, free = np.flatnonzero(used), ~fixed.ravel()
+    local = constraints.renumbered(np.where(used, np.cumsum(used) - 1, -1))
+    hard = _together(local, free[dofs], wrong)
+    solved, rest = _solved(local.take(hard), dofs, free[dofs])
+    return constraints.take(~hard) + solved, rest
 
 
-def _hard(constraints: Constraints, fixed: Mask) -> Mask | None:
-    """Return which constraints (c,) need pivoting, with all that share free degrees of freedom, if any do."""
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import connected_components
-
-    dependents, count, n = constraints.dependents, len(constraints), len(fixed)
-    times = np.bincount(dependents, minlength=n)
-    wrong = fixed[dependents] | (times[dependents] > 1)
+def _wrong(constraints: Constraints, fixed: Mask) -> Mask:
+    """Return which constraints (c,) have a dependent that is fixed, or one twice, or form a cycle."""
+    dependents, wrong = constraints.dependents, fixed[constraints.dependents]
+    times = np.bincount(dependents, minlength=len(fixed))
+    wrong |= times[dependents] > 1
     if times[constraints.independents].any():
-        P = _weights(constraints, n)[:, dependents]
+        from scipy.sparse.csgraph import connected_components
+
+        P = _weights(constraints, len(fixed))[:, dependents]
         P.sum_duplicates()
         label = connected_components(P, connection="strong")[1]
         wrong |= (np.bincount(label)[label] > 1) | (P.diagonal() != 0)
-    if not wrong.any():
-        return None
+    return wrong
+
+
+def _together(constraints: Constraints, free: Mask, some: Mask) -> Mask:
+    """Return which constraints (c,) share free degrees of freedom with some, or with others that do."""
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import connected_components
+
+    count, size = len(constraints), len(constraints) + len(free)
     row = np.concatenate([np.arange(count), constraints.owner])
-    dof = np.concatenate([dependents, constraints.independents])
-    row, dof = row[~fixed[dof]], dof[~fixed[dof]]
-    graph = csr_array((np.ones(len(row)), (row, count + dof)), shape=(count + n, count + n))
-    label = connected_components(graph, directed=False)[1]
-    return np.asarray(np.isin(label[:count], label[:count][wrong]))
+    dof = np.concatenate([constraints.dependents, constraints.independents])
+    row, dof = row[free[dof]], dof[free[dof]]
+    graph = csr_array((np.ones(len(row)), (row, count + dof)), shape=(size, size))
+    label = connected_components(graph, directed=False)[1][:count]
+    return np.asarray(np.isin(label, label[some]))
 
 
 def _rows(constraints: Constraints, n: int) -> Any:
@@ -164,8 +179,8 @@ def _rows(constraints: Constraints, n: int) -> Any:
     return csr_array(diags_array(1 / np.where(size > 0, size, 1.0)) @ A)
 
 
-def _solved(constraints: Constraints, free: Mask) -> tuple[Constraints, Redundant]:
-    """Return constraints by elimination with pivoting, and what is redundant, by free ones (n,)."""
+def _solved(constraints: Constraints, dofs: Ints, free: Mask) -> tuple[Constraints, Redundant]:
+    """Return constraints of some dofs (n,) by elimination with pivoting, and what is redundant."""
     from scipy.sparse import csr_array, diags_array, vstack
 
     n, rows, chance = (
@@ -193,7 +208,8 @@ def _solved(constraints: Constraints, free: Mask) -> tuple[Constraints, Redundan
     dependents = np.concatenate(pivots)
     W = _rounded(_followed(csr_array(vstack(found)), np.zeros(len(dependents)), dependents)[0])
     solved = _as_constraints(dependents, W[:, :n], W[:, [n]].toarray().ravel())
-    return solved, Redundant(constraints, free, np.concatenate(redundant), csr_array(vstack(left)))
+    solved = replace(solved, dependents=dofs[dependents], independents=dofs[solved.independents])
+    return solved, Redundant(constraints, dofs, free, np.concatenate(redundant), csr_array(vstack(left)))
 
 
 def _pivots(A: Any, free: Mask, stated: Ints, chance: Array, rest: Array) -> tuple[Ints, Array, Mask]:

@@ -254,6 +254,18 @@ def test_rigid_parts_that_share_an_edge_are_a_hinge():
     assert np.abs(other.rotation(result) - (0, 0, 1e-3)).max() < 1e-15
 
 
+def test_nodes_on_a_line_follow_a_point_that_holds_the_rotation_about_it():
+    """The others turn the line, which moves as its point does."""
+    model = bar(cells=(2, 1, 2))
+    hub = model.rigid(lambda X: (X[:, 0] == 2) & (X[:, 1] == 1), (2, 0, 0))
+    u0, w = np.array([1e-3, 0, 2e-3]), np.array([1e-3, 2e-3, -3e-3])
+    hub.fix("xyz", u0)
+    hub.fix_rotation("xyz", w)
+    result = model.solve()
+    X = model.mesh.points[model.mesh.nodes(hub.where)]
+    assert np.abs(result.displacement(hub.where) - u0 - np.cross(w, X - hub.point)).max() < 1e-15
+
+
 def test_a_mean_motion_of_a_held_part_is_that_of_the_supports():
     model = bar()
     model.distribute("x-", POINT).fix()
