@@ -91,6 +91,11 @@ class ConstraintMap:
         is_free[self.free] = True
         return is_free
 
+    @property
+    def norm(self) -> float:
+        """The largest sum of the sizes of the weights of T in a row, by which rounding of q grows in u."""
+        return 1.0 if self.T is None else float(max(abs(self.T).sum(axis=1).max(initial=0.0), 1.0))
+
     def holding(self, constrained: Mask) -> ConstraintMap:
         """Return the map with some of the free ones (N,) constrained, too, where they are at q = 0."""
         keep = ~constrained.ravel()[self.free]

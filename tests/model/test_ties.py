@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import kratos_lite as kl
 from kratos_lite import voigt
@@ -170,6 +171,20 @@ def test_rigid_motions_pass_a_gap_where_nodes_lie_opposite_one_another(kind, cel
     follow = np.zeros((len(c), 6))
     np.add.at(follow, c.owner, c.weights[:, None] * U[c.independents])
     assert np.abs(follow - U[c.dependents]).max() < 1e-12
+
+
+@pytest.mark.parametrize("mode", range(6))
+def test_a_prescribed_rigid_motion_passes_the_gap_of_a_turned_mesh(mode):
+    """All forces are rounding, which weights of ties of quadratic cells make larger."""
+    element, turn = "KinematicLinear3D20N", Rotation.random(random_state=0).as_matrix()
+    low = kl.box(cells=(2, 2, 1), element=element)
+    mesh = kl.join({"low": low, "top": kl.box(cells=(3, 3, 1), element=element, origin=(0, 0, 1.1))})
+    model = kl.Model(mesh.replace(points=mesh.points @ turn.T), STEEL)
+    model.tie("low.z+", "top.z-", tolerance=0.2)
+    motion = 1e-3 * rigid_modes(model.mesh.points)[:, mode].reshape(-1, 3)
+    held = model.mesh.nodes("low.z-")
+    model.fix(held, "xyz", motion[held])
+    assert np.abs(model.solve().u - motion).max() < 1e-12
 
 
 def test_a_thick_cylinder_of_two_unlike_rings():
