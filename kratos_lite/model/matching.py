@@ -85,7 +85,7 @@ class Periodic(PartTie):
         """Return the pairs on a finer mesh; ModelError where its nodes are not opposite one another."""
         return Periodic(finer.mesh, [(finer.where(a), finer.where(b)) for a, b in self.parts], self.strain)
 
-    def constraints(self, known: Mask) -> Constraints:
+    def constraints(self, fixed: Mask, known: Mask) -> Constraints:
         """Return what ties members to the node that stands for them."""
         nodes = self.members[self.label[self.members] != self.members]
         others = self.label[nodes]
@@ -130,12 +130,12 @@ class Cut(PartTie):
         """Return the cut on a finer mesh."""
         return Cut(finer.mesh, finer.where(self.a), finer.where(self.b), self.length)
 
-    def constraints(self, known: Mask) -> Constraints:
+    def constraints(self, fixed: Mask, known: Mask) -> Constraints:
         """Return them; δ is that of the carriers, two degrees of freedom that stay free if it is."""
         one, other = map(dofs_of, (self.above, self.below))
         n, (a, b), is_free = np.tile(self.normal, len(self.above)), self.carriers, self.length is None
         along, held = np.abs(n) > FLAT, known.flat
-        if is_free and ((held[one] & held[other] & along).any() or held[[a, b]].any()):
+        if is_free and ((fixed.flat[one] & fixed.flat[other] & along).any() or held[[a, b]].any()):
             raise ModelError(f"supports or constraints hold the {self}, along it; release them")
         still, also, weight = ~(along & is_free), along & is_free & (one != b), n / self.normal[self.axis]
         constants = -(self.length or 0.0) * n[still]

@@ -294,7 +294,7 @@ class RemotePoint(Coupling):
             nodes = np.setdiff1d(nodes, mesh.hanging.nodes)
         return dofs_of(nodes), rigid_modes(mesh.points[nodes], self.point) / self._sizes
 
-    def constraints(self, known: Mask) -> Constraints:
+    def constraints(self, fixed: Mask, known: Mask) -> Constraints:
         """Return what the nodes follow; see `Coupling`."""
         if self.is_rigid:
             return self._of_rigid()

@@ -239,7 +239,7 @@ class Supports:
                 known.flat[independent(every, known)[0].dependents] = True
             # What moves all nodes of a part comes first, then ties, which leave out what others hold.
             for tie in sorted(self.ties, key=lambda tie: (not tie.moves_all, not isinstance(tie, PartTie))):
-                new = tie.constraints(known)
+                new = tie.constraints(self.fixed, known)
                 every += new
                 known.flat[new.dependents] = True
                 if isinstance(tie, PartTie):

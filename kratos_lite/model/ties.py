@@ -38,8 +38,8 @@ class Coupling(ABC):
     moves_all: Sequence[Ints] = ()  # parts whose nodes it moves alone, which other ties leave to it
 
     @abstractmethod
-    def constraints(self, known: Mask) -> Constraints:
-        """Return the constraints; others hold degrees of freedom `known` (n, 3): fixed, or dependent."""
+    def constraints(self, fixed: Mask, known: Mask) -> Constraints:
+        """Return the constraints; others hold those `known` (n, 3), which are fixed or dependent."""
 
     def _check(self, groups: Sequence[ElementGroup], motion: object) -> list[str]:
         """Return warnings of what elements and a motion of their material mean for it; raise ModelError."""
@@ -89,7 +89,7 @@ class Tie(PartTie):
         """Return the tie on a finer mesh."""
         return Tie(finer.mesh, finer.where(self.a), finer.where(self.b), self.tolerance)
 
-    def constraints(self, known: Mask) -> Constraints:
+    def constraints(self, fixed: Mask, known: Mask) -> Constraints:
         """Return them; multipliers of what is known go to neighbors, so that they still add up to 1."""
         # With R these sums it is R D (S u_a - W u) = 0, S the inverse of T, in which all that is free besides
         # S u_a of its own nodes goes to the right side.
@@ -104,6 +104,12 @@ class Tie(PartTie):
             step = near @ step @ diags_array(1.0 * (taken[free].sum(axis=0) == 0))
             taken = taken + step
         taken = taken[free]
+        far = held[taken.sum(axis=0) == 0]
+        far = far[abs(self.W[far]) @ ~fixed.ravel() > 0]
+        if len(far):  # no neighbor takes these multipliers, so that they stay
+            known = known.copy()
+            known.flat[dofs[far]] = False
+            return self.constraints(fixed, known)
         taken = csr_array(taken @ diags_array(1 / np.maximum(taken.sum(axis=0), 1.0)))
         own = csr_array((np.ones(len(free)), (np.arange(len(free)), free)), shape=(len(free), len(dofs)))
         gives = csr_array((np.ones(len(held)), (np.arange(len(held)), held)), shape=(len(held), len(dofs)))

@@ -76,6 +76,25 @@ def test_a_rigid_part_may_hold_nodes_of_a_tied_face(part, other):
     assert np.abs(hub.rotation(result) - [0, 1e-3, 2e-3]).max() < 1e-12
 
 
+@pytest.mark.parametrize("hold", ["fix", "rigid"])
+@pytest.mark.parametrize("other", [(2, 2, 1), (2, 3, 4)], ids=["a depends", "b depends"])
+def test_a_face_tied_to_one_that_is_held_as_a_whole_is_held(other, hold):
+    """All nodes of the face may depend on those of the other: it is as if that were held, too."""
+    results = []
+    for parts in (["a.x+"], ["b.x-"], ["a.x+", "b.x-"]):
+        model = tied(blocks("8N 8N", other=other))
+        for part in parts:
+            if hold == "fix":
+                model.fix(part, "xyz", 1e-6)
+            else:
+                hub = model.rigid(part, (1, 0.5, 0.5))
+        model.fix("a.x-")
+        model.add(kl.Traction("b.x+", (1e6, 2e6, 0)) if hold == "fix" else hub.load((1e6, 2e6, 0)))
+        results.append(model.solve())
+    for result in results[1:]:
+        assert np.abs(result.u - results[0].u).max() < 1e-9 * np.abs(result.u).max()
+
+
 def test_parts_that_are_not_tied_are_named():
     model = kl.Model(blocks("8N 8N"), STEEL)
     model.fix("a.x-")
