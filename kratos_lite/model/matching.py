@@ -134,8 +134,8 @@ class Cut(PartTie):
         """Return them; δ is that of the carriers, two degrees of freedom that stay free if it is."""
         one, other = map(dofs_of, (self.above, self.below))
         n, (a, b), is_free = np.tile(self.normal, len(self.above)), self.carriers, self.length is None
-        along, held = np.abs(n) > FLAT, known.flat
-        if is_free and ((fixed.flat[one] & fixed.flat[other] & along).any() or held[[a, b]].any()):
+        along = np.abs(n) > FLAT
+        if is_free and ((fixed.flat[one] & fixed.flat[other] & along).any() or known.flat[[a, b]].any()):
             raise ModelError(f"supports or constraints hold the {self}, along it; release them")
         still, also, weight = ~(along & is_free), along & is_free & (one != b), n / self.normal[self.axis]
         constants = -(self.length or 0.0) * n[still]

@@ -29,7 +29,6 @@ ROUNDING, REDUNDANT = 1e-13, 1e-6
 """Weights that are 0, and what is left of a redundant row where its terms canceled, as fractions of these."""
 SHOWN, MOST = 4, 1000
 """Equations, and terms of an equation, that an error shows; iterations to find which follow from others."""
-NO_DOFS: Ints = np.zeros(0, dtype=np.int64)
 
 
 def eliminate(constraints: Constraints, fixed: Mask, values: Array) -> Constraints:
@@ -183,18 +182,14 @@ def _solved(constraints: Constraints, dofs: Ints, free: Mask) -> tuple[Constrain
     """Return constraints of some dofs (n,) by elimination with pivoting, and what is redundant."""
     from scipy.sparse import csr_array, diags_array, vstack
 
-    n, rows, chance = (
-        len(free),
-        np.arange(len(constraints)),
-        np.random.default_rng(0).random(len(constraints)),
-    )
-    A, found, left, pivots, redundant = _rows(constraints, n), [], [], [NO_DOFS], [NO_DOFS]
-    lost, columns = np.zeros(len(rows)), np.flatnonzero(free)  # what has canceled out of each row
+    n, rows, columns = len(free), np.arange(len(constraints)), np.flatnonzero(free)
+    chance, lost = np.random.default_rng(0).random(len(rows)), np.zeros(len(rows))
+    A, found, left, pivots, redundant = _rows(constraints, n), [], [], [rows[:0]], [rows[:0]]
     while len(rows):
         pivot, weight, first = _pivots(A, free, constraints.dependents[rows], chance[rows], REDUNDANT * lost)
-        none, rest, p = weight == 0, ~first & (weight != 0), pivot[first]
-        left.append(A[none])
-        redundant.append(rows[none])
+        rest, p = ~first & (weight != 0), pivot[first]
+        left.append(A[weight == 0])
+        redundant.append(rows[weight == 0])
         one = csr_array((np.ones(len(p)), (np.arange(len(p)), p)), shape=(len(p), n + 1))
         pivots.append(p)
         found.append(_rounded(diags_array(-1 / weight[first]) @ A[first] + one))
@@ -203,6 +198,7 @@ def _solved(constraints: Constraints, dofs: Ints, free: Mask) -> tuple[Constrain
         K, W = A[rest][:, p], _followed(found[-1], np.zeros(len(p)), p)[0]
         before, along = A[rest] @ diags_array(others), K @ W
         A, rows = _rounded(csr_array(before + along)), rows[rest]
+        # What cancels out of a row says how small the rest of it may be.
         gone = (abs(before) + abs(K) @ abs(W) - abs(A))[:, columns]
         lost = np.maximum(lost[rest], gone.max(axis=1).toarray()) if len(rows) else lost[rest]
     dependents = np.concatenate(pivots)
