@@ -167,7 +167,7 @@ class StaticAnalysis:
             with phase("assemble"):
                 equations = self._equations_of(moving)
                 system = equations.system
-                noise = float(np.finfo(float).eps * system.norm)
+                noise = float(np.finfo(float).eps * system.norm * system.constraint_map.norm)
             with phase("solve"):
                 u, solution = system.solve(case.forces, equations.prescribed, tolerance, start)
                 warnings += system.warnings

@@ -53,8 +53,7 @@ def opposite(mesh: Mesh, a: Ints, b: Ints, shift: Array | None = None) -> Ints:
 class Periodic(PartTie):
     """Opposite nodes differ by a mean strain: u_b - u_a = E (x_b - x_a), for all pairs of parts together."""
 
-    # Nodes of edges and corners are in several pairs: one node of each class stands for all, which is one
-    # that supports hold if there is any.
+    # Nodes of edges and corners are in several pairs: one node of each class stands for all.
 
     def __init__(self, mesh: Mesh, parts: Sequence[tuple[Where, Where]], strain: Array) -> None:
         self.mesh, self.parts, self.strain = mesh, list(parts), strain
@@ -90,34 +89,14 @@ class Periodic(PartTie):
         """Return the pairs on a finer mesh; ModelError where its nodes are not opposite one another."""
         return Periodic(finer.mesh, [(finer.where(a), finer.where(b)) for a, b in self.parts], self.strain)
 
-    def _dependents(self, fixed: Mask, axis: int) -> tuple[Ints, Ints, Array]:
-        """Return members, the node that stands for each, and what is between their displacements."""
-        stands, held = self.label.copy(), self.members[fixed[self.members, axis]]
-        stands[self.label[held[::-1]]] = held[::-1]
-        other = stands[self.label[self.members]]
-        way = self.mesh.points[self.members] - self.mesh.points[other]
-        differs = other != self.members
-        return self.members[differs], other[differs], (way @ self.strain[axis])[differs]
-
     def constraints(self, fixed: Mask, known: Mask) -> Constraints:
-        """Return what ties members that supports do not hold."""
-        every = Constraints.none()
-        for axis in range(3):
-            nodes, others, constants = self._dependents(fixed, axis)
-            free = ~fixed[nodes, axis]
-            dofs, independents = 3 * nodes[free] + axis, 3 * others[free] + axis
-            every += Constraints.of(dofs, independents[:, None], np.ones(len(dofs)), constants[free])
-        return every
-
-    def held_twice(self, fixed: Mask) -> tuple[Ints, Ints, Array]:
-        """Return members that supports hold, as the node that stands for them."""
-        pairs, between = [], []
-        for axis in range(3):
-            nodes, others, constants = self._dependents(fixed, axis)
-            both = fixed[nodes, axis]
-            pairs.append(3 * np.stack([nodes, others])[:, both] + axis)
-            between.append(constants[both])
-        return *np.concatenate(pairs, axis=1), np.concatenate(between)
+        """Return what ties members to the node that stands for them."""
+        nodes = self.members[self.label[self.members] != self.members]
+        others = self.label[nodes]
+        constants = (self.mesh.points[nodes] - self.mesh.points[others]) @ self.strain.T
+        return Constraints.of(
+            dofs_of(nodes), dofs_of(others)[:, None], np.ones(3 * len(nodes)), constants.ravel()
+        )
 
 
 class Cut(PartTie):
@@ -158,19 +137,16 @@ class Cut(PartTie):
     def constraints(self, fixed: Mask, known: Mask) -> Constraints:
         """Return them; δ is that of the carriers, two degrees of freedom that stay free if it is."""
         one, other = map(dofs_of, (self.above, self.below))
-        turned, n = known.flat[one], np.tile(self.normal, len(self.above))
-        (a, b), stuck = self.carriers, fixed.flat[one] & fixed.flat[other] & (np.abs(n) > FLAT)
-        if (stuck.any() and self.length != 0.0) or (self.length is None and known.flat[[a, b]].any()):
+        n, (a, b), is_free = np.tile(self.normal, len(self.above)), self.carriers, self.length is None
+        along = np.abs(n) > FLAT
+        if is_free and ((fixed.flat[one] & fixed.flat[other] & along).any() or known.flat[[a, b]].any()):
             raise ModelError(f"supports or constraints hold the {self}, along it; release them")
-        kept, sign = ~(turned & known.flat[other]), np.where(turned, -1.0, 1.0)
-        dependents, others = np.where(turned, [other, one], [one, other])
-        moved = kept & (np.abs(n) > FLAT) & (self.length is None)
-        still, also, weight = kept & ~moved, moved & (one != b), sign * n / self.normal[self.axis]
-        constants = -(self.length or 0.0) * (sign * n)[still]
-        every = Constraints.of(dependents[still], others[still, None], np.ones(len(constants)), constants)
-        independents = np.stack([others, np.full_like(others, b), np.full_like(others, a)], axis=1)[also]
+        still, also, weight = ~(along & is_free), along & is_free & (one != b), n / self.normal[self.axis]
+        constants = -(self.length or 0.0) * n[still]
+        every = Constraints.of(one[still], other[still, None], np.ones(len(constants)), constants)
+        independents = np.stack([other, np.full_like(other, b), np.full_like(other, a)], axis=1)[also]
         weights = np.stack([np.ones(len(weight)), weight, -weight], axis=1)[also]
-        return every + Constraints.of(dependents[also], independents, weights, np.zeros(len(weights)))
+        return every + Constraints.of(one[also], independents, weights, np.zeros(len(weights)))
 
 
 class BoltForce(Load):

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
 MOST = 1000
 """Nodes of a part whose mean motion is prescribed or has springs: all of them then meet in matrices."""
-ROUNDING, CONTRADICTION = 1e-13, 1e-9
-"""Weights that are 0, and what displacements on a part may be off a rigid motion, as fractions."""
+ROUNDING = 1e-13
+"""Fraction of the largest weight that is 0."""
 
 
 class RemotePoint(Coupling):
@@ -296,67 +296,42 @@ class RemotePoint(Coupling):
 
     def constraints(self, fixed: Mask, known: Mask) -> Constraints:
         """Return what the nodes follow; see `Coupling`."""
-        return self._of_rigid() if self.is_rigid else self._of_mean(known.ravel())
+        if self.is_rigid:
+            return self._of_rigid()
+        if not self.fixed.any():
+            return Constraints.none()
+        dofs, D = self._tying()
+        return _solved_for(dofs, D[self.fixed], self.values[self.fixed])
 
     def _of_rigid(self) -> Constraints:
-        """Return u = R q of all nodes, by as many of their components as q has free ones."""
-        # What is prescribed, of the point and of nodes, are equations A q = b, by which q = A⁺ b + Z s.
+        """Return u = R q of all nodes, by as many of their components as q has, and A q = b of the point."""
         from kratos_lite.mesh.hanging import is_corner  # a quick start without it
 
         dofs, R = self._modes(self.mesh)
-        held, p = self._supports.fixed.flat[dofs], int(self.fixed.sum())
-        A = np.vstack([np.eye(6)[self.fixed], R[held]])
-        known = independent_rows(A)
-        self._check_rigid(A, known, dofs[held])
-        Z = np.linalg.qr(A[known].T, mode="complete")[0][:, len(known) :]
-        R, free, of_nodes = R[~held], dofs[~held], known >= p
         # Corner nodes come first, as the coarse level of multigrid has these alone.
-        corner = np.flatnonzero(is_corner(self.mesh.blocks, self.mesh.n_nodes)[free // 3])
-        chosen = corner[independent_rows((R @ Z)[corner])]
-        chosen = chosen if len(chosen) == Z.shape[1] else independent_rows(R @ Z)
-        if len(chosen) < Z.shape[1]:
+        corner = np.flatnonzero(is_corner(self.mesh.blocks, self.mesh.n_nodes)[dofs // 3])
+        chosen = corner[independent_rows(R[corner])]
+        chosen = chosen if len(chosen) == 6 else independent_rows(R)
+        D, A, b = np.linalg.pinv(R[chosen]), np.eye(6)[self.fixed], (self.values * self._sizes)[self.fixed]
+        # Of nodes on a line, q = D u + N s with one rotation s that moves none, which the point must hold.
+        N = np.linalg.qr(R[chosen].T, mode="complete")[0][:, len(chosen) :]
+        if len(independent_rows(A @ N)) < N.shape[1]:
             raise ModelError(
                 f"the nodes of {short(self.where)} lie on a line or at one place, and a rotation of the "
                 "remote point about it moves none: prescribe it by fix_rotation, or take more nodes"
             )
-        W = R @ Z @ np.linalg.inv(R[chosen] @ Z)
-        G = (R - W @ R[chosen]) @ np.linalg.pinv(A[known])
-        constants = G[:, ~of_nodes] @ self._prescribed[known[~of_nodes]]
-        weights = np.hstack([W, G[:, of_nodes]])
+        without = np.linalg.qr(A @ N, mode="complete")[0][:, N.shape[1] :].T
+        rest = np.delete(np.arange(len(dofs)), chosen)
+        weights = R[rest] @ D
         weights[np.abs(weights) < ROUNDING] = 0.0
-        independents = np.concatenate([free[chosen], dofs[held][known[of_nodes] - p]])
-        rest = np.delete(np.arange(len(free)), chosen)
-        each = np.broadcast_to(independents, (len(rest), len(independents)))
-        return Constraints.of(free[rest], each, weights[rest], constants[rest])
+        each = np.broadcast_to(dofs[chosen], weights.shape)
+        follow = Constraints.of(dofs[rest], each, weights, np.zeros(len(rest)))
+        return follow + _solved_for(dofs[chosen], without @ A @ D, without @ b)
 
-    @property
-    def _prescribed(self) -> Array:
-        """The components that are prescribed, times their sizes."""
-        return (self.values * self._sizes)[self.fixed]
 
-    def _check_rigid(self, A: Array, known: Ints, held: Ints) -> None:
-        """Raise ModelError where nodes of the part are prescribed otherwise than a rigid motion."""
-        supports, point, follows = self._supports, self._prescribed, A @ np.linalg.pinv(A[known])
-        fields = [(point, supports.values), *((0 * point, moved) for _, moved in supports.motions)]
-        for of_point, of_nodes in fields:
-            b = np.concatenate([of_point, of_nodes.flat[held]])
-            off = np.abs(follows @ b[known] - b)
-            if len(held) and off.max() > CONTRADICTION * np.abs(b).max():
-                at = supports.name(int(held[max(int(off.argmax()) - len(point), 0)]))
-                raise ModelError(
-                    f"what is prescribed at {at} is no rigid motion of {short(self.where)} with its remote "
-                    "point: prescribe the motion of the point instead"
-                )
-
-    def _of_mean(self, taken: Mask) -> Constraints:
-        """Return D u = values, by as many components of nodes as are prescribed."""
-        if not self.fixed.any():
-            return Constraints.none()
-        dofs, D = self._tying()
-        C, free = D[self.fixed], np.flatnonzero(~taken[dofs])
-        chosen = free[independent_rows(C[:, free].T)]
-        if len(chosen) < len(C):
-            raise ModelError(f"supports hold {short(self.where)}, so that no mean motion can be prescribed")
-        others, inverse = np.delete(np.arange(len(dofs)), chosen), np.linalg.inv(C[:, chosen])
-        each = np.broadcast_to(dofs[others], (len(C), len(others)))
-        return Constraints.of(dofs[chosen], each, -inverse @ C[:, others], inverse @ self.values[self.fixed])
+def _solved_for(dofs: Ints, C: Array, values: Array) -> Constraints:
+    """Return C u = values (k,) by as many of the degrees of freedom."""
+    chosen = independent_rows(C.T)
+    others, inverse = np.delete(np.arange(len(dofs)), chosen), np.linalg.inv(C[:, chosen])
+    each = np.broadcast_to(dofs[others], (len(C), len(others)))
+    return Constraints.of(dofs[chosen], each, -inverse @ C[:, others], inverse @ values)

@@ -13,7 +13,8 @@ from kratos_lite.mesh import NO_ROWS, Mesh, Where
 from kratos_lite.model.loads.base import key_of
 from kratos_lite.model.local_axes import LocalAxes
 from kratos_lite.model.ties import Coupling, PartTie
-from kratos_lite.solvers.constraints import ConstraintMap, Constraints, constraint_map, eliminate
+from kratos_lite.solvers.constraints import ConstraintMap, Constraints, constraint_map
+from kratos_lite.solvers.elimination import Redundant, eliminate, independent
 from kratos_lite.time_series import function_of
 from kratos_lite.typing import Array, ArrayLike, Csr, Ints, Mask
 from kratos_lite.validation import finite, short, whole_numbers
@@ -23,8 +24,6 @@ CONSTANT = -1
 """In place of the number of a function of time."""
 AXIAL = 1e-12
 """Weight below which a component along a local axis is one along x, y or z."""
-DEPENDENT = 1e-10
-"""Square of the sine of the angle below which two directions at a node are one."""
 
 
 def axis_numbers(axes: str, letters: str = AXES) -> list[int]:
@@ -79,7 +78,6 @@ class Supports:
         self.fixed.flags.writeable = self.values.flags.writeable = False
         self.hanging = self._constraints = hanging_constraints(mesh)
         self._inclined = Constraints.none()  # of conditions in local axes
-        self._inclined_rows: list[tuple[Ints, Array, Array]] = []  # nodes, directions and values of these
         self._hangs = np.zeros(mesh.n_nodes, dtype=bool)
         if mesh.hanging is not None:
             self._hangs[mesh.hanging.nodes] = True
@@ -89,6 +87,7 @@ class Supports:
         self._of_parts = Constraints.none()  # those of ties of parts
         self.version = self.value_version = 0  # changes but for values and functions of time; all changes
         self.springs: Csr | None = None  # (3n, 3n) N/m
+        self._independent: tuple[int, Constraints, Redundant | None] = (-1, Constraints.none(), None)
         self._dependents: tuple[int, Constraints] = (-1, Constraints.none())
 
     def __str__(self) -> str:
@@ -133,7 +132,7 @@ class Supports:
         """Take a condition away; what others prescribe stays."""
         self.conditions = [other for other in self.conditions if other is not condition]
         self._fixed[:], self._values[:], self._function[:] = False, 0.0, CONSTANT
-        self._inclined, self._inclined_rows = Constraints.none(), []
+        self._inclined = Constraints.none()
         self.changed()
         for other in self.conditions:
             self._apply(replace(other, override=True))
@@ -146,8 +145,6 @@ class Supports:
             at = np.ix_(nodes, np.array(numbers))
             self._fixed[at], self._values[at], self._function[at] = False, 0.0, CONSTANT
             self.changed()
-            if self._inclined_rows:
-                self._resolve_inclined()
             return
         follows = self._hangs[nodes]
         if len(nodes) and follows.all():
@@ -169,70 +166,37 @@ class Supports:
                 f"value must be one number, {len(numbers)} numbers (one per axis of {axes!r}) "
                 f"or have shape ({len(nodes)}, {len(numbers)}); got shape {new.shape}"
             ) from None
-        if condition.local is not None:
-            self._incline(nodes[~follows], condition.local, numbers, new)
+        each = np.repeat(nodes[~follows], len(numbers))
+        if condition.local is None:
+            self._prescribe(each, np.tile(numbers, len(new)), new.ravel(), function, condition.override)
             return
-        at = np.ix_(nodes[~follows], np.array(numbers))
-        if not condition.override:
+        a = condition.local.directions(self.mesh.points[nodes[~follows]])[:, numbers]
+        if len(numbers) == 3:
+            new = (a * new[..., None]).sum(axis=1)
+            self._prescribe(each, np.tile(range(3), len(new)), new.ravel(), function, condition.override)
+        else:
+            self._incline(each, a.reshape(-1, 3), new.ravel(), condition.override)
+
+    def _prescribe(self, nodes: Ints, axes: Ints, new: Array, function: int, override: bool) -> None:
+        """Prescribe components (k,) of displacements, with a function of time or without."""
+        at = nodes, axes
+        if not override:
             self._check_prescribed_once(at, new, function)
         self.version += not self.fixed[at].all()
         self.value_version += 1
         self._fixed[at], self._values[at], self._function[at] = True, new, function
-        if self._inclined_rows:
-            self._resolve_inclined()  # what is prescribed now follows from nothing else
 
-    def _incline(self, nodes: Ints, local: LocalAxes, numbers: list[int], values: Array) -> None:
-        """Prescribe components (m, k) along local axes: a·u = value at nodes, for each of these axes."""
-        a = local.directions(self.mesh.points[nodes])[:, numbers]
-        self._inclined_rows.append((np.repeat(nodes, len(numbers)), a.reshape(-1, 3), values.ravel()))
+    def _incline(self, nodes: Ints, a: Array, values: Array, override: bool) -> None:
+        """Prescribe a·u = value at nodes, for directions a (k, 3)."""
+        axis = np.abs(a).round(9).argmax(axis=1)  # nodes of a plane take the same axis
+        others = (axis[:, None] + [1, 2]) % 3
+        size = np.take_along_axis(a, axis[:, None], axis=1)
+        weights, constants = -np.take_along_axis(a, others, axis=1) / size, values / size[:, 0]
+        some = (np.abs(weights) > AXIAL).any(axis=1)
+        self._prescribe(nodes[~some], axis[~some], constants[~some], CONSTANT, override)
+        dependents, others = 3 * nodes + axis, 3 * nodes[:, None] + others
+        self._inclined += Constraints.of(dependents[some], others[some], weights[some], constants[some])
         self.changed()
-        self._resolve_inclined()
-
-    def _resolve_inclined(self) -> None:
-        """Find what components along local axes mean, with all others that are prescribed at their nodes."""
-        rows, a, v = (np.concatenate(parts) for parts in zip(*self._inclined_rows, strict=True))
-        nodes = np.unique(rows)
-        i, axis = np.nonzero(self._fixed[nodes] & (self._function[nodes] == CONSTANT))
-        rows, a = np.concatenate([rows, nodes[i]]), np.concatenate([a, np.eye(3)[axis]])
-        v, at = np.concatenate([v, self._values[nodes[i], axis]]), np.searchsorted(nodes, rows)
-        G, g = np.zeros((len(nodes), 3, 3)), np.zeros((len(nodes), 3))  # Σ a aᵀ u = Σ a v at each node
-        np.add.at(G, at, a[:, :, None] * a[:, None])
-        np.add.at(g, at, a * v[:, None])
-        size, Q = np.linalg.eigh(G)
-        known = size > DEPENDENT
-        u = np.einsum("nij,nj->ni", Q, np.einsum("nij,ni->nj", Q, g) / np.where(known, size, np.inf))
-        wrong = np.abs((a * u[at]).sum(axis=1) - v) > 1e-9 * np.abs(v).max(initial=0.0)
-        if wrong.any():
-            node = self.mesh.node_ids[rows[wrong.argmax()]]
-            raise ModelError(f"supports along local axes and others contradict each other at node {node}")
-        self._inclined = Constraints.none()
-        for rank in (1, 2, 3):
-            some = known.sum(axis=1) == rank
-            if some.any():
-                self._resolve(nodes[some], np.swapaxes(Q[some][:, :, 3 - rank :], 1, 2), u[some])
-
-    def _resolve(self, nodes: Ints, A: Array, u: Array) -> None:
-        """Let k components of displacements follow from the others where A (m, k, 3) times them is A u."""
-        k, free = A.shape[1], 1 - 0.999 * self._fixed[nodes]  # what moves in time follows from nothing else
-        first = np.zeros(len(nodes), dtype=int)
-        if k < 3:
-            size = np.abs(A[:, 0]) * free if k == 1 else np.abs(np.cross(A[:, 0], A[:, 1])) / free
-            size = size.round(9)  # nodes of a plane take the same axis
-            first = 2 - size[:, ::-1].argmax(axis=1) if k == 1 else size.argmax(axis=1) + 1
-        order = (first[:, None] + np.arange(3)) % 3  # k that follow, then those from which they do
-        A, u = np.take_along_axis(A, order[:, None], axis=2), np.take_along_axis(u, order, axis=1)
-        W = -np.linalg.solve(A[:, :, :k], A[:, :, k:])
-        W = np.where(np.abs(W) < AXIAL, 0.0, W)
-        c = (u[:, :k] - (W @ u[:, k:, None])[..., 0]).ravel()
-        dofs = 3 * nodes[:, None] + order
-        others = np.broadcast_to(dofs[:, None, k:], W.shape).reshape(len(c), 3 - k)
-        weights = W.reshape(len(c), 3 - k)
-        dependents, alone = dofs[:, :k].ravel(), ~weights.any(axis=1)
-        self._fixed.flat[dependents[alone]], self._values.flat[dependents[alone]] = True, c[alone]
-        some = ~alone
-        if some.any():
-            inclined = dependents[some], others[some], np.asarray(weights[some], dtype=float), c[some]
-            self._inclined += Constraints.of(*inclined)
 
     def _number(self, function: Callable[[float], float]) -> tuple[int, float]:
         """Return the number of a function of time, and its value at the time 0."""
@@ -246,11 +210,11 @@ class Supports:
 
     def _check_prescribed_once(self, at: tuple[Ints, ...], new: Array, function: int) -> None:
         """Raise ModelError if degrees of freedom have another value, or another function of time."""
-        differs = (self._function[at] != function) | ((self.values[at] != new) & (function == CONSTANT))
-        clash = np.argwhere(self.fixed[at] & differs)
-        for i, j in clash[:1]:
-            dof = int(3 * at[0][i, 0] + at[1][0, j])
-            how = f"{self.values.flat[dof]:g} m and {new[i, j]:g} m"
+        apart = np.abs(self.values[at] - new) > 1e-12 * np.abs(new).max(initial=0.0)
+        differs = (self._function[at] != function) | (apart & (function == CONSTANT))
+        for i in np.flatnonzero(self.fixed[at] & differs)[:1]:
+            dof = int(3 * at[0][i] + at[1][i])
+            how = f"{self.values.flat[dof]:g} m and {new[i]:g} m"
             if function != CONSTANT or self._function.flat[dof] != CONSTANT:
                 how = "by a function of time and otherwise"
             raise ModelError(
@@ -268,27 +232,27 @@ class Supports:
     @property
     def constraints(self) -> Constraints:
         """All constraints: of hanging nodes, those added, of local axes, of ties and remote points."""
-        if not self.ties:
-            return self._constraints + self._inclined if len(self._inclined) else self._constraints
         if self._every[0] != self.value_version:
-            every = self._constraints + self._inclined
-            held, self._of_parts = self.fixed.copy(), Constraints.none()
-            for tie in sorted(self.ties, key=lambda tie: not tie.moves_all):
-                known = held.copy()
-                known.flat[every.dependents] = True
+            every, self._of_parts = self._constraints + self._inclined, Constraints.none()
+            known = self.fixed.copy()
+            if self.ties:
+                known.flat[independent(every, known)[0].dependents] = True
+            # What moves all nodes of a part comes first, then ties, which leave out what others hold.
+            for tie in sorted(self.ties, key=lambda tie: (not tie.moves_all, not isinstance(tie, PartTie))):
                 new = tie.constraints(self.fixed, known)
                 every += new
+                known.flat[new.dependents] = True
                 if isinstance(tie, PartTie):
                     self._of_parts += new
                 for nodes in tie.moves_all:
-                    held[nodes] = True
+                    known[nodes] = True
             self._every = self.value_version, every
         return self._every[1]
 
     @constraints.setter
     def constraints(self, constraints: Constraints) -> None:
         self._constraints = Constraints.none()
-        self._inclined, self._inclined_rows, self.ties = Constraints.none(), [], []
+        self._inclined, self.ties = Constraints.none(), []
         self.add_constraints(constraints)
 
     @property
@@ -313,13 +277,29 @@ class Supports:
         self.version += not old or old[0].equations != tie.equations
         self.value_version += 1
 
+    def independent(self) -> Constraints:
+        """Return equal constraints whose dependents are one once, not fixed, without cycles."""
+        if self._independent[0] != self.value_version:
+            self._independent = self.value_version, *independent(self.constraints, self.fixed)
+        return self._independent[1]
+
     def dependents(self) -> Constraints:
-        """Return all constraints by free degrees of freedom alone."""
+        """Return all constraints by free degrees of freedom alone; ModelError where they contradict."""
         if self._dependents[0] != self.value_version:
-            for tie in self.ties:
-                self._check_agreement(*tie.held_twice(self.fixed))
-            self._dependents = self.value_version, self._eliminated(self.values)
+            eliminated = self._eliminated(self.values)
+            if self._independent[2] is not None:
+                self._check_redundant(self._independent[2])
+            self._dependents = self.value_version, eliminated
         return self._dependents[1]
+
+    def _check_redundant(self, redundant: Redundant) -> None:
+        """Raise ModelError where what is redundant contradicts, at rest or for a function of time."""
+        rest = np.where(self.fixed & (self._function == CONSTANT), self.values, 0.0).ravel()
+        cure = "change or remove one of them"
+        redundant.check(rest, 1.0, self.name, "{} = {:g} m is prescribed", cure)
+        for _, moved in self.motions:
+            cure = "give all that moves the same function of time, or remove one of them"
+            redundant.check(moved.ravel().astype(float), 0.0, self.name, "{} is prescribed", cure)
 
     @property
     def displaced(self) -> float:
@@ -365,22 +345,7 @@ class Supports:
 
     def _eliminated(self, values: Array) -> Constraints:
         """Return the dependents for prescribed values."""
-        return eliminate(self.constraints, self.fixed, values, self.name)
-
-    def _check_agreement(self, dependents: Ints, independents: Ints, constants: Array) -> None:
-        """Raise ModelError where supports move tied degrees of freedom, and not by `constants` apart."""
-        function, values = self._function.flat, self.values.flat
-        timed = function[dependents] != function[independents]
-        apart = values[dependents] - values[independents]
-        rounding = 1e-9 * max(np.abs(self.values).max(), np.abs(constants).max(initial=0.0))
-        for i in np.flatnonzero(timed | (np.abs(apart - constants) > rounding))[:1]:
-            one, other = int(dependents[i]), int(independents[i])
-            both = f"{self.name(one)} and {self.name(other)} are tied, but"
-            if timed[i]:
-                text = "give both the same function, or fix only one of them"
-                raise ModelError(f"{both} move differently: {text}")
-            text = f"{constants[i]:g} m must be between them, or fix one only"
-            raise ModelError(f"{both} prescribed as {values[one]:g} m and {values[other]:g} m: {text}")
+        return eliminate(self.independent(), self.fixed, values)
 
     def check_used(self, used: Mask) -> list[str]:
         """Raise ModelError for constraints of nodes that no element uses, by the mask (n,) of those used."""
@@ -419,7 +384,7 @@ class Supports:
         if not len(ties):
             return reactions
         out, none = reactions.copy(), np.zeros_like(self.fixed)
-        ties = eliminate(ties, none, np.zeros_like(self.values), self.name)
+        ties = eliminate(independent(ties, self.fixed)[0], none, np.zeros_like(self.values))
         np.add.at(
             out.reshape(-1), ties.independents, ties.weights * reactions.flat[ties.dependents][ties.owner]
         )

@@ -11,7 +11,7 @@ import numpy as np
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.sparsity_pattern import dofs_of
 from kratos_lite.errors import ModelError
-from kratos_lite.mesh import NO_ROWS, Block, Mesh, Where
+from kratos_lite.mesh import Block, Mesh, Where
 from kratos_lite.model.mortar import NEAR, Cells, Mortar, mortar
 from kratos_lite.solvers.constraints import Constraints
 from kratos_lite.tabular import in_units
@@ -39,11 +39,7 @@ class Coupling(ABC):
 
     @abstractmethod
     def constraints(self, fixed: Mask, known: Mask) -> Constraints:
-        """Return the constraints of degrees of freedom that are not `known` (n, 3): fixed, or dependent."""
-
-    def held_twice(self, fixed: Mask) -> tuple[Ints, Ints, Array]:
-        """Return pairs of degrees of freedom that are fixed, both, and what must be between them in m."""
-        return NO_ROWS, NO_ROWS, np.zeros(0)
+        """Return the constraints; others hold those `known` (n, 3), which are fixed or dependent."""
 
     def _check(self, groups: Sequence[ElementGroup], motion: object) -> list[str]:
         """Return warnings of what elements and a motion of their material mean for it; raise ModelError."""
@@ -108,6 +104,12 @@ class Tie(PartTie):
             step = near @ step @ diags_array(1.0 * (taken[free].sum(axis=0) == 0))
             taken = taken + step
         taken = taken[free]
+        far = held[taken.sum(axis=0) == 0]
+        far = far[abs(self.W[far]) @ ~fixed.ravel() > 0]
+        if len(far):  # no neighbor takes these multipliers, so that they stay
+            known = known.copy()
+            known.flat[dofs[far]] = False
+            return self.constraints(fixed, known)
         taken = csr_array(taken @ diags_array(1 / np.maximum(taken.sum(axis=0), 1.0)))
         own = csr_array((np.ones(len(free)), (np.arange(len(free)), free)), shape=(len(free), len(dofs)))
         gives = csr_array((np.ones(len(held)), (np.arange(len(held)), held)), shape=(len(held), len(dofs)))

@@ -1,4 +1,4 @@
-"""Constraints of degrees of freedom, and the map u = T q + c from the free ones to all, by elimination.
+"""Constraints of degrees of freedom, and the map u = T q + c from the free ones to all.
 
 Multi-point constraints are u[dependent] = Σ weight · u[independent] + constant.  T^T K T q = T^T (f - K c)
 stays symmetric and holds them exactly, without a penalty.
@@ -6,14 +6,13 @@ stays symmetric and holds them exactly, without a penalty.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from kratos_lite.errors import ModelError
 from kratos_lite.typing import Array, ArrayLike, Csr, Ints, Mask, Numbers
 
 
@@ -76,49 +75,6 @@ class Constraints:
         return Constraints(*dofs, kept.weights, kept.constants)
 
 
-def eliminate(
-    constraints: Constraints, fixed: Mask, values: Array, name: Callable[[int], str]
-) -> Constraints:
-    """Express every dependent dof by free ones; ModelError for circles and dofs constrained twice."""
-    # With u_d = W u + P u_d + k, each pass doubles the length of the chains of dependents that W and k hold.
-    dependents, count = constraints.dependents, len(constraints)
-    if not count:
-        return constraints
-    from scipy.sparse import csr_array, diags_array
-    from scipy.sparse.csgraph import connected_components
-
-    _check(dependents, fixed.ravel(), name)
-    entries = constraints.weights, constraints.independents, constraints.start
-    W: Any = csr_array(entries, shape=(count, fixed.size))
-    P: Any = W[:, dependents]
-    components = connected_components(P, connection="strong")[1]
-    on_circle = (np.bincount(components)[components] > 1) | (P.diagonal() != 0)
-    if on_circle.any():
-        at = int(dependents[on_circle.argmax()])
-        raise ModelError(f"the constraints of {name(at)} form a cycle; remove one of them")
-    constants = constraints.constants + W @ np.where(fixed, values, 0.0).ravel()
-    is_free = ~fixed.ravel()
-    is_free[dependents] = False
-    W = W @ diags_array(1.0 * is_free)
-    W.eliminate_zeros()
-    while P.nnz:
-        constants, W, P = constants + P @ constants, W + P @ W, P @ P
-    W.sort_indices()
-    start, dofs = W.indptr.astype(np.int64), W.indices.astype(np.int64)
-    return Constraints(dependents, start, dofs, W.data, constants)
-
-
-def _check(dependents: Ints, fixed: Mask, name: Callable[[int], str]) -> None:
-    """Raise ModelError for dofs that depend twice, or are fixed as well."""
-    first = np.unique(dependents, return_index=True)[1]
-    if len(first) < len(dependents):
-        twice = int(np.delete(dependents, first)[0])
-        raise ModelError(f"{name(twice)} depends on others by two constraints; remove one of them")
-    if fixed[dependents].any():
-        both = int(dependents[fixed[dependents].argmax()])
-        raise ModelError(f"{name(both)} is both fixed and dependent by a constraint; do one of the two")
-
-
 @dataclass(eq=False)
 class ConstraintMap:
     """The map u = T q + c from the free degrees of freedom q to all."""
@@ -134,6 +90,11 @@ class ConstraintMap:
         is_free = np.zeros(len(self.c), dtype=bool)
         is_free[self.free] = True
         return is_free
+
+    @property
+    def norm(self) -> float:
+        """The largest sum of the sizes of the weights of T in a row, by which rounding of q grows in u."""
+        return 1.0 if self.T is None else float(max(abs(self.T).sum(axis=1).max(initial=0.0), 1.0))
 
     def holding(self, constrained: Mask) -> ConstraintMap:
         """Return the map with some of the free ones (N,) constrained, too, where they are at q = 0."""

@@ -122,8 +122,15 @@ def test_contradicting_supports_are_named_by_their_node():
     model = kl.Model(kl.box(), STEEL)
     model.fix("x-", "x", 1e-3)
     model.fix("x-", "x", 1e-3, local=kl.Cartesian((1, 0, 0)))
-    with pytest.raises(ModelError, match="contradict each other at node"):
+    with pytest.raises(ModelError, match=r"node 1 along x is prescribed twice: 0\.001 m and 0 m"):
         model.fix("x-", "x", local=kl.Cartesian((1, 0, 0)))
+    model.fix("x+", "xy", local=kl.Cartesian((1, 2, 3)))
+    model.fix("x+", "x", 1e-3, local=kl.Cartesian((1, 1, 0), (0, 0, 1)))
+    model.fix("x+", "z", 1e-3)
+    with pytest.raises(
+        ModelError, match=r"contradicts itself: node . along . = .*node . along z = 0\.001 m is"
+    ):
+        model.solve()
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import kratos_lite as kl
 from kratos_lite import voigt
@@ -73,6 +74,25 @@ def test_a_rigid_part_may_hold_nodes_of_a_tied_face(part, other):
     result = moved.solve()
     assert max(np.abs(stress).max() for stress in result.stress()) < 1e-3
     assert np.abs(hub.rotation(result) - [0, 1e-3, 2e-3]).max() < 1e-12
+
+
+@pytest.mark.parametrize("hold", ["fix", "rigid"])
+@pytest.mark.parametrize("other", [(2, 2, 1), (2, 3, 4)], ids=["a depends", "b depends"])
+def test_a_face_tied_to_one_that_is_held_as_a_whole_is_held(other, hold):
+    """All nodes of the face may depend on those of the other: it is as if that were held, too."""
+    results = []
+    for parts in (["a.x+"], ["b.x-"], ["a.x+", "b.x-"]):
+        model = tied(blocks("8N 8N", other=other))
+        for part in parts:
+            if hold == "fix":
+                model.fix(part, "xyz", 1e-6)
+            else:
+                hub = model.rigid(part, (1, 0.5, 0.5))
+        model.fix("a.x-")
+        model.add(kl.Traction("b.x+", (1e6, 2e6, 0)) if hold == "fix" else hub.load((1e6, 2e6, 0)))
+        results.append(model.solve())
+    for result in results[1:]:
+        assert np.abs(result.u - results[0].u).max() < 1e-9 * np.abs(result.u).max()
 
 
 def test_parts_that_are_not_tied_are_named():
@@ -170,6 +190,20 @@ def test_rigid_motions_pass_a_gap_where_nodes_lie_opposite_one_another(kind, cel
     follow = np.zeros((len(c), 6))
     np.add.at(follow, c.owner, c.weights[:, None] * U[c.independents])
     assert np.abs(follow - U[c.dependents]).max() < 1e-12
+
+
+@pytest.mark.parametrize("mode", range(6))
+def test_a_prescribed_rigid_motion_passes_the_gap_of_a_turned_mesh(mode):
+    """All forces are rounding, which weights of ties of quadratic cells make larger."""
+    element, turn = "KinematicLinear3D20N", Rotation.random(random_state=0).as_matrix()
+    low = kl.box(cells=(2, 2, 1), element=element)
+    mesh = kl.join({"low": low, "top": kl.box(cells=(3, 3, 1), element=element, origin=(0, 0, 1.1))})
+    model = kl.Model(mesh.replace(points=mesh.points @ turn.T), STEEL)
+    model.tie("low.z+", "top.z-", tolerance=0.2)
+    motion = 1e-3 * rigid_modes(model.mesh.points)[:, mode].reshape(-1, 3)
+    held = model.mesh.nodes("low.z-")
+    model.fix(held, "xyz", motion[held])
+    assert np.abs(model.solve().u - motion).max() < 1e-12
 
 
 def test_a_thick_cylinder_of_two_unlike_rings():

@@ -141,20 +141,51 @@ def test_chains_of_constraints_with_constants_and_fixed_masters_are_followed_to_
 
 
 @pytest.mark.parametrize(
-    ("constraints", "words"),
+    ("constraints", "equal"),
     [  # node, the node that it depends on, and the factor; even nodes are fixed
-        ([(1, 3, 1.0), (3, 5, 1.0), (5, 1, 0.5)], "form a cycle"),
-        ([(1, 1, 0.5)], "form a cycle"),
-        ([(0, 1, 1.0)], "node 1 along x is both fixed and dependent by a constraint"),
-        ([(1, 3, 1.0), (1, 5, 1.0)], "depends on others by two constraints"),
+        ([(1, 3, 1.0), (3, 5, 1.0), (5, 1, 0.5)], [(1, 0, 1.0), (3, 0, 1.0), (5, 0, 1.0)]),
+        ([(1, 3, 1.0), (3, 5, 1.0), (5, 1, 1.0)], [(1, 3, 1.0), (5, 3, 1.0)]),
+        ([(1, 1, 0.5)], [(1, 0, 1.0)]),
+        ([(1, 1, 1.0)], []),
+        ([(0, 1, 1.0)], [(1, 0, 1.0)]),
+        ([(0, 2, 1.0)], []),
+        ([(1, 3, 1.0), (1, 5, 2.0)], [(3, 1, 1.0), (5, 1, 0.5)]),
+        ([(1, 3, 1e-7), (1, 5, 2e-7)], [(1, 3, 1e-7), (5, 3, 0.5)]),
+    ],
+)
+def test_rings_and_dofs_constrained_twice_are_solved(constraints, equal):
+    found = []
+    for given in (constraints, equal):
+        model = kl.Model(kl.box(), STEEL)
+        model.fix("z-")
+        model.add(kl.Traction("z+", (1e6, 2e6, 3e6)))
+        for dependent, independent, factor in given:
+            model.constrain((dependent, "x"), {(independent, "x"): factor})
+        found.append(model.solve())
+    size = np.abs(found[1].u).max()
+    np.testing.assert_allclose(found[0].u, found[1].u, rtol=0, atol=1e-12 * size)
+    assert found[0].report.unknowns == found[1].report.unknowns
+
+
+@pytest.mark.parametrize(
+    ("constraints", "words"),
+    [  # node, the node that it depends on, and the constant; even nodes are fixed
+        (
+            [(1, 3, 0), (3, 5, 0), (5, 1, 1e-3)],
+            r"node 2 along x = node 4 along x; .*node 2 along x \+ 0.001 m",
+        ),
+        ([(1, 1, 1e-3)], r"node 2 along x = node 2 along x \+ 0.001 m: change or remove one of them"),
+        ([(0, 2, 1e-3)], "node 1 along x = 0 m is prescribed; node 3 along x = 0 m is prescribed"),
+        ([(1, 0, 1e-3), (1, 2, 0)], "node 2 along x = node 3 along x"),
     ],
 )
 def test_constraints_that_contradict_are_errors(constraints, words):
     model = kl.Model(kl.box(), STEEL)
     model.fix("z-")
-    for dependent, independent, factor in constraints:
-        model.constrain((dependent, "x"), {(independent, "x"): factor})
-    with pytest.raises(kl.ModelError, match=words):
+    model.constrain((7, "x"), {(5, "x"): 0.5})
+    for dependent, independent, constant in constraints:
+        model.constrain((dependent, "x"), {(independent, "x"): 1.0}, constant)
+    with pytest.raises(kl.ModelError, match="what is prescribed contradicts itself: .*" + words):
         model.solve()
 
 

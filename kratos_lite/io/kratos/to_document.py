@@ -59,15 +59,19 @@ def document_from(model: Model) -> Document:
     loaded, number = (forces != 0).any(axis=1, keepdims=True), next(iter(properties), 0)
     points = Block("PointLoadCondition3D1N", np.argwhere(loaded)[:, :1], properties=number, shape=Point1)
     conditions = [points] if len(points) else []
-    more, values = written(model.attached, blocks, number)
+    more, elemental = written(model.attached, blocks, number)
     whole_mesh = mesh.replace(blocks=[*blocks, *more], conditions=conditions, parts=_parts(mesh))
-    data = _nodal_data(mesh, "DISPLACEMENT", supports.fixed, supports.values, fixed=True) + start
+    constraints, fixed, values = supports.independent(), supports.fixed.copy(), supports.values.copy()
+    depends = np.diff(constraints.start) > 0
+    at = constraints.dependents[~depends]  # what constraints hold is fixed
+    fixed.flat[at], values.flat[at] = True, constraints.constants[~depends]
+    data = _nodal_data(mesh, "DISPLACEMENT", fixed, values, fixed=True) + start
     data += _nodal_data(mesh, "POINT_LOAD", np.repeat(loaded, 3, axis=1), forces)
     if len(hot := np.flatnonzero(np.isfinite(temperature))):
         free = np.zeros(len(hot), dtype=bool)
         data.append(Data("TEMPERATURE", mesh.node_ids[hot], free, temperature[hot]))
-    constraints = constraints_of(mesh, supports.constraints)
-    document = Document(whole_mesh, properties, nodal_data=data, constraints=constraints, element_data=values)
+    tied = constraints_of(mesh, constraints.take(depends))
+    document = Document(whole_mesh, properties, nodal_data=data, constraints=tied, element_data=elemental)
     if mesh.conditions:
         document.notes.append(Note(0, "conditions are replaced by the nodal forces of their loads"))
     if mesh.units != "SI":

@@ -257,3 +257,34 @@ def test_a_pipe_and_a_loop_of_links_are_refused(tmp_path):
     (tmp_path / "loop.mdpa").symlink_to(tmp_path / "loop.mdpa")
     with pytest.raises(kl.InputError, match="cannot be read"):
         read_bytes(tmp_path / "loop.mdpa")
+
+
+RING = """
+Begin Constraints LinearMasterSlaveConstraint DISPLACEMENT_X DISPLACEMENT_X
+1 0.0 [1.0] 4 6
+2 0.0 [1.0] 6 8
+3 0.0 [1.0] 8 4
+4 0.0005 [0.5] 2 2
+End Constraints
+"""
+
+
+def test_a_ring_of_constraints_is_read_solved_and_written_without_it(tmp_path):
+    """Nodes 4, 6 and 8 move alike in x; node 2 moves by 1 mm, as half of its motion and 0.5 mm."""
+    model = kl.Model(kl.box(), kl.Isotropic3D(200e9, 0.3, density=7800.0))
+    model.fix(model.mesh.nodes("z-")[[0, 2, 3]], "xyz")
+    model.fix([1], "yz")
+    model.add(kl.PointLoad([7], (1e5, 0, -1e5)))
+    kl.write(tmp_path / "plain.mdpa", model)
+    with open(tmp_path / "plain.mdpa", "a") as file:
+        file.write(RING)
+    ring = kl.read(tmp_path / "plain.mdpa")
+    for dependent in (3, 5):
+        model.constrain((dependent, "x"), {(7, "x"): 1.0})
+    model.fix([1], "x", 1e-3)
+    found, expected = ring.solve().u, model.solve().u
+    assert np.abs(found - expected).max() < 1e-12 * np.abs(expected).max()
+    kl.write(tmp_path / "solved.mdpa", ring)
+    again = kl.read(tmp_path / "solved.mdpa")
+    assert len(np.unique(again.supports.constraints.dependents)) == len(again.supports.constraints) == 2
+    assert np.abs(again.solve().u - expected).max() < 1e-12 * np.abs(expected).max()
