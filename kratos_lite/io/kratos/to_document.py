@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.analysis.model import Model
+from kratos_lite.analysis.nodal_loads import external_loads
 from kratos_lite.errors import InputError
 from kratos_lite.io.formats.document import Constraint, Data, Document, Note, Properties
 from kratos_lite.io.kratos.properties import THERMAL_LAW, USER_LAW
@@ -48,7 +49,7 @@ def document_from(model: Model) -> Document:
     temperature, references = _temperature(model)
     numbers, properties = _properties(model, gravity, references)
     blocks = _blocks(model, numbers)
-    forces = sum((load.forces(mesh, model.element_groups()) for load in others), np.zeros_like(mesh.points))
+    forces = external_loads(model, model.element_groups(), others)
     loaded, number = (forces != 0).any(axis=1, keepdims=True), next(iter(properties), 0)
     points = Block("PointLoadCondition3D1N", np.argwhere(loaded)[:, :1], properties=number, shape=Point1)
     conditions = [points] if len(points) else []
