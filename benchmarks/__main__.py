@@ -1,7 +1,7 @@
 """Measure: ``python -m benchmarks quick``, or ``full``, or one set by its name.
 
 Sets: ``kratos error growth stall assembly parse skips cube1 motion ale distributed``, and in this process
-``effectivity adaptive edges dynamics laws folders``.
+``effectivity adaptive edges dynamics laws loads folders``.
 
 ``report`` makes the pages and pictures of the docs from the results kept; ``references`` makes the
 energies of the scenes without an exact field.  See benchmarks/README.md.
@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks import accuracy, curves, dynamics, folders, laws, report, scaling, scenes, sets, stall
+from benchmarks import accuracy, curves, dynamics, folders, laws, loads, report, scaling, scenes, sets, stall
 from benchmarks.driver import ROOT, Driver, Run, load, results, save, scratch
 from benchmarks.motion import MOTIONS
 from benchmarks.programs import HELPERS, PROGRAMS
@@ -56,6 +56,7 @@ OTHERS: dict[str, Callable[[argparse.Namespace], int | None]] = {
     "edges": lambda o: accuracy.edges(),
     "dynamics": lambda o: dynamics.dynamics(),
     "laws": lambda o: laws.laws(o.pythons.get("Kratos", o.pythons.get("", "")), o.cells or laws.CELLS),
+    "loads": lambda o: loads.loads(),
     "folders": lambda o: folders.folders(o.path, o.pythons.get("Kratos", o.pythons.get("", ""))),
     "references": lambda o: references(o.cells or (4, 8, 16)),
     "report": lambda o: write_report(),

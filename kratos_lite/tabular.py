@@ -5,15 +5,28 @@ from __future__ import annotations
 import re
 from dataclasses import fields, is_dataclass
 
+IN, LBF = 0.0254, 4.4482216152605
+"""An inch in m, and a pound-force in N."""
 UNITS: dict[str, dict[str, tuple[str, float]]] = {
     "SI": {},
     "mm N MPa t": {"m": ("mm", 1e-3), "Pa": ("MPa", 1e6), "J": ("mJ", 1e-3), "kg": ("t", 1e3)},
     "m kN kPa t": {"N": ("kN", 1e3), "Pa": ("kPa", 1e3), "J": ("kJ", 1e3), "kg": ("t", 1e3)},
+    "mm kN GPa kg ms": {
+        **{"m": ("mm", 1e-3), "N": ("kN", 1e3), "Pa": ("GPa", 1e9)},
+        **{"s": ("ms", 1e-3), "Hz": ("kHz", 1e3)},
+    },
+    "in lbf psi slinch": {
+        **{"m": ("in", IN), "N": ("lbf", LBF), "Pa": ("psi", LBF / IN**2)},
+        **{"J": ("in·lbf", LBF * IN), "kg": ("slinch", LBF / IN)},
+    },
 }
-"""Consistent sets of units, with s and K: what takes the place of each unit of SI, and its size in SI."""
-_UNIT = re.compile("kg|Pa|[mNJ]")
+"""Consistent sets of units, with K: what takes the place of each unit of SI, and its size in SI.
+
+A slinch is 1 lbf s²/in.
+"""
+_UNIT = re.compile("kg|Pa|Hz|rad|[mNJs]")
 _AFTER_NUMBER = re.compile(
-    r"(?:(?<=[\d)\]] )|(?<=\[))√?(?:kg|Pa|[mNJ])[²³23]?(?:[ /](?:kg|Pa|[mNJs])[²³23]?)*(?!\w)"
+    r"(?:(?<=[\d)\]] )|(?<=\[))√?(?:kg|Pa|Hz|rad|[mNJs])[²³23]?(?:[ /](?:kg|Pa|[mNJs])[²³23]?)*(?!\w)"
 )
 
 
@@ -41,7 +54,7 @@ def size_in_si(unit: str, units: str) -> float:
     1e+12
     """
     size = 1.0
-    for per, name, power in re.findall("(/?)(kg|Pa|[mNJ])([²³]?)", unit):
+    for per, name, power in re.findall("(/?)(kg|Pa|[mNJs])([²³]?)", unit):
         size *= UNITS[units].get(name, ("", 1.0))[1] ** ({"²": 2, "³": 3}.get(power, 1) * (-1 if per else 1))
     return size
 

@@ -5,18 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from itertools import chain
 from typing import Any
 
 import numpy as np
 
 from kratos_lite.analysis.fields import Fields
-from kratos_lite.analysis.nodal_loads import forces_of
+from kratos_lite.analysis.nodal_loads import nodal_forces
 from kratos_lite.analysis.quantities import Compliance, Quantity
 from kratos_lite.assembly.attached import Attached
 from kratos_lite.assembly.gauss_point_fields import internal_load, virtual_work, work_by_coordinates
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model.free_motions import FreeMotions
 from kratos_lite.model.loads.temperature import heated
+from kratos_lite.model.loads.together import joined
 from kratos_lite.model.local_axes import Cartesian
 from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array
@@ -82,11 +84,12 @@ def _of_loads(model: Structure, result: Any, by: str, v: Array) -> Array:
     """Return the derivative of the work v·f of the loads."""
     known = result.mesh, result.groups
     if by == "loads":
-        return np.array([(forces_of(model, known[1], load) * v).sum() for load in result._acting])
+        found = (nodal_forces(model, known[1], [load]) for load in result._acting)
+        return np.array([sum((forces * v[nodes]).sum() for nodes, forces in some) for some in found])
     total = np.zeros_like(v) if by == "coordinates" else np.zeros(result.mesh.n_elements)
-    for load in result._acting if by != "stiffness" else ():
-        for factor, part in load.acting(0.0):
-            total += factor * (part.by_density if by == "density" else part.by_coordinates)(*known, v)
+    acting = chain.from_iterable(load.acting(0.0) for load in result._acting if by != "stiffness")
+    for factor, part in joined(result.mesh, acting):
+        total += factor * (part.by_density if by == "density" else part.by_coordinates)(*known, v)
     return total
 
 

@@ -175,7 +175,7 @@ class EquationsOfMotion:
         assert self.terms is not None
         system, load = self.system, self.system.scatter(self.terms.centrifugal.ravel())
         cure = "let it turn about a principal axis through its center of mass"
-        self.free_motions.check([load], moving=True, cure=cure)
+        self.free_motions.check([(np.arange(len(load)), load)], moving=True, cure=cure)
         held = system.constraint_map.holding(self.free_motions.constrained[system.nodes])
         equations = LinearSolver(self.K, held, system.points, Plan("direct"))
         u0 = equations.solve(system.gather(load), 1e-12, system.progress, np.zeros_like(held.c)).x

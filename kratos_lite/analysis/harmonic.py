@@ -17,7 +17,7 @@ from kratos_lite.analysis.element_fields import ElementFields
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.fields import labelled
 from kratos_lite.analysis.modal import natural_modes
-from kratos_lite.analysis.nodal_loads import forces_of
+from kratos_lite.analysis.nodal_loads import nodal_forces
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError, ModelError, SolveError
 from kratos_lite.mesh import Mesh
@@ -298,7 +298,7 @@ def _check(model: Structure) -> None:
 
 def _forces(model: Structure, e: EquationsOfMotion, loads: HarmonicLoads | None) -> Complexes:
     """Return the amplitudes (3a,) of the forces in N."""
-    total = np.zeros(e.size, dtype=complex)
+    total = np.zeros(model.mesh.points.shape, dtype=complex)
     loads = model.loads if loads is None else instance(loads, "loads", (list, tuple), "[load]")
     for item in loads:
         load, factor = item if isinstance(item, tuple) and len(item) == 2 else (item, 1.0)
@@ -309,5 +309,6 @@ def _forces(model: Structure, e: EquationsOfMotion, loads: HarmonicLoads | None)
         if not isinstance(factor, Complex):
             raise InputError(f"the factor of a load is a complex number; got {factor!r}")
         finite(abs(factor), "the size of the factor of a load")
-        total += factor * e.system.gather(forces_of(model, e.groups, load))
-    return total
+        for nodes, forces in nodal_forces(model, e.groups, [load]):
+            np.add.at(total, nodes, complex(factor) * forces)
+    return np.asarray(e.system.gather(total), dtype=complex)

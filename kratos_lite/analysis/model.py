@@ -37,7 +37,8 @@ class Model(Structure):
         ``b_bar``, ``reduced``, ``total_lagrangian`` for large displacements, ``f_bar`` where ν → ½ then, or
         ``non_locking``: that of each shape which does not lock with its material.
     units : consistent set of units that mesh, material and all that is added are in, such as
-        ``"mm N MPa t"``, as a label: no number changes; see `Mesh.use_units`.  That of the mesh if not given.
+        ``"mm N MPa t"``, as a label: no number changes; see `Mesh.use_units`.  That of the mesh if not given;
+        ``"auto"`` recognizes it from E and density of the material.
 
     Raises
     ------

@@ -7,7 +7,7 @@ from operator import itemgetter
 
 import numpy as np
 
-from kratos_lite.analysis.nodal_loads import initial_loads, stress_load
+from kratos_lite.analysis.nodal_loads import external_loads, initial_loads, stress_load
 from kratos_lite.analysis.report import element_counts
 from kratos_lite.analysis.result import Result, result_of
 from kratos_lite.analysis.solution_checks import Phases, check_arguments, check_solution
@@ -141,9 +141,10 @@ def _checked(model: Structure) -> tuple[list[ElementGroup], list[str]]:
 def _forces(model: Structure, groups: list[ElementGroup], own: Mask) -> Array:
     """Return what the loads put on the nodes of a part (n, 3), to be summed over parts."""
     total = np.zeros_like(model.mesh.points)
-    for load in model.loads:
-        forces = load.forces(model.mesh, groups)
-        total += forces * own[:, None] if _acts_on_nodes(load) else forces
+    for shared in (True, False):
+        loads = [load for load in model.loads if _acts_on_nodes(load) is shared]
+        forces = external_loads(model, groups, loads)
+        total += forces * own[:, None] if shared else forces
     return total
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kratos_lite.analysis.nodal_loads import external_loads, forces_of, initial_loads
+from kratos_lite.analysis.nodal_loads import external_loads, initial_loads, nodal_forces
 from kratos_lite.analysis.solution_checks import Phases
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError, ModelError
@@ -126,10 +126,10 @@ def load_set(
         groups = heated(mesh, state.groups, chain.from_iterable(load.acting(0.0) for load in loads))
         initial = initial_loads(model, groups)
         forces = external if initial is None else external - supports.on_independents(initial)
-        checks.check_carried(mesh, forces, state.used)
+        checks.check_carried(mesh, np.arange(len(forces)), forces, state.used)
         pushed = any_axis((forces != 0) & ~supports.fixed)
         moving = state.components_with(pushed | dirichlet.displaced)
-        state.free.check((forces_of(model, state.groups, load) for load in loads), moving)
+        state.free.check(nodal_forces(model, state.groups, loads), moving)
     return LoadSet(list(loads), groups, external, forces, moving, phase)
 
 

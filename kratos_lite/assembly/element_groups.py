@@ -37,6 +37,8 @@ from kratos_lite.validation import whole_number
 if TYPE_CHECKING:
     from kratos_lite.elements.tables import StrainTables
 
+FEW = 16
+"""Nodes that get something are few if they are so many times fewer than all."""
 CHUNK_BYTES = 4_000_000
 """Memory of the element matrices computed at once: small enough for the cache."""
 
@@ -209,9 +211,13 @@ def geometries_of(points: Array, group: ElementGroup) -> Geometries:
 
 def add_nodal(total: Array, nodes: Numbers, values: Array) -> None:
     """Add element vectors (m, k, 3) to nodal vectors `total` (n, 3)."""
-    flat = nodes.ravel()
+    flat: Any = nodes.ravel()
+    rows: Any = slice(None)
+    if FEW * len(flat) < len(total):  # most rows get nothing
+        rows, flat = np.unique(flat, return_inverse=True)
+    size = len(total[rows])
     for axis in range(total.shape[1]):
-        total[:, axis] += np.bincount(flat, weights=values[..., axis].ravel(), minlength=len(total))
+        total[rows, axis] += np.bincount(flat, weights=values[..., axis].ravel(), minlength=size)
 
 
 # ---- grouping --------------------------------------------------------------------------------------

@@ -14,6 +14,7 @@ from kratos_lite.bodies.linear_algebra import NO_ENTRIES, Entries
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.loads import Load, TimeDependentLoad
+from kratos_lite.model.loads.base import in_time
 from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.loads.temperature import Temperature
 from kratos_lite.time_series import Factor, function_of
@@ -106,8 +107,11 @@ def _on_nodes(load: Load, mesh: Mesh, body: FreeBody) -> AppliedLoad:
     """Return the nodal forces of the undeformed mesh, which keep their direction in space."""
     elements = body.elements()
     if isinstance(load, TimeDependentLoad):
-        forces, nothing = load.history(lambda one: one.forces(mesh, elements)), np.zeros_like(mesh.points)
-        return AppliedLoad(lambda q, u, t: body.generalized_nodal_force(forces(t) + nothing, q))
+        forces = in_time([load], lambda ones: ones[0].forces(mesh, elements))
+        rest = np.zeros_like(mesh.points)
+        return AppliedLoad(
+            lambda q, u, t: body.generalized_nodal_force(sum((k * f for k, f in forces(t)), rest), q)
+        )
     f = load.forces(mesh, elements)
     return AppliedLoad(
         lambda q, u, t: body.generalized_nodal_force(f, q),

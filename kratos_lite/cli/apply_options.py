@@ -133,7 +133,7 @@ def _time(options: Namespace, of_file: TimeIntegration | None) -> TimeIntegratio
 
 def _add_to_model(model: Model, options: Namespace) -> None:
     """Add the units, materials, supports, loads and motion of the command line to a model."""
-    if options.units is not None:
+    if options.units not in (None, "auto"):
         model.mesh.use_units(options.units)
     if options.formulation is not None:
         try:
@@ -143,6 +143,8 @@ def _add_to_model(model: Model, options: Namespace) -> None:
     # the special wins over the general
     for part, law in sorted(options.material, key=lambda pair: pair[0] is not None):
         model.assign(law, _where(model, part))
+    if options.units == "auto":
+        model.recognize_units()
     for part, (axes, value) in options.fix:
         model.fix(part, axes, value)
     if options.gravity and any(isinstance(load, Gravity) for load in model.loads):

@@ -27,7 +27,7 @@ PICTURE = "picture of the deformed model, of its modes, or of a body along its p
 RESTART = "go on from a state that --state wrote; files hold the rest alone, so give them new names"
 STRESS_FREE = "do not take the DISPLACEMENT of free nodes in the file for the state without stress"
 SECTION = "force, moment and area of a cut: by a plane such as x=0.5, or around the elements of a part"
-UNITS = "consistent units of all numbers here and in the file, as a label: mm N MPa t, m kN kPa t (SI)"
+UNITS = "consistent units of all numbers here and in the file, a label: auto, mm N MPa t … (SI)"
 VTU = "how .vtu files store their numbers: quickest, smallest, or to be read by eye (binary)"
 
 

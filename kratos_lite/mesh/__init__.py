@@ -14,7 +14,7 @@ from kratos_lite.mesh.blocks import (
 )
 from kratos_lite.mesh.mesh import Mesh
 from kratos_lite.mesh.selection import SIDES, Where, WhereElements
-from kratos_lite.mesh.topology import Faces, components, equal_sets, outward_signs
+from kratos_lite.mesh.topology import Faces, components, equal_sets
 
 __all__ = [
     "NO_ROWS",
@@ -30,7 +30,6 @@ __all__ = [
     "equal_sets",
     "ids_of",
     "mask_of",
-    "outward_signs",
     "rows_of_ids",
     "select",
     "with_rows",

@@ -173,6 +173,10 @@ class Cells(Protocol):
     def extent(self) -> Array:
         """Lowest and highest coordinates (2, 3)."""
 
+    @property
+    def places(self) -> tuple[Array, Ints]:
+        """How far nodes are along a skew direction, in order (n,), and the nodes in this order."""
+
     def place(self, block: Block, cell: int) -> str:
         """Return a cell in words."""
 
@@ -210,10 +214,16 @@ def with_rows(blocks: Iterable[Block]) -> Iterator[tuple[Block, slice]]:
         start += len(block)
 
 
-def select(blocks: Sequence[Block], rows: Ints) -> list[Block]:
-    """Return the cells with these rows, block by block."""
+def select(blocks: Sequence[Block], rows: Ints, properties: Ints | None = None) -> list[Block]:
+    """Return the cells with these rows (k,), block by block; with other properties (k,) if given."""
     inside = ((block, at, (rows >= at.start) & (rows < at.stop)) for block, at in with_rows(blocks))
-    return [block.take(rows[here] - at.start) for block, at, here in inside if here.any()]
+    found = [(block.take(rows[here] - at.start), here) for block, at, here in inside if here.any()]
+    return [b if properties is None else replace(b, properties=properties[here]) for b, here in found]
+
+
+def ranges(start: Ints, count: Ints) -> Ints:
+    """Return the whole numbers from each start on, as many as its count, one after the other."""
+    return np.repeat(start - np.cumsum(count) + count, count) + np.arange(int(count.sum()))
 
 
 def mask_of(indices: Any, count: int) -> Mask:
@@ -242,10 +252,7 @@ def without_repeats(rows: Ints) -> Ints:
     """Return the rows, each once, in the order in which they came first."""
     if (rows[1:] > rows[:-1]).all():
         return rows
-    order = np.argsort(rows, kind="stable")
-    ordered = rows[order]
-    first: Ints = np.sort(order[np.append(True, ordered[1:] != ordered[:-1])])
-    return rows[first]
+    return np.fromiter(dict.fromkeys(rows.tolist()), dtype=np.int64)
 
 
 def ids_of(blocks: Iterable[Block]) -> Ints:

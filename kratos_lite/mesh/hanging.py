@@ -13,7 +13,7 @@ from typing import TypeAlias
 import numpy as np
 
 from kratos_lite.errors import MeshError
-from kratos_lite.mesh.blocks import Block, with_rows
+from kratos_lite.mesh.blocks import Block, ranges, with_rows
 from kratos_lite.mesh.centers import Centers, Keys, are_among, keys_of, sorted_keys
 from kratos_lite.shapes import Shape
 from kratos_lite.shapes.faces import FACE_SHAPES, Line2, Line3
@@ -99,9 +99,7 @@ class HangingNodes:
     def _rows(self, chosen: Ints) -> tuple[Ints, Ints]:
         """Return where the independents of some hanging nodes begin, one after the other, and these."""
         count = np.diff(self.start)[chosen]
-        first = np.cumsum(count) - count
-        take = np.repeat(self.start[chosen] - first, count) + np.arange(int(count.sum()))
-        return first, take
+        return np.cumsum(count) - count, ranges(self.start[chosen], count)
 
 
 CHILDREN = {

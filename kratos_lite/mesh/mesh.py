@@ -23,7 +23,7 @@ from kratos_lite.mesh.blocks import (
     select,
     with_rows,
 )
-from kratos_lite.mesh.selection import Where, WhereElements, find_elements, find_nodes, find_part
+from kratos_lite.mesh.selection import SKEW, Where, WhereElements, find_elements, find_nodes, find_part
 from kratos_lite.mesh.topology import Faces, inverted, mirror
 from kratos_lite.tabular import UNITS, Tabular
 from kratos_lite.typing import Array, ArrayLike, Ints, Mask
@@ -51,8 +51,8 @@ class Mesh(Tabular):
     source : name of the file it came from, used in messages.
     hanging : nodes inside edges or faces of larger neighbors, as `refine` finds them.
     whole : False for one part of a larger mesh, where named parts may be empty.
-    units : consistent set of units that its numbers are in, ``SI``, ``mm N MPa t`` or ``m kN kPa t``; see
-        `use_units`.
+    units : consistent set of units that its numbers are in, ``SI``, ``mm N MPa t``, ``m kN kPa t``,
+        ``mm kN GPa kg ms`` or ``in lbf psi slinch``; see `use_units`.
 
     Raises
     ------
@@ -263,10 +263,21 @@ class Mesh(Tabular):
 
     def used_nodes(self) -> Mask:
         """Return which nodes belong to an element, (n,) bool."""
+        return self._used_nodes
+
+    @cached_property
+    def _used_nodes(self) -> Mask:
         used = np.zeros(self.n_nodes, dtype=bool)
         for block in self.blocks:
             used[block.nodes] = True
-        return used
+        return read_only(used)
+
+    @cached_property
+    def places(self) -> tuple[Array, Ints]:
+        """How far the nodes are along `selection.SKEW`, in order (n,), and the nodes in this order."""
+        along = (self.points - self.extent[0]) @ SKEW
+        order = np.argsort(along)
+        return along[order], order
 
     @cached_property
     def extent(self) -> Array:
@@ -526,12 +537,21 @@ class Mesh(Tabular):
         list of Block
             One block for each shape of faces.
         """
+        rows = self.face_rows(where)
+        return select(self.face_blocks(rows), rows)
+
+    def face_rows(self, where: Where) -> Ints:
+        """Return the faces of a part as rows (k,), which count through conditions, then boundary faces."""
         rows = self.part(where).conditions if isinstance(where, str) else NO_ROWS
         if len(rows):
-            return select(self.conditions, rows)
-        inside = mask_of(self.nodes(where), self.n_nodes)
-        chosen = [block.take(np.asarray(inside[block.nodes].all(axis=1))) for block in self.boundary]
-        return [block for block in chosen if len(block)]
+            return rows
+        nodes = self.nodes(where)
+        return self.n_conditions + self.all_faces.among(nodes, mask_of(nodes, self.n_nodes))
+
+    def face_blocks(self, rows: Ints) -> Sequence[Block]:
+        """Return the conditions, and the boundary faces if some of these rows of faces are theirs."""
+        of_conditions = rows.max(initial=-1) < self.n_conditions
+        return self.conditions if of_conditions else (*self.conditions, *self.boundary)
 
 
 def place_of(mesh: Mesh, element: int) -> str:

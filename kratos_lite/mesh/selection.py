@@ -22,6 +22,8 @@ AT_NODE = 1e-6
 """Distance from a point up to which a node lies at it, as fraction of the size of the mesh."""
 ONE_PLACE = 1e-9
 """Distance between nodes at one place, as fraction of the size of the mesh."""
+SKEW = np.array([0.5411961, 0.6180340, 0.5702238])
+"""A direction along which hardly any two nodes of a mesh are equally far."""
 SIDES = {letter + sign: (axis, end) for axis, letter in enumerate("xyz") for end, sign in enumerate("-+")}
 """Names of the sides of the bounding box: axis and end."""
 
@@ -55,9 +57,9 @@ def find_nodes(where: Callable[[Array], ArrayLike] | ArrayLike, mesh: Cells) -> 
     """Return the indices of nodes by a point, predicate, mask or indices, each once and in this order."""
     points = mesh.points
     if (point := point_of(where)) is not None:
-        rows, nearby = nodes_at(point, points)
+        rows = nodes_at(point, mesh)
         if mesh.whole and not len(rows):
-            text = f"there is no node at {point.tolist()} m; {nearby}"
+            text = f"there is no node at {point.tolist()} m; {near(point, points)}"
             cure = "choose that one, or read values anywhere in the mesh by result.at(points)"
             raise MeshError(f"{in_units(text, mesh.units)}; {cure}")
         return rows
@@ -87,18 +89,29 @@ def point_of(where: Any) -> Array | None:
     return finite(where, "a point", (3,), error=MeshError)
 
 
-def nodes_at(point: Array, points: Array) -> tuple[Ints, str]:
-    """Return the rows of the nodes at a point (3,), nearest first, and what is near to it in words."""
+def nodes_at(point: Array, mesh: Cells) -> Ints:
+    """Return the rows of the nodes at a point (3,), nearest first."""
+    if not len(mesh.points):
+        return NO_ROWS
+    (low, high), (along, order) = mesh.extent, mesh.places
+    size = float(np.linalg.norm(high - low))
+    middle, reach = float((point - low) @ SKEW), 2 * AT_NODE * size
+    start, stop = np.searchsorted(along, middle - reach), np.searchsorted(along, middle + reach, side="right")
+    rows = np.sort(order[start:stop])
+    distance = np.linalg.norm(mesh.points[rows] - point, axis=1)
+    rows = rows[np.argsort(distance, kind="stable")][: int((distance <= AT_NODE * size).sum())]
+    # all at one place, but not the other side of a thin plate
+    apart = np.linalg.norm(mesh.points[rows] - mesh.points[rows[:1]], axis=1)
+    return rows[apart <= ONE_PLACE * size]
+
+
+def near(point: Array, points: Array) -> str:
+    """Return which node is near to a point (3,), in words."""
     if not len(points):
-        return NO_ROWS, "there are no nodes"
+        return "there are no nodes"
     distance = np.linalg.norm(points - point, axis=1)
     row = int(distance.argmin())
-    size = float(np.linalg.norm(np.ptp(points, axis=0)))
-    # all at one place, but not the other side of a thin plate
-    rows = np.flatnonzero(distance <= AT_NODE * size)
-    rows = rows[np.linalg.norm(points[rows] - points[row], axis=1) <= ONE_PLACE * size]
-    text = f"the nearest node is that at {points[row].tolist()} m (row {row}), {distance[row]:.3g} m away"
-    return rows[np.argsort(distance[rows], kind="stable")], text
+    return f"the nearest node is that at {points[row].tolist()} m (row {row}), {distance[row]:.3g} m away"
 
 
 def _is_mask(chosen: Any) -> bool:

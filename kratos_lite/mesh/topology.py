@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from kratos_lite.mesh.blocks import NO_ROWS, Block, with_rows
+from kratos_lite.mesh.blocks import NO_ROWS, Block, ranges, with_rows
 from kratos_lite.mesh.centers import Centers, Keys, keys_of, mixed
 from kratos_lite.native import kernels
 from kratos_lite.shapes import Shape
@@ -132,6 +132,48 @@ class Faces:
                 faces.append(Block(shape.__name__, nodes, parents, 0 * parents, shape))
         return faces
 
+    @cached_property
+    def _by_first_node(self) -> tuple[Ints, Ints, Rows]:
+        """First nodes of the boundary faces in order, the faces in this order, and the nodes of each face."""
+        width = max((block.nodes.shape[1] for block in self.boundary), default=1)
+        columns = (np.minimum(np.arange(width), b.nodes.shape[1] - 1) for b in self.boundary)
+        filled = [b.nodes[:, some] for b, some in zip(self.boundary, columns, strict=True)]
+        nodes = np.vstack([np.zeros((0, width), dtype=np.int32), *filled])
+        order = np.argsort(nodes[:, 0], kind="stable")
+        return nodes[order, 0].astype(np.int64), order, nodes
+
+    def among(self, rows: Ints, inside: Mask) -> Ints:
+        """Return the boundary faces, through blocks, that have all their nodes in rows, `inside` (n,)."""
+        first, order, nodes = self._by_first_node
+        start = np.searchsorted(first, rows)
+        faces = np.sort(order[ranges(start, np.searchsorted(first, rows, side="right") - start)])
+        return faces[inside[nodes[faces]].all(axis=1)]
+
+    @cached_property
+    def _by_corners(self) -> dict[int, tuple[Rows, Centers]]:
+        """Corners of the boundary faces that have so many, and which face has which."""
+        tables = {}
+        for c in (3, 4):
+            outside = [b.nodes[:, :c] for b in self.boundary if b.known_shape.corners == c]
+            tables[c] = np.vstack([np.zeros((0, c), dtype=np.int32), *outside]), Centers()
+            tables[c][1].add(keys_of(tables[c][0]), np.arange(len(tables[c][0])))
+            tables[c][1].sort()
+        return tables
+
+    def outward_signs(self, block: Block) -> Array:
+        """Return +1 for faces whose nodes run counter-clockwise from outside, -1 for others, 0 inside."""
+        c = block.known_shape.corners
+        known, numbers = self._by_corners[c]
+        corners = block.nodes[:, :c]
+        match = numbers.find(keys_of(corners))
+        signs = np.zeros(len(block))
+        on = np.flatnonzero(match >= 0)
+        other = known[match[on]]
+        start = np.argmax(other == corners[on, :1], axis=1)
+        following = np.take_along_axis(other, ((start + 1) % c)[:, None], axis=1)[:, 0]
+        signs[on] = np.where(following == corners[on, 1], 1.0, -1.0)
+        return signs
+
 
 def faces_of(block: Block) -> tuple[tuple[int, ...], ...]:
     """Return the faces of the cells of a block as columns of its nodes."""
@@ -144,25 +186,6 @@ def corners(face: tuple[int, ...]) -> tuple[int, ...]:
 
 
 # ---- orientation -----------------------------------------------------------------------------------
-
-
-def outward_signs(boundary: Sequence[Block], block: Block) -> Array:
-    """Return +1 for faces whose nodes run counter-clockwise from outside, -1 for others, 0 inside."""
-    c = block.known_shape.corners
-    outside = [b.nodes[:, :c] for b in boundary if b.shape is not None and b.shape.corners == c]
-    known = np.vstack([np.zeros((0, c), dtype=np.int32), *outside])
-    corners = block.nodes[:, :c]
-    numbers = Centers()
-    numbers.add(keys_of(known), np.arange(len(known)))
-    numbers.sort()
-    match = numbers.find(keys_of(corners))
-    signs = np.zeros(len(block))
-    on = np.flatnonzero(match >= 0)
-    other = known[match[on]]
-    start = np.argmax(other == corners[on, :1], axis=1)
-    following = np.take_along_axis(other, ((start + 1) % c)[:, None], axis=1)[:, 0]
-    signs[on] = np.where(following == corners[on, 1], 1.0, -1.0)
-    return signs
 
 
 def mirror(shape: type[Shape]) -> Ints:

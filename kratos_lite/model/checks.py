@@ -20,8 +20,8 @@ from kratos_lite.mesh import Block, Mesh
 from kratos_lite.model.loads import Load
 from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.supports import Supports
-from kratos_lite.tabular import size_in_si, unit_name
-from kratos_lite.typing import Array, Mask
+from kratos_lite.tabular import UNITS, size_in_si, unit_name
+from kratos_lite.typing import Array, Ints, Mask
 from kratos_lite.validation import instance
 
 SLOWEST, QUICKEST = 1.0, 2.5e4
@@ -34,6 +34,13 @@ HEAVY, HARD = 2300.0, 1e7
 """Above this density in kg/m³ there are concrete, rock and metals, all far stiffer than this E in Pa."""
 METAL, BULKY = 6e10, 1e3
 """Young's modulus in Pa of light metals, above that of concrete; volume in m³ that no part of metal has."""
+REAL = (1e10, 1.2e12, 1400.0, 2.3e4), (1e5, 1e12, 100.0, 2500.0), (1e3, 1e9, 5.0, 700.0)
+"""Young's moduli in Pa and densities in kg/m³, the least and the largest, of metals, ceramics, rock and fibre
+composites, then of polymers, wood, rubber and soil, then of foams: the likelier first."""
+FASTEST = 1.85e4
+"""Speed of waves in m/s above that of diamond."""
+CLEAR = {"SI": (1e10, 1.2e12), "mm N MPa t": (4e4, 4.2e5)}
+"""Young's moduli from magnesium to alumina, and those that nothing has in other units."""
 FOLD = 0.2
 """Fraction of the mean det J by which it may be negative at a node; two swapped nodes give 0.7 and more."""
 LOADS_ON_SUPPORTS = "all loads act on fixed components, so nothing moves"
@@ -158,7 +165,7 @@ def check_nodes(mesh: Mesh, references: Any = None) -> Iterator[str]:
 
 def check_wave_speeds(materials: Iterable[Material], units: str = "SI") -> list[str]:
     """Warn where the speed of waves sqrt(E/ρ) says that E and ρ can hardly both be in their units."""
-    slowest, quickest = (speed / size_in_si("m", units) for speed in (SLOWEST, QUICKEST))
+    slowest, quickest = (speed / size_in_si("m/s", units) for speed in (SLOWEST, QUICKEST))
     speeds = {
         str(material): float(np.sqrt(young_moduli(material)[1]) / np.sqrt(material.density))
         for material in materials
@@ -196,6 +203,35 @@ def unusual_constants(materials: Iterable[Material], units: str = "SI") -> Itera
                 f"the density of {material} is far from that of any engineering material, {1 / dense:g} "
                 f"(aerogel) to {22600 / dense:,g} kg/m³ (osmium): is it in {unit} (steel: {7850 / dense:g})?"
             )
+
+
+def recognized_units(materials: Iterable[Material]) -> str | None:
+    """Return the consistent set of units in which E and density of all materials are those of real ones.
+
+    Where several sets fit, that of the likelier kinds; without any density the one in which E alone is clear.
+    None where no set fits, or several alike.
+
+    >>> from kratos_lite import Isotropic3D
+    >>> recognized_units([Isotropic3D(E=30e6, nu=0.3, density=7.3e-4)])
+    'in lbf psi slinch'
+    """
+    constants = [(young_moduli(material)[1], material.density) for material in materials]
+    fits: dict[str, int] = {}
+    clear = {units for units, (low, high) in CLEAR.items() if any(low <= E <= high for E, _ in constants)}
+    for units in UNITS if any(density for _, density in constants) else sorted(clear):
+        kinds = [_kind(size_in_si("Pa", units) * E, size_in_si("kg/m³", units) * x) for E, x in constants]
+        if -1 not in kinds:
+            fits[units] = sum(kinds)
+    best = [units for units, kind in fits.items() if kind == min(fits.values())]
+    return best[0] if len(best) == 1 else None
+
+
+def _kind(E: float, density: float) -> int:
+    """Return the number in REAL of the first kind with E in Pa and a density in kg/m³; -1 without any."""
+    for i, (soft, stiff, light, heavy) in enumerate(REAL):
+        if soft <= E <= stiff and (not density or (light <= density <= heavy and E < FASTEST**2 * density)):
+            return i
+    return -1
 
 
 def young_moduli(material: Material) -> tuple[float, float]:
@@ -259,10 +295,10 @@ def check_loads(
     loads: Sequence[Load], groups: Sequence[ElementGroup], forces: Array, supports: Supports
 ) -> list[str]:
     """Warn of loads that do nothing: gravity without mass or in m/s², forces on fixed components alone."""
-    metre = size_in_si("m", supports.mesh.units)
+    size = size_in_si("m/s²", supports.mesh.units)
     weights = [load.force for load in loads if isinstance(load, Gravity) and np.shape(load.force) == (3,)]
-    if metre != 1 and any(9.7 < np.linalg.norm(g) < 9.9 for g in weights):
-        return [f"gravity is 9.81 in m/s²; this model is in {supports.mesh.units}: give {9.81 / metre:g}"]
+    if size != 1 and any(9.7 < np.linalg.norm(g) < 9.9 for g in weights):
+        return [f"gravity is 9.81 in m/s²; this model is in {supports.mesh.units}: give {9.81 / size:g}"]
     massless = all(g.material.density == 0 for g in groups) and not forces.any()
     if massless and any(isinstance(load, Gravity) for load in loads):
         return ["gravity acts on no mass: every material has density 0; give density in kg/m³"]
@@ -273,9 +309,9 @@ def check_loads(
     return ["no load acts and no displacement is prescribed, so nothing moves"]
 
 
-def check_carried(mesh: Mesh, forces: Array, used: Mask) -> None:
-    """Raise ModelError for forces (n, 3) on nodes that no element uses, by the mask (n,) of those used."""
-    for node in np.flatnonzero(~used & (forces != 0).any(axis=1))[:1]:
+def check_carried(mesh: Mesh, nodes: Ints, forces: Array, used: Mask) -> None:
+    """Raise ModelError for forces (k, 3) on nodes (k,) that no element uses, by a mask (n,) of those used."""
+    for node in nodes[~used[nodes] & (forces != 0).any(axis=1)][:1]:
         raise ModelError(
             f"node {mesh.node_ids[node]} carries a load but belongs to no element; load another node, or "
             "give it an element"

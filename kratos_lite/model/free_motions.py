@@ -17,7 +17,7 @@ from itertools import islice
 
 import numpy as np
 
-from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.assembly.element_groups import ElementGroup, add_nodal
 from kratos_lite.errors import MAX_PROBLEMS, ModelError
 from kratos_lite.mesh import Mesh, mask_of
 from kratos_lite.model.rigid_body_modes import RigidBlocks, free_modes
@@ -137,17 +137,20 @@ class FreeMotions:
     # ---- what is refused -----------------------------------------------------------------------------
 
     def check(
-        self, loads: Iterable[Array], moving: Mask | bool, cure: str = "add loads that balance them"
+        self,
+        loads: Iterable[tuple[Ints, Array]],
+        moving: Mask | bool,
+        cure: str = "add loads that balance them",
     ) -> None:
         """Raise ModelError where a component can still move, unless loads act on it that balance."""
         if not self.any:
             return
         points, R = self.blocks.mesh.points, self._pair[0]
-        total, size = np.zeros_like(points), np.zeros(len(points))
-        for forces in loads:
-            total += forces
-            size += np.linalg.norm(forces, axis=1)
-        roundoff = self._rounding * self._by_component(size)
+        total, size = np.zeros_like(points), np.zeros((len(points), 1))
+        for nodes, forces in loads:
+            add_nodal(total, nodes, forces)
+            add_nodal(size, nodes, np.linalg.norm(forces, axis=1, keepdims=True))
+        roundoff = self._rounding * self._by_component(size[:, 0])
         limit = roundoff[:, None] * self._by_component(np.linalg.norm(R, axis=1), largest=True)
         off = (np.abs(self._by_component(_products(R, total))) > limit).any(axis=1)
         wrong = (self.counts > 0) & (off | self._is_hinged | ~np.asarray(moving))

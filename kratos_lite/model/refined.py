@@ -46,8 +46,8 @@ def refined(structure: S, finer: RefinedMesh) -> S:
     for attachment in structure.attachments:
         new.add(attachment.refined(finer, structure.remote_points, new.remote_points))
     new.loads = [load.refined(finer) for load in structure.loads]
-    for name, load in structure.named_loads.items():
-        new._named[name] = new.loads[next(i for i, one in enumerate(structure.loads) if one is load)]
+    finer_of = {id(load): one for load, one in zip(structure.loads, new.loads, strict=True)}
+    new._named = {name: finer_of[id(load)] for name, load in structure.named_loads.items()}
     new.notes = list(structure.notes)
     return new
 

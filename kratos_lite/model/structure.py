@@ -19,7 +19,7 @@ from kratos_lite.model.attachments import AddedMass, AttachedMatrix, Attachment,
 from kratos_lite.model.free_motions import FreeMotions, free_motions
 from kratos_lite.model.joints import check_coincident, check_joints
 from kratos_lite.model.loads import Load, ScaledLoad
-from kratos_lite.model.loads.base import key_of
+from kratos_lite.model.loads.base import key_of, warnings_of
 from kratos_lite.model.local_axes import Cartesian, LocalAxes, normal_of_plane
 from kratos_lite.model.locking import check_locking
 from kratos_lite.model.matching import BoltForce, Cut, Periodic
@@ -44,7 +44,7 @@ class Structure(Solid):
         formulation: str | None = None,
         units: str | None = None,
     ) -> None:
-        super().__init__(mesh, material, formulation, units)
+        super().__init__(mesh, material, formulation, None if units == "auto" else units)
         self.supports = Supports(mesh)
         self.attachments: list[AttachedMatrix] = []  # springs and added masses
         self.attached: Attached | None = None  # their matrices
@@ -54,6 +54,19 @@ class Structure(Solid):
         self.notes: list[str] = []  # what readers of files remarked, for the report
         self.references: Any = None  # of decks: what nodes that no element uses stand for
         self.patterns = PatternCache()
+        if units == "auto":
+            self.recognize_units()
+
+    def recognize_units(self) -> None:
+        """Use the units that E and density of the materials tell, and note which, or that they tell none."""
+        used = self._used_materials()
+        units = checks.recognized_units(used) if used else None
+        if units is None:
+            self.notes.append(f"units: not recognized from E and density of the materials; {self.units}")
+        else:
+            self.mesh.use_units(units)
+            named = ", ".join(map(str, used[:3])) + " …" * (len(used) > 3)
+            self.notes.append(f"units: {', '.join(units.split())} (recognized from E and density of {named})")
 
     @property
     def version(self) -> tuple[int, int]:
@@ -534,18 +547,17 @@ class Structure(Solid):
             raise InputError(f"a load such as Gravity or Traction is needed; got {type(load).__name__}")
         load = load if amplitude is None else ScaledLoad(load, amplitude)
         load.check(self.mesh)
-        named = self.named_loads
         if name is not None:
             instance(name, "the name of a load", str, "'wind'")
-        if name in named:
-            if key_of(named[name]) == key_of(load):
+        if name in self._named and (old := self.named_loads.get(name)) is not None:
+            if key_of(old) == key_of(load):
                 return
             if not override:
                 raise ModelError(
-                    f"there is another load {name!r} already, {named[name]!r}; replace it by override=True, "
+                    f"there is another load {name!r} already, {old!r}; replace it by override=True, "
                     f"or take it away by model.remove({name!r})"
                 )
-            self.loads[:] = [load if other is named[name] else other for other in self.loads]
+            self.loads[:] = [load if other is old else other for other in self.loads]
         else:
             self.loads.append(load)
         if name is not None:
@@ -672,6 +684,6 @@ CHECKS: tuple[Callable[[Structure, Sequence[ElementGroup]], Iterable[str]], ...]
     lambda model, groups: model.supports.check_used(model.mesh.used_nodes()),
     lambda model, groups: [text for tie in model.supports.ties for text in tie._check(groups, model.motion)],
     lambda model, groups: checks.check_attached(model.attached is not None, model.motion),
-    lambda model, groups: [text for load in model.loads for text in load.warnings(model.mesh, groups)],
+    lambda model, groups: warnings_of(model.loads, model.mesh, groups),
 )
 """What is checked of each model with sound cells: a check returns warnings, or raises an error."""

@@ -7,13 +7,21 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
+from kratos_lite.cli import main
 from kratos_lite.errors import KratosLiteError
 from kratos_lite.mesh.refinement import refine
+from kratos_lite.model.checks import check_wave_speeds, recognized_units
 from kratos_lite.model.refined import refined
 from kratos_lite.tabular import UNITS, in_units, size_in_si, unit_name
 
 MM = "mm N MPa t"
-SIZES = {"SI": (1.0, 1.0, 1.0), MM: (1e3, 1e-6, 1e-12), "m kN kPa t": (1.0, 1e-3, 1e-3)}
+SIZES = {
+    "SI": (1.0, 1.0, 1.0),
+    MM: (1e3, 1e-6, 1e-12),
+    "m kN kPa t": (1.0, 1e-3, 1e-3),
+    "mm kN GPa kg ms": (1e3, 1e-9, 1e-9),
+    "in lbf psi slinch": (1 / 0.0254, 0.0254**2 / 4.4482216152605, 0.0254**4 / 4.4482216152605),
+}
 """Sizes of 1 m, 1 Pa and 1 kg/m³ in each set of units."""
 
 
@@ -35,10 +43,10 @@ def bracket(units="SI", gravity=0.0):
 @pytest.mark.parametrize("units", UNITS)
 def test_sets_of_units_are_consistent(units):
     """Pa = N/m², J = N m, and N = kg m/s²."""
-    m, N, Pa, J, kg = (size_in_si(unit, units) for unit in ("m", "N", "Pa", "J", "kg"))
+    m, N, Pa, J, kg, s = (size_in_si(unit, units) for unit in ("m", "N", "Pa", "J", "kg", "s"))
     assert abs(N / m**2 / Pa - 1) < 1e-12
     assert abs(N * m / J - 1) < 1e-12
-    assert abs(kg * m / N - 1) < 1e-12
+    assert abs(kg * m / s**2 / N - 1) < 1e-12
     assert abs(size_in_si("kg/m³", units) / (kg / m**3) - 1) < 1e-12
 
 
@@ -280,7 +288,7 @@ def _body(model, folder):
         (lambda model, _: model.mesh.use_units("m kN kPa t"), "is said to be in mm N MPa t"),
         (
             lambda model, _: kl.Model(kl.box(), units="mm"),
-            "units must be one of SI, mm N MPa t, m kN kPa t; got 'mm'",
+            "units must be one of SI, mm N MPa t, m kN kPa t, mm kN GPa kg ms, in lbf psi slinch; got 'mm'",
         ),
         (lambda model, _: kl.Model(kl.box(), units=3), "units must be one of"),
         (lambda model, _: kl.Mesh([[0, 0, 0]], units="inch"), "units must be one of"),
@@ -296,3 +304,88 @@ def test_a_file_of_a_model_does_not_hold_its_units(tmp_path):
     notes = kl.write(tmp_path / "r.mdpa", bracket(MM))
     assert any("that the numbers, which stay, are in mm N MPa t" in note for note in notes)
     assert not any("numbers" in note for note in kl.write(tmp_path / "s.mdpa", bracket()))
+
+
+# ---- recognized --------------------------------------------------------------------------------------------
+
+REAL = {  # E in Pa and density in kg/m³, as handbooks have them
+    "steel": (210e9, 7850.0),
+    "aluminium": (70e9, 2700.0),
+    "titanium": (110e9, 4500.0),
+    "lead": (16e9, 11340.0),
+    "tungsten carbide": (600e9, 15600.0),
+    "alumina": (380e9, 3900.0),
+    "glass": (70e9, 2500.0),
+    "concrete": (30e9, 2400.0),
+    "carbon fibre": (140e9, 1600.0),
+    "nylon": (2.8e9, 1140.0),
+    "polyethylene": (0.8e9, 950.0),
+    "wood": (11e9, 500.0),
+    "rubber": (2e6, 1100.0),
+    "rigid foam": (130e6, 100.0),
+    "polystyrene foam": (5e6, 20.0),
+}
+
+
+def materials(names, units, density=1.0):
+    pascal, dense = size_in_si("Pa", units), size_in_si("kg/m³", units)
+    constants = (REAL[name] for name in names)
+    return [kl.Isotropic3D(E=E / pascal, nu=0.3, density=density * heavy / dense) for E, heavy in constants]
+
+
+@pytest.mark.parametrize("units", UNITS)
+def test_real_materials_tell_their_units(units):
+    for name in REAL:
+        assert recognized_units(materials([name], units)) == units, name
+    assert recognized_units(materials(REAL, units)) == units
+    assert not check_wave_speeds(materials(REAL, units), units)
+
+
+@pytest.mark.parametrize(
+    ("E", "density", "units"),
+    [
+        (210000.0, 7.9e-9, MM),
+        (210.0, 7.9e-6, "mm kN GPa kg ms"),
+        (3e7, 7.3e-4, "in lbf psi slinch"),
+        (210e9, 0.0, "SI"),
+        (210000.0, 0.0, MM),
+        (210.0, 0.0, None),  # steel in GPa, or polyethylene in MPa
+        (3e7, 0.0, None),  # steel in psi, or concrete in kPa
+        (210000.0, 7850.0, None),  # MPa and kg/m³
+        (210e9, 7.85e-9, None),
+        (1.0, 1.0, None),
+    ],
+)
+def test_what_tells_units_and_what_does_not(E, density, units):
+    assert recognized_units([kl.Isotropic3D(E=E, nu=0.3, density=density)]) == units
+
+
+def test_steel_without_density_beside_rubber_with_it_and_nothing():
+    pair = materials(["steel"], MM, density=0.0) + materials(["rubber"], MM)
+    assert recognized_units(pair) == MM
+    assert recognized_units(materials(["steel", "rubber"], MM, density=0.0)) == MM
+    assert recognized_units(materials(["steel"], MM) + materials(["steel"], "SI")) is None
+    assert recognized_units([]) is None
+
+
+def test_a_model_takes_the_units_of_its_materials_and_says_so():
+    steel = kl.Isotropic3D(E=210.0, nu=0.3, density=7.85e-6)
+    model = kl.Model(kl.box((100, 20, 10)), steel, units="auto")
+    model.fix("x-")
+    model.add(kl.Traction("x+", (1e-3, 0, 0)))
+    assert model.units == "mm kN GPa kg ms"
+    assert f"units: mm, kN, GPa, kg, ms (recognized from E and density of {steel})" in str(model)
+    result = model.solve()
+    assert "kN" in str(result)
+    assert not any("speed of waves" in text for text in result.report.warnings)
+    other = kl.Model(kl.box(), kl.Isotropic3D(E=210000.0, nu=0.3, density=7850.0), units="auto")
+    assert other.units == "SI"
+    assert "units: not recognized" in str(other)
+    assert in_units("3 m/s², 2 s, 5 Hz, 4 rad/s", model.units) == "3 mm/ms², 2 ms, 5 kHz, 4 rad/ms"
+
+
+def test_units_are_recognized_on_the_command_line(tmp_path, capsys):
+    kl.write(tmp_path / "box.vtu", kl.box((100.0, 20.0, 10.0)))
+    options = ["--units", "auto", "--material", "E=210e3,nu=0.3,density=7.85e-9", "--fix", "x-:xyz"]
+    assert main(["solve", str(tmp_path / "box.vtu"), *options, "--traction", "x+:1,0,0"]) == 0
+    assert "units: mm, N, MPa, t (recognized" in capsys.readouterr().out

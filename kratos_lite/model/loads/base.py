@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from copy import copy
 from functools import lru_cache
 from types import FunctionType
-from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias, TypeVar
 
 import numpy as np
 
-from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.assembly.element_groups import ElementGroup, add_nodal
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.local_axes import LocalAxes
 from kratos_lite.time_series import Factor, TimeSeries, function_of
-from kratos_lite.typing import Array, ArrayLike, Rows
+from kratos_lite.typing import Array, ArrayLike, Ints, Rows
 from kratos_lite.validation import finite, instance, short, takes
 
 if TYPE_CHECKING:
     from kratos_lite.mesh.refined_mesh import RefinedMesh
 
+T = TypeVar("T")
 OfPlace: TypeAlias = "Callable[[Array], ArrayLike]"
 """A function of places (m, 3) in m."""
 
@@ -68,6 +70,16 @@ class Load(ABC):
         InputError, ModelError
             The load does not fit the mesh.
         """
+
+    def on_nodes(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> tuple[Ints, Array]:
+        """Return nodes (k,), and forces (k, 3) in N there that add up to those of `forces`."""
+        forces = self.forces(mesh, groups)
+        nodes = np.flatnonzero(np.abs(forces) @ np.ones(3))  # faster than any(axis=1)
+        return nodes, forces[nodes]
+
+    def __init_subclass__(cls) -> None:  # a class that gives its forces alone has them on all nodes
+        if "forces" in vars(cls) and "on_nodes" not in vars(cls):
+            cls.on_nodes = Load.on_nodes  # type: ignore[method-assign]
 
     def acting(self, time: float) -> Sequence[tuple[float, Load]]:
         """Return the loads that this one is at a time in s, each with a factor."""
@@ -131,18 +143,20 @@ class DistributedLoad(Load):
     where: Any
 
     @abstractmethod
-    def integral(self, mesh: Mesh, groups: Sequence[ElementGroup], factors: int) -> Array:
-        """Return the nodal forces (n, 3) in N; a function is taken at the points of a rule of `factors`."""
+    def integral(self, mesh: Mesh, groups: Sequence[ElementGroup], factors: int) -> tuple[Ints, Array]:
+        """Return what `on_nodes` does; a function is taken at the points of a rule of `factors`."""
 
     def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
         """Return the nodal forces (n, 3) in N."""
-        return self.integral(mesh, groups, self.factors)
+        return nodal(mesh, *self.integral(mesh, groups, self.factors))
 
     def warnings(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
         """Return a warning if the load is a function that jumps inside elements."""
         if not callable(getattr(self, self.nodal[0], None)):
             return []
-        forces = self.integral(mesh, groups, self.factors + 2)  # one more point a direction, or two
+        forces = nodal(
+            mesh, *self.integral(mesh, groups, self.factors + 2)
+        )  # one more point a direction, or two
         change = float(np.abs(self.forces(mesh, groups) - forces).sum())
         if change <= MOST_CHANGE * float(np.abs(forces).sum()):
             return []
@@ -226,7 +240,8 @@ class TimeDependentLoad(Load):
 
     def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
         """Return the nodal forces (n, 3) in N at the time 0."""
-        return self.history(lambda load: load.forces(mesh, groups))(0.0) + np.zeros_like(mesh.points)
+        found = (factor * load.forces(mesh, groups) for factor, load in self.acting(0.0))
+        return sum(found, np.zeros_like(mesh.points))
 
     def refined(self, finer: RefinedMesh) -> Load:
         """Return a load whose function gives those of this one on a finer mesh."""
@@ -236,29 +251,6 @@ class TimeDependentLoad(Load):
             return None if load is None else load.refined(finer)
 
         return TimeDependentLoad(function)
-
-    def history(self, forces_of: Callable[[Load], Array]) -> Callable[[float], Array | float]:
-        """Return the nodal forces as a function of time.
-
-        Parameters
-        ----------
-        forces_of : gives the nodal forces (n, 3) in N of a constant load.
-
-        Returns
-        -------
-        A function of the time in s: (n, 3) in N, or 0.
-        """
-        last: tuple[Load | None, Array | float] = None, 0.0
-
-        @lru_cache(maxsize=2)
-        def forces(time: float) -> Array | float:
-            nonlocal last
-            load = self.at(time)
-            if load is not last[0]:
-                last = load, 0.0 if load is None else forces_of(load)
-            return last[1]
-
-        return forces
 
 
 class ScaledLoad(TimeDependentLoad):
@@ -288,10 +280,31 @@ class ScaledLoad(TimeDependentLoad):
         """Return the load with its amplitude at a time in s."""
         return [(self.amplitude(time), self.load)]
 
-    def history(self, forces_of: Callable[[Load], Array]) -> Callable[[float], Array | float]:
-        """Return the nodal forces (n, 3) in N as a function of time."""
-        forces = forces_of(self.load)
-        return lambda time: self.amplitude(time) * forces
+
+def in_time(
+    loads: Iterable[TimeDependentLoad], forces_of: Callable[[list[Load]], T]
+) -> Callable[[float], list[tuple[float, T]]]:
+    """Return what loads put on nodes at a time in s: factors, and what `forces_of` gives of loads for each.
+
+    Those with the same amplitude have one factor; while the loads are the same, so is what it gives of them.
+    """
+    groups: dict[int, list[TimeDependentLoad]] = {}
+    for load in loads:
+        groups.setdefault(id(getattr(load, "amplitude", load)), []).append(load)
+    kept: dict[int, tuple[list[Load], T]] = {}
+
+    @lru_cache(maxsize=2)
+    def forces(time: float) -> list[tuple[float, T]]:
+        found = []
+        for key, same in groups.items():
+            acting = [one for load in same for one in load.acting(time)]
+            ones = [load for _, load in acting]
+            if ones and (key not in kept or kept[key][0] != ones):
+                kept[key] = ones, forces_of(ones)
+            found += [(acting[0][0], kept[key][1])] if ones else []
+        return found
+
+    return forces
 
 
 def _shown(value: Any) -> str:
@@ -299,6 +312,13 @@ def _shown(value: Any) -> str:
     if isinstance(value, np.ndarray):
         return f"({', '.join(f'{x:g}' for x in value)})" if value.shape == (3,) else f"array {value.shape}"
     return getattr(value, "__name__", "a function") if callable(value) else short(value)
+
+
+def nodal(mesh: Mesh, nodes: Ints, forces: Array) -> Array:
+    """Return forces (k, 3) on some nodes (k,) as those of all nodes (n, 3)."""
+    total = np.zeros_like(mesh.points)
+    add_nodal(total, nodes, forces)
+    return total
 
 
 def vectors(values: ArrayLike, what: str, shapes: str, dimensions: tuple[int, ...] = (1,)) -> Array:
@@ -351,14 +371,30 @@ def key_of(value: Any, depth: int = 0) -> Hashable:
 
 
 def equal_loads(loads: Sequence[Load], named: Mapping[str, Load]) -> list[str]:
-    """Return a warning for each load that acts more than once without a name that tells it is meant."""
+    """Return a warning of loads that act more than once without a name that tells it is meant."""
     meant = {id(load) for load in named.values()}
     alike: dict[Hashable, list[Load]] = {}
     for load in loads:
         alike.setdefault(key_of(load), []).append(load)
-    return [
+    found = [
         f"{len(same)} equal loads {same[0]!r}, which add up; if one alone is meant, give it a name, "
         "model.add(load, name=...), so that it is not added twice"
         for same in alike.values()
         if len(same) > 1 and any(id(load) not in meant for load in same)
     ]
+    return told_once((text, text) for text in found)
+
+
+def told_once(warnings: Iterable[tuple[Hashable, str]]) -> list[str]:
+    """Return the first of all warnings with the same key, and the number of the others."""
+    texts: dict[Hashable, list[str]] = {}
+    for key, text in warnings:
+        texts.setdefault(key, []).append(text)
+    counted = ((same[0], len(same) - 1) for same in texts.values())
+    return [text + f" (and {n} more load{'s' * (n > 1)})" * (n > 0) for text, n in counted]
+
+
+def warnings_of(loads: Sequence[Load], mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
+    """Return the warnings of loads; those that differ in the load and in numbers alone are one."""
+    found = ((load, text) for load in loads for text in load.warnings(mesh, groups))
+    return told_once((re.sub(r"[\d.]+", "", text.replace(repr(load), "")), text) for load, text in found)

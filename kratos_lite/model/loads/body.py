@@ -13,7 +13,7 @@ from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh, WhereElements, mask_of
 from kratos_lite.model.loads.base import DistributedLoad, OfPlace, placed, vectors
 from kratos_lite.model.local_axes import LocalAxes
-from kratos_lite.typing import Array, ArrayLike
+from kratos_lite.typing import Array, ArrayLike, Ints
 
 if TYPE_CHECKING:
     from kratos_lite.mesh.refined_mesh import RefinedMesh
@@ -50,8 +50,8 @@ class BodyForce(DistributedLoad):
         """Raise MeshError if there is no such part, property or element."""
         mesh.elements(self.where)
 
-    def integral(self, mesh: Mesh, groups: Sequence[ElementGroup], factors: int) -> Array:
-        """Return ∫ N b dV as nodal forces (n, 3) in N.
+    def integral(self, mesh: Mesh, groups: Sequence[ElementGroup], factors: int) -> tuple[Ints, Array]:
+        """Return all nodes (n,), and ∫ N b dV (n, 3) in N.
 
         Raises
         ------
@@ -67,7 +67,7 @@ class BodyForce(DistributedLoad):
                 total += scale * gauss_point_fields.body_force_by_function(points, part, force, factors)
             elif force.any():
                 total += gauss_point_fields.body_force(points, part, scale * force)
-        return total
+        return np.arange(len(total)), total
 
     def _checked_force(self, mesh: Mesh) -> Any:
         """Return the force as an array, or a function of places that is checked."""

@@ -10,8 +10,9 @@ import numpy as np
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.mesh import Mesh, Where
-from kratos_lite.mesh.selection import ONE_PLACE, nodes_at, point_of
-from kratos_lite.model.loads.base import Load, vectors
+from kratos_lite.mesh.blocks import without_repeats
+from kratos_lite.mesh.selection import ONE_PLACE, near, nodes_at, point_of
+from kratos_lite.model.loads.base import Load, nodal, vectors
 from kratos_lite.model.local_axes import LocalAxes
 from kratos_lite.typing import Array, ArrayLike, Ints
 from kratos_lite.validation import flag, short
@@ -78,16 +79,17 @@ class PointLoad(Load):
         ModelError
             No node is chosen.
         """
-        total = np.zeros_like(mesh.points)
+        return nodal(mesh, *self.on_nodes(mesh, groups))
+
+    def on_nodes(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> tuple[Ints, Array]:
+        """Return nodes (k,) and the forces (k, 3) in N there; errors are those of `forces`."""
         if self._point is not None:
             nodes, N = around(mesh, self._point)
-            total[nodes] = N[:, None] * self._at(self._point)
-            return total
-        nodes = mesh.nodes(self.where)
+            return nodes, N[:, None] * self._at(self._point)
+        nodes = without_repeats(mesh.nodes(self.where))
         if mesh.whole and not len(nodes):
             raise ModelError(f"a point load finds no node in {self.where!r}")
-        total[nodes] += self._at(mesh.points[nodes])
-        return total
+        return nodes, np.broadcast_to(self._at(mesh.points[nodes]), (len(nodes), 3))
 
     def _at(self, points: Array) -> Array:
         """Return the force along x y z at points (..., 3) in m."""
@@ -107,7 +109,7 @@ class PointLoad(Load):
 
 def around(mesh: Mesh, point: Array, what: str = "a point load") -> tuple[Ints, Array]:
     """Return the nodes (k,) on which something on a point acts, and its fraction (k,) on each."""
-    nodes, nearby = nodes_at(point, mesh.points)
+    nodes = nodes_at(point, mesh)
     nodes = nodes[mesh.used_nodes()[nodes]][:1]
     size = float(np.linalg.norm(mesh.extent[1] - mesh.extent[0]))
     if len(nodes) and np.linalg.norm(mesh.points[nodes[0]] - point) <= ONE_PLACE * size:
@@ -116,7 +118,7 @@ def around(mesh: Mesh, point: Array, what: str = "a point load") -> tuple[Ints, 
     if located.inside:
         return located.nodes_and_weights()
     if mesh.whole and not len(nodes):
-        raise MeshError(f"{what} at {point.tolist()} m acts outside the mesh; {nearby}")
+        raise MeshError(f"{what} at {point.tolist()} m acts outside the mesh; {near(point, mesh.points)}")
     return nodes, np.ones(len(nodes))
 
 

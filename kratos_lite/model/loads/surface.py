@@ -20,11 +20,12 @@ from kratos_lite.elements.surface import (
 )
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.mesh import Block, Mesh, Where, outward_signs, with_rows
+from kratos_lite.mesh import Block, Mesh, Where, with_rows
+from kratos_lite.mesh.blocks import NO_ROWS, select, without_repeats
 from kratos_lite.mesh.refined_mesh import RefinedMesh
 from kratos_lite.model.loads.base import DistributedLoad, Load, OfPlace, at_places, placed, vectors
 from kratos_lite.model.local_axes import LocalAxes
-from kratos_lite.typing import Array, ArrayLike, Rows
+from kratos_lite.typing import Array, ArrayLike, Ints, Rows
 from kratos_lite.validation import finite, flag, number
 
 SURFACES = ("triangle", "quadrilateral")
@@ -34,6 +35,7 @@ class FaceLoad(DistributedLoad):
     """A load on faces or lines."""
 
     what: ClassVar[str]
+    each_face: ClassVar[bool]  # of a class whose constant loads on several parts may be one load
     cells: ClassVar[tuple[str, ...]] = SURFACES
     factors = FUNCTION
 
@@ -41,12 +43,16 @@ class FaceLoad(DistributedLoad):
     def on_faces(self, mesh: Mesh, faces: list[Block], factors: int) -> Iterable[Array]:
         """Return the forces (m, k, 3) in N on the nodes of the m faces of each block."""
 
-    def integral(self, mesh: Mesh, groups: Sequence[ElementGroup], factors: int) -> Array:
-        """Return the nodal forces (n, 3) in N of all faces."""
-        total, faces = np.zeros_like(mesh.points), loaded_faces(mesh, self.where, self.what, self.cells)
-        for block, forces in zip(faces, self.on_faces(mesh, faces, factors), strict=True):
-            add_nodal(total, block.nodes, forces)
-        return total
+    def integral(self, mesh: Mesh, groups: Sequence[ElementGroup], factors: int) -> tuple[Ints, Array]:
+        """Return nodes (k,), face by face, and the forces (k, 3) in N there."""
+        faces = loaded_faces(mesh, self.where, self.what, self.cells)
+        forces = [f.reshape(-1, 3) for f in self.on_faces(mesh, faces, factors)]
+        nodes = [block.nodes.ravel() for block in faces]
+        return np.concatenate([NO_ROWS, *nodes]), np.concatenate([np.zeros((0, 3)), *forces])
+
+    def on_nodes(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> tuple[Ints, Array]:
+        """Return nodes (k,), face by face, and the forces (k, 3) in N there."""
+        return self.integral(mesh, groups, self.factors)
 
     def by_coordinates(self, mesh: Mesh, groups: Sequence[ElementGroup], v: Array) -> Array:
         """Return the derivative (n, 3) in N of v·f by the nodes; ModelError of a function of places."""
@@ -73,7 +79,7 @@ class Traction(FaceLoad):
     local : axes of the traction, one vector or a function: `Cylindrical`, …; x y z if not given.
     """
 
-    what = "a traction"
+    what, each_face = "a traction", True
     nodal = "traction", 2
 
     def __init__(
@@ -108,7 +114,7 @@ class LineLoad(Traction):
     local : as of `Traction`.
     """
 
-    what, cells = "a line load", ("line",)
+    what, cells, each_face = "a line load", ("line",), True
 
 
 class Pressure(FaceLoad):
@@ -129,7 +135,7 @@ class Pressure(FaceLoad):
         The normal is neither, the pressure no number, or a follower is a function of places.
     """
 
-    what = "a pressure"
+    what, each_face = "a pressure", True
     nodal = "pressure", 1
 
     def __init__(
@@ -221,8 +227,8 @@ class Resultant(FaceLoad):
         self.moment = vectors(moment, "a resultant moment", "(3,) in N m")
         self.about = None if about is None else vectors(about, "the point of a resultant", "(3,) in m")
 
-    def integral(self, mesh: Mesh, groups: Sequence[ElementGroup], factors: int) -> Array:
-        """Return the nodal forces (n, 3) in N of all faces, or of the nodes.
+    def integral(self, mesh: Mesh, groups: Sequence[ElementGroup], factors: int) -> tuple[Ints, Array]:
+        """Return nodes (k,) and forces (k, 3) in N there, of all faces or of the nodes.
 
         Raises
         ------
@@ -231,9 +237,8 @@ class Resultant(FaceLoad):
         """
         if not self._nodes:
             return super().integral(mesh, groups, factors)
-        total, nodes = np.zeros_like(mesh.points), mesh.nodes(self.where)
-        total[nodes] = self._traction(mesh, mesh.points[nodes], np.ones(len(nodes)))(mesh.points[nodes])
-        return total
+        nodes = without_repeats(mesh.nodes(self.where))
+        return nodes, self._traction(mesh, mesh.points[nodes], np.ones(len(nodes)))(mesh.points[nodes])
 
     def on_faces(self, mesh: Mesh, faces: list[Block], factors: int) -> Iterable[Array]:
         """Return ∫ N t dA (m, k, 3) in N of each face."""
@@ -357,6 +362,8 @@ def _points_of(mesh: Mesh, faces: Sequence[Block], factors: int) -> Iterator[tup
 
 def _on(block: Block, value: Any, mesh: Mesh, what: str, width: tuple[int, ...]) -> Any:
     """Return a load on faces: constant, at their nodes, or a function of places (..., 3)."""
+    if isinstance(value, list):
+        return np.repeat(np.asarray(value)[block.properties, None], block.nodes.shape[1], axis=1)
     if callable(value):
         return at_places(value, what, width)
     if np.ndim(value) == len(width):
@@ -368,7 +375,7 @@ def _on(block: Block, value: Any, mesh: Mesh, what: str, width: tuple[int, ...])
 
 def outward(mesh: Mesh, block: Block) -> Array:
     """Return +1 for faces whose nodes run counter-clockwise from outside the body, else -1."""
-    signs = outward_signs(mesh.boundary, block)
+    signs = mesh.all_faces.outward_signs(block)
     if (signs == 0).any():
         lost = block.ids[int(np.argmax(signs == 0))]
         raise ModelError(
@@ -379,18 +386,33 @@ def outward(mesh: Mesh, block: Block) -> Array:
 
 def loaded_faces(mesh: Mesh, where: Where, what: str, cells: Sequence[str] = SURFACES) -> list[Block]:
     """Return the faces of a part, or lines; ModelError, which names what needs them, for none."""
-    faces = mesh.faces(where)
-    wanted = "faces" if cells == SURFACES else "lines"
+    if isinstance(where, list) and where and isinstance(where[0], Block):
+        return where
+    return faces_of_rows(mesh, [loaded_rows(mesh, where, what, cells)], what, cells)
+
+
+def faces_of_rows(mesh: Mesh, parts: Sequence[Ints], what: str, cells: Sequence[str]) -> list[Block]:
+    """Return the faces of some parts by their rows, whose `properties` are the numbers of the parts."""
+    rows, part = np.concatenate(parts), np.repeat(np.arange(len(parts)), [len(some) for some in parts])
+    faces = select(mesh.face_blocks(rows), rows, part)
     for block in faces:
         if block.shape is None or block.shape.cell not in cells:
+            wanted = "faces" if cells == SURFACES else "lines"
             other = "conditions of the unknown type" if block.shape is None else "other conditions,"
             raise ModelError(
                 f"{what} acts on {wanted}; it meets {other} {block.name} (the first is {block.ids[0]})"
             )
-    if mesh.whole and not faces:
+    return faces
+
+
+def loaded_rows(mesh: Mesh, where: Where, what: str, cells: Sequence[str]) -> Ints:
+    """Return the rows of the faces or lines of a part, as `Mesh.face_rows` does; ModelError for none."""
+    rows = mesh.face_rows(where)
+    if mesh.whole and not len(rows):
+        wanted = "faces" if cells == SURFACES else "lines"
         name = f"part {where!r}" if isinstance(where, str) else "the chosen nodes"
         raise ModelError(
             f"{what} finds no {wanted[:-1]} on {name}: it has no conditions and no element face "
             "on the boundary has all its nodes in it"
         )
-    return faces
+    return rows
