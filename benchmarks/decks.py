@@ -30,9 +30,9 @@ DIFFERS = {
 TEXT = """# Test decks of CalculiX
 
 The decks of CalculiX's own tests that hold solids alone, here and in a live ccx {version}. *Tables*: those of
-displacements of all nodes, frequencies and buckling factors that both print at the same times. *U*, *S*: largest
-difference over the largest value of any node in the worst step; ccx prints seven digits. *Agrees*: U at most
-{agrees:g}. {counts}.
+displacements of all nodes, frequencies, buckling factors and stresses that both print at the same times.
+*U*: largest difference of displacements, frequencies and factors over the largest value, of seven printed
+digits; *S*: of stresses at nodes, of six. *Agrees*: U at most {agrees:g}. {counts}.
 
 """
 

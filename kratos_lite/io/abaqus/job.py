@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kratos_lite.atomic import all_or_none, write_whole
-from kratos_lite.errors import InputError
 from kratos_lite.io.abaqus.cards import Card
 from kratos_lite.io.abaqus.deck import Deck, Step
 from kratos_lite.io.abaqus.loads import with_faces

@@ -82,7 +82,13 @@ class PointLoad(Load):
         return nodal(mesh, *self.on_nodes(mesh, groups))
 
     def on_nodes(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> tuple[Ints, Array]:
-        """Return nodes (k,) and the forces (k, 3) in N there; errors are those of `forces`."""
+        """Return nodes (k,) and the forces (k, 3) in N there.
+
+        Raises
+        ------
+        ModelError
+            No node is chosen.
+        """
         if self._point is not None:
             nodes, N = around(mesh, self._point)
             return nodes, N[:, None] * self._at(self._point)
