@@ -21,8 +21,8 @@ NUMBERS = (
 ).split()
 WORDS = (
     'Begin End Nodes Elements Properties // /* */ [ ] ( ) { } " , ; : = \\ \0 \t \r \ufeff é 3 [3] '
-    "KinematicLinear3D8N KinematicLinear3D27N DISPLACEMENT_X YOUNG_MODULUS null true NaN -Infinity z+ x- ../a "
-    "*STEP *STATIC *NSET, TYPE=C3D8 NLGEOM ELSET=BAR"
+    "KinematicLinear3D8N KinematicLinear3D27N DISPLACEMENT_X YOUNG_MODULUS null true NaN -Infinity z+ x- "
+    "../a *STEP *STATIC *NSET, TYPE=C3D8 NLGEOM ELSET=BAR"
 ).split(" ")
 VALUES: list[Any] = [
     *(None, True, False, 0, 1, -1, 2, 0.5, 1e-300, 1e9, 1e30, 1e200, 1e308, -1e308, 2**31, 2**63, 10**18),

@@ -53,6 +53,7 @@ class Building:
             missing = mesh.element_ids[~assigned][0]
             raise InputError(f"{deck.path}: element {missing} is in no *SOLID SECTION")
         self._stress(model)
+        model.recognize_units()
         model.notes += deck.notes
         return model
 
