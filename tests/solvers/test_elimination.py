@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
+from kratos_lite.distributed.cut import Cut
 from kratos_lite.errors import ModelError
 from kratos_lite.solvers.constraints import Constraints, constraint_map
 from kratos_lite.solvers.elimination import eliminate, independent
@@ -132,3 +133,32 @@ def test_a_sector_whose_equations_and_local_supports_form_rings():
     one, other = full.solve(), part.solve()
     assert np.abs((one.u - other.u)[in_part]).max() < 1e-10 * np.abs(one.u).max()
     assert np.abs(other.u[inside & in_part]).max() > 1e-4
+
+
+def moved_in_time():
+    model = kl.Model(kl.box((2, 1, 1), (2, 1, 1)), STEEL)
+    model.fix("x-", "xyz", lambda t: 1e-3 * t)
+    return model, *(model.mesh.nodes(side).tolist() for side in ("x-", "x+"))
+
+
+def test_what_moves_in_time_is_followed_through_redundant_equations():
+    """Two nodes that move by one function are tied as well; a third is half of a free one."""
+    model, held, end = moved_in_time()
+    model.constrain((held[0], "x"), {(held[1], "x"): 1.0})
+    model.constrain((held[2], "x"), {(end[0], "x"): 0.5})
+    analysis = model.transient()
+    for _ in kl.integrate(analysis, dt=1e-6, steps=3):
+        assert abs(analysis.state().u[end[0], 0] - 2e-3 * analysis.time) < 1e-18
+    model.constrain((end[1], "x"), {(held[0], "x"): 1.0})
+    model.constrain((end[1], "x"), {(held[1], "x"): 2.0})
+    with pytest.raises(ModelError, match="give all that moves the same function of time, or remove one"):
+        model.transient()
+
+
+def test_what_equations_hold_alone_is_held_in_parts_of_ranks():
+    model = kl.Model(kl.box(), STEEL)
+    model.fix("z-")
+    model.constrain((5, "x"), {(5, "x"): 0.5}, 1e-3)
+    made = model.supports.constraint_map(np.arange(8))
+    assert made.c[15] == 2e-3
+    assert Cut(model.mesh.points, model.element_groups(), made, 1).held[5].tolist() == [True, False, False]
