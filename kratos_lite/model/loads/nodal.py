@@ -82,7 +82,15 @@ class PointLoad(Load):
         return nodal(mesh, *self.on_nodes(mesh, groups))
 
     def on_nodes(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> tuple[Ints, Array]:
-        """Return nodes (k,) and the forces (k, 3) in N there; errors are those of `forces`."""
+        """Return nodes (k,) and the forces (k, 3) in N there.
+
+        Raises
+        ------
+        MeshError
+            The point lies outside the mesh, or there is no such part or node.
+        ModelError
+            No node is chosen.
+        """
         if self._point is not None:
             nodes, N = around(mesh, self._point)
             return nodes, N[:, None] * self._at(self._point)
