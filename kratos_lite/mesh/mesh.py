@@ -541,16 +541,15 @@ class Mesh(Tabular):
         return select(self.face_blocks(rows), rows)
 
     def face_rows(self, where: Where) -> Ints:
-        """Return the faces of a part.
+        """Return the faces of a part as rows, which count through conditions, then boundary faces.
 
         Parameters
         ----------
-        where : part name, predicate on the points (n, 3), mask (n,) or indices of nodes.
+        where : as for `faces`.
 
         Returns
         -------
         (k,) int
-            Rows that count through conditions, then boundary faces.
         """
         rows = self.part(where).conditions if isinstance(where, str) else NO_ROWS
         if len(rows):
@@ -559,15 +558,16 @@ class Mesh(Tabular):
         return self.n_conditions + self.all_faces.among(nodes, mask_of(nodes, self.n_nodes))
 
     def face_blocks(self, rows: Ints) -> Sequence[Block]:
-        """Return the conditions, and the boundary faces if some faces are theirs.
+        """Return the blocks through which rows of faces count.
 
         Parameters
         ----------
-        rows : (k,) int, of faces.
+        rows : (k,) int, as of `face_rows`.
 
         Returns
         -------
-        Sequence of Block
+        sequence of Block
+            The conditions, and the boundary faces if some of the rows are theirs.
         """
         of_conditions = rows.max(initial=-1) < self.n_conditions
         return self.conditions if of_conditions else (*self.conditions, *self.boundary)

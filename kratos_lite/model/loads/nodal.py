@@ -86,6 +86,8 @@ class PointLoad(Load):
 
         Raises
         ------
+        MeshError
+            The point lies outside the mesh, or there is no such part or node.
         ModelError
             No node is chosen.
         """
