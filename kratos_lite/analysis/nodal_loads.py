@@ -14,7 +14,7 @@ from kratos_lite.assembly.gauss_point_fields import internal_load
 from kratos_lite.mesh.blocks import NO_ROWS, mask_of
 from kratos_lite.model.checks import check_carried
 from kratos_lite.model.loads import Load, TimeDependentLoad
-from kratos_lite.model.loads.base import in_time
+from kratos_lite.model.loads.base import InTime
 from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.loads.temperature import Temperature, heated
 from kratos_lite.model.loads.together import joined
@@ -131,4 +131,4 @@ class AppliedLoads:
 
     @cached_property
     def _changing(self) -> Callable[[float], list[tuple[float, tuple[Ints, Array]]]]:
-        return in_time([x for x in self.model.loads if isinstance(x, TimeDependentLoad)], self._on_nodes)
+        return InTime([x for x in self.model.loads if isinstance(x, TimeDependentLoad)], self._on_nodes)

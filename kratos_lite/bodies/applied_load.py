@@ -14,7 +14,7 @@ from kratos_lite.bodies.linear_algebra import NO_ENTRIES, Entries
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.loads import Load, TimeDependentLoad
-from kratos_lite.model.loads.base import in_time
+from kratos_lite.model.loads.base import InTime
 from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.loads.temperature import Temperature
 from kratos_lite.time_series import Factor, function_of
@@ -107,7 +107,7 @@ def _on_nodes(load: Load, mesh: Mesh, body: FreeBody) -> AppliedLoad:
     """Return the nodal forces of the undeformed mesh, which keep their direction in space."""
     elements = body.elements()
     if isinstance(load, TimeDependentLoad):
-        forces = in_time([load], lambda ones: ones[0].forces(mesh, elements))
+        forces = InTime([load], lambda ones: ones[0].forces(mesh, elements))
         rest = np.zeros_like(mesh.points)
         return AppliedLoad(
             lambda q, u, t: body.generalized_nodal_force(sum((k * f for k, f in forces(t)), rest), q)

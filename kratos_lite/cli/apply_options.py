@@ -77,7 +77,7 @@ def _marked(path: str, mark: str) -> str:
     >>> _marked("out/part.vtu", "-2")
     'out/part-2.vtu'
     """
-    return str(Path(path).with_suffix("")) + mark + Path(path).suffix
+    return f"{Path(path).with_suffix('')}{mark}{Path(path).suffix}" if mark else path
 
 
 def given(options: Namespace, *names: str) -> dict[str, Any]:

@@ -6,9 +6,8 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from copy import copy
-from functools import lru_cache
 from types import FunctionType
-from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -281,30 +280,35 @@ class ScaledLoad(TimeDependentLoad):
         return [(self.amplitude(time), self.load)]
 
 
-def in_time(
-    loads: Iterable[TimeDependentLoad], forces_of: Callable[[list[Load]], T]
-) -> Callable[[float], list[tuple[float, T]]]:
-    """Return what loads put on nodes at a time in s: factors, and what `forces_of` gives of loads for each.
+class InTime(Generic[T]):
+    """What loads put on nodes at a time in s: factors, and what `forces_of` gives of loads for each.
 
     Those with the same amplitude have one factor; while the loads are the same, so is what it gives of them.
     """
-    groups: dict[int, list[TimeDependentLoad]] = {}
-    for load in loads:
-        groups.setdefault(id(getattr(load, "amplitude", load)), []).append(load)
-    kept: dict[int, tuple[list[Load], T]] = {}
 
-    @lru_cache(maxsize=2)
-    def forces(time: float) -> list[tuple[float, T]]:
+    def __init__(self, loads: Iterable[TimeDependentLoad], forces_of: Callable[[list[Load]], T]) -> None:
+        groups: dict[int, list[TimeDependentLoad]] = {}
+        for load in loads:
+            groups.setdefault(id(getattr(load, "amplitude", load)), []).append(load)
+        self._groups, self._forces_of = list(groups.values()), forces_of
+        self._kept: dict[int, tuple[list[Load], T]] = {}
+        self._last: tuple[float, list[tuple[float, T]]] | None = None
+
+    def __call__(self, time: float) -> list[tuple[float, T]]:
+        """Return pairs of a factor and what the loads with it give."""
+        if self._last is None or self._last[0] != time:
+            self._last = time, self._at(time)
+        return self._last[1]
+
+    def _at(self, time: float) -> list[tuple[float, T]]:
         found = []
-        for key, same in groups.items():
+        for key, same in enumerate(self._groups):
             acting = [one for load in same for one in load.acting(time)]
             ones = [load for _, load in acting]
-            if ones and (key not in kept or kept[key][0] != ones):
-                kept[key] = ones, forces_of(ones)
-            found += [(acting[0][0], kept[key][1])] if ones else []
+            if ones and (key not in self._kept or self._kept[key][0] != ones):
+                self._kept[key] = ones, self._forces_of(ones)
+            found += [(acting[0][0], self._kept[key][1])] if ones else []
         return found
-
-    return forces
 
 
 def _shown(value: Any) -> str:
