@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
+from kratos_lite.cli import main
 from kratos_lite.io.run import prepare
 from kratos_lite.typing import Array
 from tests.io.abaqus.conftest import CUBE
@@ -255,3 +256,14 @@ def test_a_harmonic_response_is_written_as_a_table_alone(read: Read, tmp_path: P
     case.harmonic, case.outputs.json = {"frequencies": [1.0]}, str(tmp_path / "out.json")
     with pytest.raises(kl.InputError, match=r"written as \.csv alone"):
         kl.run(case)
+
+
+def test_the_command_line_writes_a_file_for_each_step(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    sweep = "*STEP\n*STEADY STATE DYNAMICS\n2.,10.,3\n*MODAL DAMPING\n1,4,.1\n*CLOAD\nTOP,3,3.\n*END STEP\n"
+    Path("job.inp").write_text(ONE + MODES_STEP + sweep)
+    assert main(["solve", "job.inp", "-o", "out.vtu", "-q"]) == 0
+    assert Path("out-1.pvd").is_file()
+    assert len(Path("out-2.csv").read_text().splitlines()) == 1 + 8 * 5
