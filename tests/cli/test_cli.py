@@ -446,7 +446,7 @@ WRONG_OPTIONS = {
     "material without a constant": (["--material", "E=1e9"], "Isotropic3D needs nu (POISSON_RATIO)"),
     "unknown constant": (["--material", "E=1e9,nu=0.3,rho=1"], "constants of Isotropic3D are E, nu, density"),
     "constant twice": (["--material", "E=1e9,E=1e9,nu=0.3"], "E is given twice"),
-    "unknown law": (["--material", "x:Wood:E=1e9,nu=0.3"], "'Wood' is no material; have ConeSoftening3D"),
+    "unknown law": (["--material", "x:Wood:E=1e9,nu=0.3"], "'Wood' is no material; have Anisotropic3D"),
     "constant out of bounds": (["--material", "E=1e9,nu=0.5"], "nu (POISSON_RATIO) 0.5 must be < 0.5"),
     "unknown property": (["--material", "7:" + STEEL], "no element has property 7"),
     "no number": ([*HELD, "--gravity", "0,0,down"], "--gravity: 'down' is not a finite number"),
@@ -484,7 +484,7 @@ WRONG_OPTIONS = {
     "json as vtu": ([*HELD, "--json", "out.vtu"], "out.vtu: the ending must be .json"),
     "unknown law or part": (
         ["--material", "Foo:E=1e9,nu=0.3"],
-        "unknown law or part 'Foo'; laws are ConeSoftening3D",
+        "unknown law or part 'Foo'; laws are Anisotropic3D",
     ),
     "too large": (
         [*HELD, "--fix", "z+:xyz=1e300", "--json", "out.json"],
