@@ -129,8 +129,9 @@ class Material:
         for name in names_of(type(self)):
             value = getattr(self, name)
             if name in self.tables:
-                shape = self.tables[name] if np.size(value) else None
-                array = finite(value, self._name(name), shape, error=MaterialError)
+                array = finite(value, self._name(name), error=MaterialError)
+                if array.size:
+                    finite(array, self._name(name), self.tables[name], error=MaterialError)
                 vars(self)[name] = _tuples(array.tolist())
                 continue
             if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):

@@ -203,6 +203,15 @@ CASES: Case = {
         lambda v: kl.converge(lambda h: static(), lambda result: 1.0, v).values,
         [3.0, 2.0, 1.0],
     ),
+    ("Anisotropic3D", "stiffness"): (lambda v: kl.Anisotropic3D(v).C, ROCK.C),
+    ("Anisotropic3D", "alpha"): (lambda v: kl.Anisotropic3D(ROCK.C, alpha=v).expansion, STRAIN),
+    ("turned", "axes"): (lambda v: kl.Anisotropic3D(ROCK.C).turned(v).C, np.eye(3)),
+    ("J2Plasticity3D", "curve"): (
+        lambda v: kl.J2Plasticity3D(1e9, 0.3, 1e6, curve=v).evaluate(
+            0.1 * STRAIN, kl.J2Plasticity3D(1e9, 0.3, 1e6).initial_state(), 1.0
+        )[0],
+        ((0.1, 2e6), (0.2, 3e6)),
+    ),
     ("Cartesian", "x"): (lambda v: kl.Cartesian(v).directions(POINT), VECTOR),
     ("Cartesian", "y"): (lambda v: kl.Cartesian((0, 0, 1), v).directions(POINT), VECTOR),
     ("Structure.use_rule", "where"): (lambda v: changed("use_rule", 2, v), [0]),
