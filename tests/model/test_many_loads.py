@@ -60,6 +60,13 @@ def test_each_load_keeps_its_own_size_and_face():
     assert_close(total(fixed(*loads, kl.Pressure("z+", 1e5), *loads))[:, 2].sum(), 2 * expected.sum() - 2e5)
 
 
+def test_each_load_keeps_its_own_amplitude():
+    model, plain = fixed(), [kl.Pressure(nodes, 1e5 * i) for i, nodes in enumerate(TOP)]
+    for i, nodes in enumerate(TOP):
+        model.add(kl.Pressure(nodes, 1e5), amplitude=float(i))
+    assert_close(total(model), total(fixed(*plain)))
+
+
 def test_point_loads_on_nodes_and_points_add_up():
     nodes = np.unique(TOP)
     loads = [kl.PointLoad(nodes[[i]], (0, 1.0, i)) for i in range(len(nodes))]

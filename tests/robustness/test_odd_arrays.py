@@ -150,6 +150,7 @@ CASES: Case = {
     ("Mesh.nodes", "where"): (CUBE.nodes, NODES),
     ("Mesh.elements", "where"): (CUBE.elements, [0]),
     ("Mesh.faces", "where"): (CUBE.faces, NODES),
+    ("Mesh.face_rows", "where"): (CUBE.face_rows, NODES),
     ("Mesh.add_part", "where"): (lambda v: CUBE.replace().add_part("a", v), NODES),
     ("Mesh.node_rows", "ids"): (CUBE.node_rows, NODES),
     ("Mesh.locate", "points"): (lambda v: CUBE.locate(v).rows, [POINT]),
