@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cached_property
 from itertools import chain
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
@@ -128,10 +128,6 @@ class AppliedLoads:
         total = np.zeros_like(self.model.mesh.points) if initial is None else -initial
         total[nodes] += forces
         return total
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Leave out what is made anew."""
-        return {name: value for name, value in vars(self).items() if name != "_changing"}
 
     @cached_property
     def _changing(self) -> Callable[[float], list[tuple[float, tuple[Ints, Array]]]]:
