@@ -243,16 +243,6 @@ CASES: Case = {
     ),
     ("Torque", "torque"): (lambda v: moved(kl.RigidBody, kl.Torque(v)), VECTOR),
     ("Body.add", "amplitude"): (lambda v: moved(kl.RigidBody, kl.Gravity(VECTOR), amplitude=v), 2.0),
-    ("Anisotropic3D", "stiffness"): (lambda v: kl.Anisotropic3D(v).C, ROCK.C),
-    ("Anisotropic3D", "alpha"): (lambda v: kl.Anisotropic3D(ROCK.C, alpha=v).expansion, STRESS * 1e-6),
-    ("Anisotropic3D.turned", "axes"): (lambda v: kl.Anisotropic3D(ROCK.C).turned(v).C, np.eye(3)),
-    ("J2Plasticity3D", "curve"): (
-        lambda v: kl.J2Plasticity3D(1e9, 0.3, 1e6, curve=v).evaluate(
-            np.array([0.01, 0, 0, 0, 0, 0]), kl.J2Plasticity3D(1e9, 0.3, 1e6).initial_state(), 1.0
-        )[0],
-        [[0.01, 2e6], [0.1, 3e6]],
-    ),
-    ("Mesh.face_rows", "where"): (lambda v: CUBE.face_rows(v).astype(float), CUBE.nodes("z-")),
     ("LinearMaterial.stress", "strain"): (ROCK.stress, STRESS * 1e-6),
     ("KinematicLinear", "X"): (lambda v: BRICK(v).detJ(VECTOR), BRICK.nodes),
     **{
