@@ -1,7 +1,7 @@
 """Measure: ``python -m benchmarks quick``, or ``full``, or one set by its name.
 
 Sets: ``kratos error growth stall assembly parse skips cube1 motion ale distributed``, and in this process
-``effectivity adaptive edges dynamics laws loads folders``.
+``effectivity adaptive edges dynamics laws loads folders decks``.
 
 ``report`` makes the pages and pictures of the docs from the results kept; ``references`` makes the
 energies of the scenes without an exact field.  See benchmarks/README.md.
@@ -16,7 +16,20 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks import accuracy, curves, dynamics, folders, laws, loads, report, scaling, scenes, sets, stall
+from benchmarks import (
+    accuracy,
+    curves,
+    decks,
+    dynamics,
+    folders,
+    laws,
+    loads,
+    report,
+    scaling,
+    scenes,
+    sets,
+    stall,
+)
 from benchmarks.driver import ROOT, Driver, Run, load, results, save, scratch
 from benchmarks.motion import MOTIONS
 from benchmarks.programs import HELPERS, PROGRAMS
@@ -58,6 +71,7 @@ OTHERS: dict[str, Callable[[argparse.Namespace], int | None]] = {
     "laws": lambda o: laws.laws(o.pythons.get("Kratos", o.pythons.get("", "")), o.cells or laws.CELLS),
     "loads": lambda o: loads.loads(),
     "folders": lambda o: folders.folders(o.path, o.pythons.get("Kratos", o.pythons.get("", ""))),
+    "decks": lambda o: decks.speed() if o.path == ROOT else decks.decks(o.path),
     "references": lambda o: references(o.cells or (4, 8, 16)),
     "report": lambda o: write_report(),
 }
@@ -114,7 +128,7 @@ def arguments(words: Sequence[str] | None) -> argparse.Namespace:
     many = {"nargs": "+", "metavar": "NAME"}
     add, seconds = parser.add_argument, {"type": float, "metavar": "SECONDS"}
     add("command", choices=[*COMMANDS, *OTHERS])
-    add("path", nargs="?", type=Path, default=ROOT, help="for folders: with copies of Kratos's test folders")
+    add("path", nargs="?", type=Path, default=ROOT, help="for folders, decks: with tests of Kratos, CalculiX")
     add("--programs", choices=names, default=names, help=f"some of: {', '.join(names)}", **many)
     add("--scenes", choices=sorted(scenes.SCENES), help="for error, stall: some of their scenes", **many)
     add("--elements", choices=scenes.KINDS, help=f"some of: {', '.join(scenes.KINDS)}", **many)

@@ -3,30 +3,47 @@
 from __future__ import annotations
 
 import gzip
+import os
 import re
 import subprocess
+import sys
 import tempfile
 from collections import Counter
 from itertools import pairwise
 from pathlib import Path
+from time import perf_counter
 
 import numpy as np
 
 import kratos_lite as kl
-from benchmarks.driver import ROOT
+from benchmarks.driver import ROOT, load, save
 from benchmarks.tables import Row, error, table
 from kratos_lite.io.abaqus.deck import Deck
 from kratos_lite.io.abaqus.job import Job
+from kratos_lite.io.abaqus.mesh import ELEMENT_TYPES
 
 PAGE, LIMIT, AGREES = ROOT / "docs" / "about" / "calculix-decks.md", 60, 1e-6
+RESULTS = Path(__file__).with_name("results") / "decks.json"
 ASKED = "*NODE FILE\nU\n*EL FILE\nS\n*NODE PRINT, NSET=EVERY, GLOBAL=YES\nU\n"
 """Results that every step writes."""
 SOLIDS = ("C3D", "SPRING", "MASS", "DASHPOT", "DCOUP3D", "GAPUNI")
+MODAL = "ccx keeps the modes that it found alone; here the whole model answers"
+RULE = "ccx takes mass and body forces of C3D20R by 2×2×2 points, here they are exact"
 DIFFERS = {
-    "beampic": "ccx's iterative solver ends early",
-    "segment1": "ccx integrates the centrifugal load by the points of the reduced rule",
-    "beamf": "another mass matrix of C3D20R",
+    **dict.fromkeys([f"beamdy{i}" for i in (*range(1, 8), 14, 15, 16, 19)], MODAL),
+    **dict.fromkeys(["beamdy8", "beamdy9"], f"{MODAL}; {RULE}"),
+    **dict.fromkeys(["beamf", "segment1", "segment2"], RULE),
+    **dict.fromkeys(["beamnh", "beamnlmpc", "beamnlp"], "ccx ends its iterations early"),
+    **dict.fromkeys(
+        ["beamimpdy1", "beamimpdy1nodirect", "beamimpdy2"], "other increments, and damping in HHT"
+    ),
+    **dict.fromkeys(["beamnldy", "beamnldynodirect"], "a sudden load in one increment"),
+    "beampic": "the iterative solver of ccx ends early",
+    "cubef2f3": "faces are tied in the mean here, node by node in ccx",
+    "damper1": "damping by mass of rigid motions in HHT",
 }
+SIZES = (("C3D10", 8), ("C3D10", 13), ("C3D20R", 8), ("C3D8", 20), ("C3D10", 18))
+"""Elements and cells along the short edges of a block 1 × 1 × 2 under its weight."""
 TEXT = """# Test decks of CalculiX
 
 The decks of CalculiX's own tests that hold solids alone, here and in a live ccx {version}. *Tables*: those of
@@ -86,6 +103,51 @@ def compared(text: str, path: Path, ccx: str) -> Row:
     return row | {"verdict": "agrees" if agrees else "differs"}
 
 
+def speed(ccx: str = "ccx") -> None:
+    """Measure a block under its weight, whole processes one after the other, and keep the rows."""
+    rows = list[Row]()
+    for kind, n in SIZES:
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder, "job.inp")
+            unknowns = write_block(path, kind, n)
+            ours = timed([sys.executable, "-m", "kratos_lite", "ccx", "job"], folder)
+            u = printed(path)["U", 0, 1.0]
+            theirs = timed([ccx, "job"], folder)
+            row = {"element": kind, "unknowns": unknowns, "U": off(u, printed(path)["U", 0, 1.0])}
+        rows.append(row | {"kratos_lite": ours, "ccx": theirs})
+        print(rows[-1], flush=True)
+        save(RESULTS, {"set": "decks", "rows": rows})
+
+
+def timed(words: list[str], folder: str) -> tuple[float, float]:
+    """Return seconds and megabytes of a process."""
+    start = perf_counter()
+    child = subprocess.Popen(words, cwd=folder, stdout=subprocess.DEVNULL)
+    _, code, used = os.wait4(child.pid, 0)
+    if code:
+        raise RuntimeError(f"{words[0]} ends with {code}")
+    return round(perf_counter() - start, 2), round(used.ru_maxrss / 1024)
+
+
+def write_block(path: Path, kind: str, n: int) -> int:
+    """Write the deck of a block; return its unknowns."""
+    mesh = kl.box((1.0, 1.0, 2.0), (n, n, 2 * n), ELEMENT_TYPES[kind])
+    cells = mesh.blocks[0].nodes[:, list(mesh.blocks[0].known_shape.to_vtk)] + 1
+    base = np.flatnonzero(mesh.points[:, 2] == 0) + 1
+    rows = [",\n".join(", ".join(map(str, row[i : i + 10])) for i in range(0, len(row), 10))
+            for row in np.column_stack([np.arange(1, len(cells) + 1), cells]).tolist()]  # fmt: skip
+    path.write_text(
+        "*NODE, NSET=EVERY\n"
+        + "".join("{}, {:.15g}, {:.15g}, {:.15g}\n".format(i, *x) for i, x in enumerate(mesh.points.tolist(), 1))
+        + f"*ELEMENT, TYPE={kind}, ELSET=BLOCK\n" + "\n".join(rows)
+        + "\n*NSET, NSET=BASE\n" + ",\n".join(map(str, base.tolist()))
+        + "\n*MATERIAL, NAME=STEEL\n*ELASTIC\n210000., .3\n*DENSITY\n7.85e-9\n"
+        "*SOLID SECTION, ELSET=BLOCK, MATERIAL=STEEL\n*BOUNDARY\nBASE, 1, 3\n*STEP\n*STATIC\n"
+        f"*DLOAD\nBLOCK, GRAV, 9810., 0., .6, -.8\n{ASKED}*END STEP\n"
+    )  # fmt: skip
+    return 3 * (mesh.n_nodes - len(base))
+
+
 def off(ours: np.ndarray, theirs: np.ndarray) -> float:
     """Return the largest difference over the largest value."""
     return float(np.abs(ours - theirs).max() / (np.abs(theirs).max() or 1.0))
@@ -122,14 +184,22 @@ def printed(path: Path) -> dict[tuple[str, int, float], np.ndarray]:
 
 
 def page(rows: list[Row], version: str) -> str:
-    """Return the page of all rows."""
-    names = ("deck", "tables", "verdict", "U", "S", "reason")
+    """Return the page of all rows, and of the times that are kept."""
     counts = ", ".join(f"{n} {verdict}" for verdict, n in Counter(row["verdict"] for row in rows).items())
+    names = ("deck", "tables", "verdict", "U", "S", "reason")
+    why = [row | {"reason": row.get("reason", DIFFERS.get(str(row["deck"]), ""))} for row in rows]
+    body = [[str(row.get(name, "")) for name in names] for row in why]
+    head = TEXT.format(version=version, agrees=AGREES, counts=counts)
+    return head + table(names, body) + times(load(RESULTS).get("rows", []))
+
+
+def times(rows: list[Row]) -> str:
+    """Return the table of times."""
+    names = ("element", "unknowns", "kratos_lite", "ccx", "ratio", "difference of U")
     body = [
-        [
-            str(row.get(name, DIFFERS.get(str(row["deck"]), "")) if name == "reason" else row.get(name, ""))
-            for name in names
-        ]
+        [row["element"], str(row["unknowns"]), *("{} s, {} MB".format(*row[name]) for name in names[2:4]),
+         f"{row['ccx'][0] / row['kratos_lite'][0]:.1f}", error(row["U"])]
         for row in rows
-    ]
-    return TEXT.format(version=version, agrees=AGREES, counts=counts) + table(names, body)
+    ]  # fmt: skip
+    text = "A block 1 × 1 × 2 under its weight, whole processes, two cores (`python -m benchmarks decks`):"
+    return f"\n## Time\n\n{text}\n\n{table(names, body)}"
