@@ -134,11 +134,12 @@ def write_block(path: Path, kind: str, n: int) -> int:
     mesh = kl.box((1.0, 1.0, 2.0), (n, n, 2 * n), ELEMENT_TYPES[kind])
     cells = mesh.blocks[0].nodes[:, list(mesh.blocks[0].known_shape.to_vtk)] + 1
     base = np.flatnonzero(mesh.points[:, 2] == 0) + 1
+    enumerated = [(i, *x) for i, x in enumerate(mesh.points.tolist(), 1)]
     rows = [",\n".join(", ".join(map(str, row[i : i + 10])) for i in range(0, len(row), 10))
             for row in np.column_stack([np.arange(1, len(cells) + 1), cells]).tolist()]  # fmt: skip
     path.write_text(
         "*NODE, NSET=EVERY\n"
-        + "".join("{}, {:.15g}, {:.15g}, {:.15g}\n".format(i, *x) for i, x in enumerate(mesh.points.tolist(), 1))
+        + "".join("{}, {:.15g}, {:.15g}, {:.15g}\n".format(*row) for row in enumerated)
         + f"*ELEMENT, TYPE={kind}, ELSET=BLOCK\n" + "\n".join(rows)
         + "\n*NSET, NSET=BASE\n" + ",\n".join(map(str, base.tolist()))
         + "\n*MATERIAL, NAME=STEEL\n*ELASTIC\n210000., .3\n*DENSITY\n7.85e-9\n"
