@@ -26,6 +26,10 @@ LOADS = {"traction": Traction, "pressure": Pressure, "point_load": PointLoad, "r
 """Options of loads on parts."""
 
 
+MODAL = ("modes", "buckling", "harmonic", "time")
+"""Options that say which analysis is done."""
+
+
 def case_of(options: Namespace, part: int | None = None) -> Case:
     """Return the case of an input and the options of the command line, which win where there is one value.
 
@@ -42,7 +46,7 @@ def case_of(options: Namespace, part: int | None = None) -> Case:
         **given(options, "linear", "scale"),
     )
     if case.then:
-        refuse(options, ("modes", "buckling", "time"), "does not go with a file of several steps")
+        refuse(options, MODAL, "does not go with a file of several steps")
     for number, each in enumerate((case, *case.then), 1):
         _apply(each, options, f"-{number}" if case.then else "")
     return case
@@ -59,7 +63,7 @@ def _apply(case: Case, options: Namespace, mark: str) -> None:
     case.time = _time(options, case.time)
     if case.is_of_model and case.time is not None:
         case.time = case.time.starting_from(case.model.supports, case.model.initial_displacement)
-    if given(options, "modes", "buckling"):
+    if given(options, "modes", "buckling", "harmonic"):
         _take_modes(case, options)
     for name, path in given(options, "json", "picture", "state").items():
         setattr(case.outputs, name, _marked(path, mark))
@@ -97,7 +101,7 @@ def refuse_serial_options(options: Namespace) -> None:
     from kratos_lite.distributed.petsc import parsed, petsc
 
     why = "does not go with --backend petsc, which solves statics; leave one out"
-    refuse(options, ("modes", "buckling", "time", *only("time"), "rotation", "translation"), why)
+    refuse(options, (*MODAL, *only("time"), "rotation", "translation"), why)
     refuse(options, ("error",), "is for one process; leave it out, or --backend petsc")
     if Path(options.input).suffix.lower() == ".py":
         raise InputError(f"{options.input}: scripts are for one process; leave --backend petsc out")
@@ -106,13 +110,14 @@ def refuse_serial_options(options: Namespace) -> None:
 
 
 def _take_modes(case: Case, options: Namespace) -> None:
-    """Ask a case for natural frequencies or buckling, whatever its file says of time and outputs."""
-    (name, count), *others = given(options, "modes", "buckling", "time").items()
+    """Ask a case for modes, buckling or a harmonic response, whatever its file says of time and outputs."""
+    (name, value), *others = given(options, *MODAL).items()
     if others:
         raise InputError(f"--{name} and --{others[0][0]}: give one of them")
-    refuse(options, ("json", "state"), "does not hold modes; -o OUT.pvd or OUT.html does")
+    refuse(options, ("json", "state"), "does not hold modes or responses; -o OUT does")
     refuse(options, ("error",), "is for statics; modes are those of the mesh as it is")
-    case.modes, case.buckling, case.time, case.outputs = count, name == "buckling", None, Outputs()
+    case.time, case.outputs, case.buckling = None, Outputs(), name == "buckling"
+    case.modes, case.harmonic = (0, value) if name == "harmonic" else (value, None)
 
 
 def _time(options: Namespace, of_file: TimeIntegration | None) -> TimeIntegration | None:

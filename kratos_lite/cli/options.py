@@ -15,6 +15,7 @@ FORMULATION = (
     "instead of that of the names of elements: standard, enhanced, b_bar, reduced, "
     "total_lagrangian, f_bar or non_locking"
 )
+HARMONIC = "find the response to loads that swing, at frequencies in Hz with a damping ratio (0); -o OUT.csv"
 INTEGRATOR = (
     "newmark[:BETA,GAMMA], hht[:ALPHA], bossak[:ALPHA], generalized_alpha[:RHO] or central_difference"
 )
@@ -133,6 +134,7 @@ GROUPS = {
     "solver": (
         Option("--modes", "N", MODES, only="models"),
         Option("--buckling", "N", BUCKLING, only="models"),
+        Option("--harmonic", "LOW:HIGH:COUNT[:DAMPING]", HARMONIC, only="models"),
         *_all(
             Option("--solver", "auto|dense|direct|amg", "auto chooses by size"),
             Option("--error", "FRACTION", ERROR),

@@ -6,7 +6,7 @@ A reader raises InputError with the reason, or ValueError where a text is not of
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import isfinite
+from math import isfinite, pi
 from typing import TYPE_CHECKING, Any
 
 from kratos_lite.errors import InputError, nearest
@@ -178,6 +178,19 @@ def material(text: str) -> tuple[str | None, Material]:
     return parts[-1], law.from_variables(values)
 
 
+def sweep(text: str) -> dict[str, Any]:
+    """Return the options of a harmonic response, from the first frequency to the last in Hz.
+
+    >>> sweep("0:10:3:2%")["frequencies"].round(2).tolist()
+    [0.0, 31.42, 62.83]
+    """
+    from numpy import linspace
+
+    low, high, many, *damping = text.split(":")
+    omega = 2 * pi * linspace(number(low), number(high), count(many))
+    return {"frequencies": omega, "damping": fraction(*damping) if damping else 0.0}
+
+
 FORMS: dict[str, Callable[[str], Any]] = {
     "N": count,
     "T[:REFERENCE]": temperature,
@@ -194,6 +207,7 @@ FORMS: dict[str, Callable[[str], Any]] = {
     "NAME[:NUMBERS]": integrator,
     "CUT": section,
     "ALPHA,BETA": rayleigh,
+    "LOW:HIGH:COUNT[:DAMPING]": sweep,
 }
 
 

@@ -282,6 +282,19 @@ def test_modes_are_written_as_a_series_and_a_picture(run, folder):
         assert np.abs(data - sign * expected).max() < 1e-6
 
 
+def test_a_response_to_loads_that_swing_is_told_and_written(run, folder):
+    model = tower()
+    model.add(kl.Traction("z+", (1e3, 0, 0)))
+    response = model.harmonic(2 * np.pi * np.linspace(0, 4, 3), damping=0.02)
+    words = ("--traction", "z+:1e3,0,0", "--harmonic", "0:4:3:2%", "-o", "a.csv")
+    told = run("solve", "tower.mdpa", *WORDS, *words)
+    largest = [np.linalg.norm(response.displacement(i), axis=1).max() for i in range(3)]
+    found = [float(line.split()[2]) for line in told.out.splitlines()[1:4]]
+    np.testing.assert_allclose(found, largest, rtol=1e-6)
+    table = np.loadtxt("a.csv", delimiter=",", skiprows=1)
+    assert abs(table[:, 2].max() / np.abs(response.displacement(2)[:, 0]).max() - 1) < 1e-9
+
+
 def test_shapes_of_buckling_are_told_and_written_as_modes_are(run, folder):
     model = tower()
     model.add(kl.Traction("z+", (0, 0, -1e3)))
@@ -313,7 +326,7 @@ def test_shapes_of_buckling_are_told_and_written_as_modes_are(run, folder):
     ("words", "said"),
     [
         (("-o", "a.vtu"), "a.vtu: modes are written as .pvd (for ParaView), .html or .frd"),
-        (("--json", "a.json"), "--json does not hold modes; -o OUT.pvd or OUT.html does"),
+        (("--json", "a.json"), "--json does not hold modes or responses; -o OUT does"),
         (("--vtu", "ascii"), "--vtu ascii: there is no output to write so; add -o OUT.pvd"),
         (("--picture", "a.xyz"), "a.xyz: pictures cannot be written as .xyz"),
     ],
