@@ -206,6 +206,14 @@ def function_or_none(value: Any, must: str) -> None:
         raise InputError(f"{must}; got {short(value)}")
 
 
+def fraction(value: Any, what: str) -> float:
+    """Return a number, or that of percents such as ``"5%"``."""
+    word = value.strip() if isinstance(value, str) else ""
+    if word.endswith("%") and word[:-1].strip().replace(".", "", 1).isdecimal():
+        return float(word[:-1]) / 100
+    return number(value, what)
+
+
 def takes(function: Any, count: int) -> bool:
     """Return whether something can be called with so many arguments, as far as Python knows."""
     import inspect

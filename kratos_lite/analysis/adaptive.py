@@ -35,7 +35,7 @@ from kratos_lite.model.refined import refined
 from kratos_lite.model.structure import Structure
 from kratos_lite.tabular import in_units
 from kratos_lite.typing import Array, Ints, Progress
-from kratos_lite.validation import number, short, whole_number
+from kratos_lite.validation import fraction, short, whole_number
 
 Geometry: TypeAlias = Mapping[str, Callable[[Array], Array]]
 """By part, a function that takes places (k, 3) near its true surface onto it."""
@@ -55,7 +55,7 @@ BYTES = 6000  # that an unknown may need; the largest mesh is one that fits into
 
 def solve_to(
     model: Structure,
-    error: float,
+    error: float | str,
     solver: str = "auto",
     tolerance: float = 1e-10,
     progress: Progress | None = None,
@@ -64,7 +64,7 @@ def solve_to(
     quantity: Quantity | None = None,
 ) -> Result:
     """Solve a static model on meshes that become finer until the error is as small as requested."""
-    aim = number(error, "error")
+    aim = fraction(error, "error")
     if not LEAST <= aim < 1:
         raise InputError(f"error must be a fraction between {LEAST:g} and 1, such as 0.01; got {error!r}")
     most = _affordable() if most_unknowns is None else whole_number(most_unknowns, "most_unknowns")

@@ -68,9 +68,11 @@ class Isotropic3D(LinearMaterial):
                 f"{self._name('E')} {self.E:g} must be > 0 Pa: a body without stiffness cannot carry load"
             )
         if not self.nu < 0.5:
+            cure = "for nearly incompressible bodies use 0.499 and quadratic elements"
+            if self.nu > 1:
+                cure = "is it in percent?" if self.nu < 50 else "are nu and density swapped?"
             raise MaterialError(
-                f"{self._name('nu')} {self.nu:g} must be < 0.5: the bulk modulus is infinite at 0.5; "
-                "for nearly incompressible bodies use 0.499 and quadratic elements"
+                f"{self._name('nu')} {self.nu:g} must be < 0.5: the bulk modulus is infinite at 0.5; {cure}"
             )
         if not self.nu > -1:
             raise MaterialError(

@@ -544,7 +544,8 @@ class Structure(Solid):
             load.attach(self)
             return
         if not isinstance(load, Load):
-            raise InputError(f"a load such as Gravity or Traction is needed; got {type(load).__name__}")
+            hint = ", which acts on bodies" if type(load).__module__.startswith("kratos_lite.bodies") else ""
+            raise InputError(f"a load such as Gravity or Traction is needed; got {type(load).__name__}{hint}")
         load = load if amplitude is None else ScaledLoad(load, amplitude)
         load.check(self.mesh)
         if name is not None:

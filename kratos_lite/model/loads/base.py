@@ -325,13 +325,20 @@ def nodal(mesh: Mesh, nodes: Ints, forces: Array) -> Array:
     return total
 
 
-def vectors(values: ArrayLike, what: str, shapes: str, dimensions: tuple[int, ...] = (1,)) -> Array:
+def vectors(values: Any, what: str, shapes: str, dimensions: tuple[int, ...] = (1,)) -> Array:
     """Return vectors of the right shape."""
     array = finite(values, what)
     if array.ndim not in dimensions or array.shape[-1] != 3:
         got = f"shape {array.shape}" if array.ndim else f"the number {array}"
         raise InputError(f"{what} must be {shapes}; got {got}")
     return array
+
+
+def is_of_places(value: Any, what: str) -> bool:
+    """Return whether a value is a function; InputError for one that takes more than places (m, 3)."""
+    if callable(value) and not takes(value, 1):
+        raise InputError(f"{what} as a function takes places X (m, 3) alone: lambda X: …; got {value!r}")
+    return callable(value)
 
 
 def at_places(function: OfPlace, what: str, width: tuple[int, ...]) -> Callable[[Array], Array]:

@@ -11,7 +11,7 @@ from kratos_lite.assembly import gauss_point_fields
 from kratos_lite.assembly.element_groups import ElementGroup, add_nodal
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh, WhereElements, mask_of
-from kratos_lite.model.loads.base import DistributedLoad, OfPlace, placed, vectors
+from kratos_lite.model.loads.base import DistributedLoad, OfPlace, is_of_places, placed, vectors
 from kratos_lite.model.local_axes import LocalAxes
 from kratos_lite.typing import Array, ArrayLike, Ints
 
@@ -35,7 +35,7 @@ class BodyForce(DistributedLoad):
     def __init__(
         self, force: ArrayLike | OfPlace, where: WhereElements = None, *, local: LocalAxes | None = None
     ) -> None:
-        self.force: Any = force if callable(force) else vectors(force, *self.what, (1, 2))
+        self.force: Any = force if is_of_places(force, self.what[0]) else vectors(force, *self.what, (1, 2))
         self.where = where
         self._along(local)
 

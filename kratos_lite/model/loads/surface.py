@@ -23,7 +23,15 @@ from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Block, Mesh, Where, with_rows
 from kratos_lite.mesh.blocks import NO_ROWS, select, without_repeats
 from kratos_lite.mesh.refined_mesh import RefinedMesh
-from kratos_lite.model.loads.base import DistributedLoad, Load, OfPlace, at_places, placed, vectors
+from kratos_lite.model.loads.base import (
+    DistributedLoad,
+    Load,
+    OfPlace,
+    at_places,
+    is_of_places,
+    placed,
+    vectors,
+)
 from kratos_lite.model.local_axes import LocalAxes
 from kratos_lite.typing import Array, ArrayLike, Ints, Rows
 from kratos_lite.validation import finite, flag, number
@@ -86,7 +94,7 @@ class Traction(FaceLoad):
         self, where: Where, traction: ArrayLike | OfPlace, *, local: LocalAxes | None = None
     ) -> None:
         self.where, self.traction = where, traction
-        if not callable(traction):
+        if not is_of_places(traction, self.what):
             self.traction = vectors(traction, "a traction", "(3,) or (n, 3) in Pa", (1, 2))
         self._along(local)
 
@@ -144,7 +152,7 @@ class Pressure(FaceLoad):
         if normal not in ("outward", "nodes"):
             raise InputError(f"normal must be 'outward' or 'nodes'; got {normal!r}")
         self.follower = flag(follower, "follower")
-        if callable(pressure):
+        if is_of_places(pressure, self.what):
             if follower:
                 raise InputError("a follower pressure is a number or (n,) in Pa; got a function of places")
         else:

@@ -11,7 +11,7 @@ import numpy as np
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh, WhereElements, mask_of
-from kratos_lite.model.loads.base import Load, OfPlace, at_places
+from kratos_lite.model.loads.base import Load, OfPlace, at_places, is_of_places
 from kratos_lite.typing import Array, ArrayLike
 from kratos_lite.validation import finite, number
 
@@ -56,7 +56,7 @@ class Temperature(Load):
     def __init__(
         self, values: ArrayLike | OfPlace, reference: float = 0.0, where: WhereElements = None
     ) -> None:
-        if not callable(values):
+        if not is_of_places(values, "a temperature"):
             values = finite(values, "temperatures")
             if values.ndim > 1:
                 raise InputError(f"temperatures are a number or (n,) of the nodes; got shape {values.shape}")
