@@ -83,7 +83,7 @@ class Model(Structure):
         tolerance : relative residual at which the iterative solver stops.
         progress : called with the phase and the fraction done, 0 … 1.
         error : relative error of the energy norm, such as 0.01 or ``"1%"``, for which the mesh is made finer
-            and linear elements quadratic where needed; the result is on the final mesh, the model stays as it is.
+            and linear elements quadratic where needed; the result is on the final mesh, the model stays.
         most_unknowns : with `error`: no mesh with more of them is solved (as many as fit into the free
             memory); a warning says what was reached, and what it would take.
         geometry : with `error`: by part, a function that takes places (k, 3) in m near its true surface onto
