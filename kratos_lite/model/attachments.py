@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 import numpy as np
 
 from kratos_lite.assembly.attached import Attached
-from kratos_lite.assembly.sparsity_pattern import dofs_of
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh, Where
 from kratos_lite.mesh.selection import point_of
@@ -208,27 +207,25 @@ class AddedMass(AttachedMatrix):
 
 
 class OnNodes(AttachedMatrix):
-    """Springs to ground, or masses, on nodes (k,) along x, y, z: values (k, 3) in N/m or kg."""
+    """Springs, or masses, on nodes (k,) by their matrix (3n, 3n) in N/m or kg."""
 
     what = "an element of one node"
     where = None  # type: ignore[assignment]
 
-    def __init__(self, nodes: Ints, values: Array, is_mass: bool) -> None:
-        if (values < 0).any():
-            raise InputError(f"{self.what} has stiffness and mass ≥ 0; got {values.min():g}")
-        self.nodes, self.W, self.is_mass = nodes, values[:, None] * np.eye(3), is_mass
+    def __init__(self, nodes: Ints, A: Csr, is_mass: bool) -> None:
+        self.nodes, self.A, self.is_mass = nodes, A, is_mass
+        self.W = A.diagonal().reshape(-1, 3)[nodes, None] * np.eye(3)
 
     def matrix(self, mesh: Mesh) -> Csr:
         """Return the matrix (3n, 3n) on a mesh."""
-        from scipy.sparse import coo_array
-
         if len(idle := self.nodes[~mesh.used_nodes()[self.nodes]]):
             raise ModelError(f"{self.what} is at node {mesh.node_ids[idle[0]]}, which no solid has")
-        dofs, values = dofs_of(self.nodes), np.einsum("kii->ki", self.W).ravel()
-        return coo_array((values, (dofs, dofs)), shape=(mesh.points.size,) * 2).tocsr()
+        A: Any = self.A.copy()
+        A.resize(mesh.points.size, mesh.points.size)
+        return A
 
     def __repr__(self) -> str:
-        x, y, z = self.W.sum(axis=0).diagonal()
+        x, y, z = self.A.diagonal().reshape(-1, 3).sum(axis=0)
         total = f"mass {x:g} kg" if self.is_mass else f"stiffness ({x:g}, {y:g}, {z:g}) N/m"
         return f"{total} on {len(self.nodes)} nodes in all"
 

@@ -8,14 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from kratos_lite.analysis.model import Model
 from kratos_lite.assembly.sparsity_pattern import dofs_of
-from kratos_lite.elements.surface import area_vectors, face_rule
-from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import ModelError
 from kratos_lite.io.abaqus.cards import Card, Row
 from kratos_lite.io.abaqus.loads import LoadCards, with_faces
@@ -24,14 +22,11 @@ from kratos_lite.io.abaqus.supports import Axes, equations, node_rows
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.mesh.hanging import is_corner
 from kratos_lite.mesh.join import split
-from kratos_lite.model.attachments import AttachedMatrix
+from kratos_lite.model.attachments import OnNodes
+from kratos_lite.model.loads.surface import Pressure, Traction
 from kratos_lite.model.ties import constraints_of
 from kratos_lite.solvers.constraints import independent_rows, rigid_modes
 from kratos_lite.typing import Array, Csr, Ints, Mask
-
-if TYPE_CHECKING:
-    from kratos_lite.mesh.refined_mesh import RefinedMesh
-
 
 HELD, CORNER, MIDDLE = 1.0, 0.3, 0.1
 """What equations count from which reference nodes follow: of supported, corner and other nodes."""
@@ -79,11 +74,9 @@ class Connections:
         """Read *DISTRIBUTING: a reference node moves as the nodes of faces do in the mean, by their areas."""
         # Σ w |u - u_ref - θ × (x - x_ref)|² is least, so that forces and moments go to nodes as in CalculiX.
         ref, of, axes = self._coupled(card)
-        w, X = np.zeros(self.mesh.n_nodes), self.mesh.points
-        for block in self._faces(of.option("SURFACE"), of):
-            rule = face_rule(block.known_shape)
-            dA = np.linalg.norm(area_vectors(block.known_shape, X[block.nodes], rule), axis=-1)
-            np.add.at(w, block.nodes, dA @ tabulate(block.known_shape, rule)[0])
+        faces: Any = self._faces(of.option("SURFACE"), of)
+        X = self.mesh.points
+        w = Traction(faces, (1.0, 0.0, 0.0)).forces(self.mesh, [])[:, 0]
         nodes, some = np.flatnonzero(w), np.unique([0, 1, 2, *axes])
         R = rigid_modes(X[nodes], X[ref])
         B = R.T * np.repeat(w[nodes], 3)
@@ -204,10 +197,9 @@ class Connections:
     def _cut(self, card: Card) -> None:
         """Cut the mesh for *PRE-TENSION SECTION: the way between both sides is the displacement of a node."""
         card.check_options(("SURFACE", "NODE", "NAME"))
-        mesh, blocks = self.mesh, self._faces(card.option("SURFACE"), card)
-        rows = np.unique(np.concatenate([block.nodes.ravel() for block in blocks]))
-        areas = [area_vectors(b.known_shape, mesh.points[b.nodes]).sum(axis=(0, 1)) for b in blocks]
-        n = np.sum(areas, axis=0)
+        mesh, rows = self.mesh, self._surface_nodes(card.option("SURFACE"), card)
+        faces: Any = self._faces(card.option("SURFACE"), card)
+        n = Pressure(faces, -1.0, normal="nodes").forces(mesh, []).sum(axis=0)
         new, copies = split(mesh, rows), mesh.n_nodes + np.arange(len(rows))
         order = np.arange(new.n_nodes)
         if n[np.abs(n).argmax()] > 0:  # as in CalculiX the elements of the surface get the copies
@@ -254,9 +246,9 @@ class Connections:
             K = K + k * (real @ A.T @ A @ real)
         masses = diags_array(np.repeat(self.cards.masses_of(None), 3))
         M = references.P.T @ masses @ references.P @ real
-        for made in (Springs(csr_array(K)), Masses(csr_array(M))):
-            if abs(made.A).sum() > 0:
-                model.add(made)
+        for A, is_mass in ((K, False), (M, True)):
+            if len(nodes := np.unique(A.diagonal().nonzero()[0] // 3)):
+                model.add(OnNodes(nodes, csr_array(A), is_mass))
 
     def _constrain(self, model: Model, fixed: Mask) -> References:
         """Add the equations without free reference nodes, which follow what equations choose for them."""
@@ -336,32 +328,3 @@ def _depend(model: Model, E: Csr, first: Ints) -> None:
     first = np.asarray(((abs(E) + 9 * abs(E).multiply(at(first))) @ free).argmax(axis=1)).ravel()
     rows = at(first) - diags_array(1 / E.multiply(at(first)).sum(axis=1)) @ E
     model.supports.add_constraints(constraints_of(first, csr_array(rows)))
-
-
-class Springs(AttachedMatrix):
-    """Springs between nodes of a deck, by their matrix (3n, 3n)."""
-
-    what = "a spring of a deck"
-
-    def __init__(self, A: Csr) -> None:
-        self.A = A
-
-    def matrix(self, mesh: Mesh) -> Csr:
-        """Return the matrix (3n, 3n)."""
-        return self.A
-
-    def _weights(self, vectors: Array) -> Array:
-        raise NotImplementedError
-
-    def refined(self, finer: RefinedMesh, *points: object) -> AttachedMatrix:
-        """Raise ModelError."""
-        raise ModelError("springs and masses of a deck are of its nodes, and have none on a finer mesh")
-
-    def __repr__(self) -> str:
-        return f"{type(self).__name__} of {len(np.unique(self.A.nonzero()[0] // 3))} nodes"
-
-
-class Masses(Springs):
-    """Masses at nodes of a deck."""
-
-    what, is_mass = "a mass of a deck", True

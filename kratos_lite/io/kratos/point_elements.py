@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from kratos_lite.assembly.attached import Attached
-from kratos_lite.errors import Problems
+from kratos_lite.errors import InputError, Problems
 from kratos_lite.io.formats.document import Data, Document
 from kratos_lite.io.names import POINT_ELEMENT
 from kratos_lite.mesh import Block, ids_of, rows_of_ids
@@ -39,10 +39,19 @@ def set_apart(document: Document) -> Document:
         else:
             data.append(given)
     problems.raise_if_any()
+    from scipy.sparse import csr_array, diags_array  # a quick start without such elements
+
     solid = ~np.isin(mesh.element_ids, ids)
     row, solids = np.cumsum(solid) - 1, [b for b in mesh.blocks if b.name != POINT_ELEMENT]
     parts = {n: replace(p, elements=row[p.elements[solid[p.elements]]]) for n, p in mesh.parts.items()}
-    attached = [OnNodes(nodes, value, name == MASS) for name, value in values.items() if value.any()]
+    attached = []
+    for name, value in values.items():
+        if (value < 0).any():
+            raise InputError(f"{POINT_ELEMENT} has {name} ≥ 0; got {value.min():g}")
+        diagonal = np.zeros_like(mesh.points)
+        np.add.at(diagonal, nodes, value)
+        if value.any():
+            attached.append(OnNodes(nodes, csr_array(diags_array(diagonal.ravel())), name == MASS))
     made = mesh.replace(blocks=solids, parts=parts)
     return replace(document, mesh=made, element_data=data, attached=attached)
 
