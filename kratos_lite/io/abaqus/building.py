@@ -24,7 +24,7 @@ class Building:
 
     def __init__(self, deck: Deck) -> None:
         self.deck = deck
-        faces = [face for step in deck.steps for _, face in step.acting.faces]
+        faces = [face for step in deck.steps for face in step.acting.faces]
         self.mesh, self.number = with_faces(deck.mesh, faces, "SmallDisplacementSurfaceLoadCondition")
 
     def model(self, large: bool = False) -> Model:

@@ -18,7 +18,7 @@ from kratos_lite.errors import ModelError
 from kratos_lite.io.abaqus.cards import Card, Row
 from kratos_lite.io.abaqus.loads import LoadCards, with_faces
 from kratos_lite.io.abaqus.mesh import FINITE, Cells, MeshCards
-from kratos_lite.io.abaqus.supports import Axes, equations, node_rows
+from kratos_lite.io.abaqus.supports import Axes, node_rows
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.mesh.hanging import is_corner
 from kratos_lite.mesh.join import split
@@ -133,8 +133,21 @@ class Connections:
 
     def equation(self, card: Card, axes: Axes) -> None:
         """Read *EQUATION, along local axes."""
-        for nodes, directions, factors, _ in equations(card, self.cards, self.mesh):
-            w = factors[:, None] * axes.directions(self.mesh, nodes)[range(len(nodes)), directions]
+        card.check_options(())
+        rows = card.rows()
+        for row in rows:
+            count, values = row.integer(0), list[float]()
+            while len(values) < 3 * count:
+                line = next(rows, None) or row.wrong(f"an equation of {count} terms has {3 * count} values")
+                values += [line.number(i) for i in range(len(line.fields))]
+            table = np.array(values[: 3 * count]).reshape(-1, 3)
+            nodes, directions = self.mesh.node_rows(table[:, 0].astype(np.int64)), table[:, 1]
+            if (nodes < 0).any():
+                row.wrong(f"there is no node {table[nodes < 0, 0][0]:g}")
+            if not np.isin(directions, (1, 2, 3)).all():
+                row.wrong("an equation has directions 1, 2, 3 of solids alone")
+            along = axes.directions(self.mesh, nodes)[range(len(nodes)), directions.astype(int) - 1]
+            w = table[:, 2:] * along
             order = np.argsort(-np.abs(w[0]), kind="stable")  # the first has the largest weight of its node
             dofs = 3 * nodes[:, None] + np.arange(3)
             dofs[0], w[0] = dofs[0, order], w[0, order]
@@ -244,7 +257,7 @@ class Connections:
             if abs(A[:, np.flatnonzero(loose)]).sum() > 0:
                 card.wrong("a spring ends at a node of no element that nothing holds, or that is moved")
             K = K + k * (real @ A.T @ A @ real)
-        masses = diags_array(np.repeat(self.cards.masses_of(None), 3))
+        masses = diags_array(np.repeat(self.cards.masses_of(), 3))
         M = references.P.T @ masses @ references.P @ real
         for A, is_mass in ((K, False), (M, True)):
             if len(nodes := np.unique(A.diagonal().nonzero()[0] // 3)):

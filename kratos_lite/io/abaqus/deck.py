@@ -235,8 +235,6 @@ class Deck:
 
     def boundary(self, card: Card) -> None:
         """Read *BOUNDARY, of the model or of a step."""
-        if card.options.get("OP", "").upper() == "NEW":
-            self.held.clear()
         boundary(card, self.held, self.cards, self.mesh)
 
     # ---- steps ----------------------------------------------------------------------------------------
@@ -277,8 +275,7 @@ class Deck:
         """Read a card of loads."""
         if self._in_step(card).procedure is None:
             card.wrong("it belongs after the procedure of the step, such as *STATIC")
-        read = getattr(self.loads, card.keyword.lower())
-        read(card, self.acting, len(self.steps) + 1)
+        self.loads.read(card, self.acting, len(self.steps) + 1)
 
     def output(self, card: Card) -> None:
         """Read a card that asks for results."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -28,18 +28,18 @@ Face: TypeAlias = tuple[int, int]
 
 @dataclass(frozen=True)
 class Term:
-    """A distributed load: its numbers, its amplitude, and the step in which it was given."""
+    """A distributed load: its size, directions and places, its amplitude, and the step that gave it."""
 
     values: tuple[float, ...]
     amplitude: str
     step: int
 
-    def settled(self, factors: dict[str, float], count: int) -> Term:
-        """Return the load whose first numbers the end of its amplitude has multiplied."""
+    def settled(self, factors: dict[str, float]) -> Term:
+        """Return the load whose size the end of its amplitude has multiplied."""
         if self.amplitude not in factors:
             return self
-        factor = factors[self.amplitude]
-        return Term((*(factor * v for v in self.values[:count]), *self.values[count:]), "", self.step)
+        size, *places = self.values
+        return Term((factors[self.amplitude] * size, *places), "", self.step)
 
 
 @dataclass
@@ -49,7 +49,7 @@ class Acting:
     forces: Nodal
     temperatures: Nodal  # (n, 1)
     imaginary: Nodal  # forces that are a quarter of a period ahead, in *STEADY STATE DYNAMICS
-    faces: dict[tuple[str, Face], Term] = field(default_factory=dict)  # P: a pressure, T: a traction
+    faces: dict[Face, Term] = field(default_factory=dict)  # pressures
     bodies: dict[tuple[str, str, tuple[float, ...]], Term] = field(default_factory=dict)  # GRAV and CENTRIF
 
     @classmethod
@@ -71,10 +71,8 @@ class Acting:
         """Let amplitudes end at factors."""
         for some in self.nodal:
             some.settle(factors)
-        for key, term in self.faces.items():
-            self.faces[key] = term.settled(factors, len(term.values))
-        for body, term in self.bodies.items():  # a size, then directions and places
-            self.bodies[body] = term.settled(factors, 1)
+        self.faces = {key: term.settled(factors) for key, term in self.faces.items()}
+        self.bodies = {key: term.settled(factors) for key, term in self.bodies.items()}
 
     def names(self) -> set[str]:
         """Return the amplitudes of the loads."""
@@ -82,12 +80,12 @@ class Acting:
         terms = (term.amplitude for term in (*self.faces.values(), *self.bodies.values()))
         return set().union(*of_nodes, terms) - {""}
 
-    def put(self, key: tuple[str, Face], values: tuple[float, ...], amplitude: str, step: int) -> None:
-        """Add to a load on a face of the same step, or replace that of an earlier one."""
-        old = self.faces.get(key)
+    def press(self, face: Face, pressure: float, amplitude: str, step: int) -> None:
+        """Add to the pressure on a face of the same step, or replace that of an earlier one."""
+        old = self.faces.get(face)
         if old is not None and old.step == step:
-            values = tuple(a + b for a, b in zip(old.values, values, strict=True))
-        self.faces[key] = Term(values, amplitude, step)
+            pressure += old.values[0]
+        self.faces[face] = Term((pressure,), amplitude, step)
 
 
 class LoadCards:
@@ -100,63 +98,53 @@ class LoadCards:
             (at.start, at.stop, face_rows(block.known_shape)) for block, at in with_rows(mesh.blocks)
         ]
 
-    def cload(self, card: Card, acting: Acting, step: int) -> None:
-        """Read *CLOAD."""
-        card.check_options(("OP", "AMPLITUDE", "LOADCASE"))
+    def read(self, card: Card, acting: Acting, step: int) -> None:
+        """Read *CLOAD, *DLOAD, *DSLOAD or *TEMPERATURE; OP=NEW removes the loads of its kind."""
+        card.check_options(("OP", "AMPLITUDE", *["LOADCASE"] * (card.keyword == "CLOAD")))
         forces = acting.imaginary if card.options.get("LOADCASE") == "2" else acting.forces
-        if _op(card) == "NEW":
-            forces.clear()
-        name = card.options.get("AMPLITUDE", "").upper()
+        if (op := card.options.get("OP", "MOD").upper()) not in ("NEW", "MOD"):
+            card.wrong(f"OP is NEW or MOD; got {op}")
+        if op == "NEW":
+            kinds: dict[str, tuple[Any, ...]] = {"CLOAD": (forces,), "TEMPERATURE": (acting.temperatures,)}
+            kinds |= {"DLOAD": (acting.faces, acting.bodies), "DSLOAD": (acting.faces,)}
+            for loads in kinds[card.keyword]:
+                loads.clear()
         for row in card.rows():
-            axis = row.integer(1)
-            nodes = node_rows(row.text(0), row, self.cards, self.mesh)
-            if axis in (4, 5, 6):
-                nodes = rotation_rows(nodes, self.cards, self.mesh, row)
-            if axis not in range(1, 7) or not len(nodes):
-                row.wrong(f"a force on solids has direction 1, 2 or 3, on reference nodes 1 … 6; got {axis}")
-            forces.add(nodes, (axis - 1) % 3, row.number(2), name, step)
+            if card.keyword == "CLOAD":
+                self._force(row, forces, card.amplitude, step)
+            elif card.keyword == "TEMPERATURE":
+                nodes = node_rows(row.text(0), row, self.cards, self.mesh)
+                acting.temperatures.put(nodes, 0, row.number(1), card.amplitude)
+            else:
+                self._distributed(row, acting, card, step)
 
-    def dload(self, card: Card, acting: Acting, step: int) -> None:
-        """Read *DLOAD."""
-        card.check_options(("OP", "AMPLITUDE"))
-        if _op(card) == "NEW":
-            acting.faces.clear()
-            acting.bodies.clear()
-        name = card.options.get("AMPLITUDE", "").upper()
-        for row in card.rows():
-            kind = row.text(1).upper()
-            if kind in ("GRAV", "CENTRIF"):
-                at = row.text(0).upper()
-                if not at.isdigit():
-                    self.cards.elements_of(at, row)
-                values = tuple(row.numbers(4 if kind == "GRAV" else 7, 2))
-                acting.bodies[kind, at, values[1:]] = Term(values, name, step)
-                continue
-            face = face_number(kind, row, "P")
-            for key in self.faces(self.cards.elements_of(row.text(0), row), face, row):
-                acting.put(("P", key), (row.number(2),), name, step)
+    def _force(self, row: Row, forces: Nodal, amplitude: str, step: int) -> None:
+        """Read a row of *CLOAD."""
+        axis = row.integer(1)
+        nodes = node_rows(row.text(0), row, self.cards, self.mesh)
+        if axis in (4, 5, 6):
+            nodes = rotation_rows(nodes, self.cards, self.mesh, row)
+        if axis not in range(1, 7) or not len(nodes):
+            row.wrong(f"a force on solids has direction 1, 2 or 3, on reference nodes 1 … 6; got {axis}")
+        forces.add(nodes, (axis - 1) % 3, row.number(2), amplitude, step)
 
-    def dsload(self, card: Card, acting: Acting, step: int) -> None:
-        """Read *DSLOAD."""
-        card.check_options(("OP", "AMPLITUDE"))
-        if _op(card) == "NEW":
-            acting.faces.clear()
-        name = card.options.get("AMPLITUDE", "").upper()
-        for row in card.rows():
-            if row.text(1).upper() != "P":
+    def _distributed(self, row: Row, acting: Acting, card: Card, step: int) -> None:
+        """Read a row of *DLOAD or *DSLOAD."""
+        kind = row.text(1).upper()
+        if card.keyword == "DSLOAD":
+            if kind != "P":
                 row.wrong(f"a load on a surface is P, a pressure; got {row.text(1)}")
-            for key in self.surface(row.text(0), row):
-                acting.put(("P", key), (row.number(2),), name, step)
-
-    def temperature(self, card: Card, acting: Acting, step: int) -> None:
-        """Read *TEMPERATURE."""
-        card.check_options(("OP", "AMPLITUDE"))
-        if _op(card) == "NEW":
-            acting.temperatures.clear()
-        name = card.options.get("AMPLITUDE", "").upper()
-        for row in card.rows():
-            nodes = node_rows(row.text(0), row, self.cards, self.mesh)
-            acting.temperatures.put(nodes, 0, row.number(1), name)
+            faces = self.surface(row.text(0), row)
+        elif kind in ("GRAV", "CENTRIF"):
+            at = row.text(0).upper()
+            self.cards.elements_of(at, row)
+            values = tuple(row.numbers(4 if kind == "GRAV" else 7, 2))
+            acting.bodies[kind, at, values[1:]] = Term(values, card.amplitude, step)
+            return
+        else:
+            faces = self.faces(self.cards.elements_of(row.text(0), row), face_number(kind, row, "P"), row)
+        for face in faces:
+            acting.press(face, row.number(2), card.amplitude, step)
 
     def surface(self, name: str, at: Row | Card) -> list[Face]:
         """Return the faces of a surface."""
@@ -179,11 +167,6 @@ class LoadCards:
                 at.wrong(f"{text}; got number {face + 1}")
             found += [(row, ours[face]) for row in some]
         return found
-
-
-def _op(card: Card) -> str:
-    op = card.options.get("OP", "MOD").upper()
-    return op if op in ("NEW", "MOD") else card.wrong(f"OP is NEW or MOD; got {op}")
 
 
 def with_faces(mesh: Mesh, every: Iterable[Face], name: str) -> tuple[Mesh, dict[Face, int]]:
@@ -221,14 +204,15 @@ def loads_of(
         yield NodalForces(carried(values)), name
     for name in sorted({term.amplitude for term in acting.faces.values()}):
         pressure = np.zeros(len(number))
-        for (_, face), term in acting.faces.items():
+        for face, term in acting.faces.items():
             if term.amplitude == name:
                 pressure[number[face]] = term.values[0]
         none = {cell: np.zeros((n, 3)) for cell in ("point", "line", "triangle", "quadrilateral")}
         yield ConditionLoads(np.zeros((len(number), 3)), none, pressure, np.zeros(n)), name
     for (kind, at, _), term in acting.bodies.items():
-        where = rows_of_ids(mesh.element_ids, np.unique(cards.elements_in(at)))
-        where, masses = where[where >= 0], cards.masses_of(at)
+        ids = np.unique(cards.elements_of(at))
+        where, masses = rows_of_ids(mesh.element_ids, ids), cards.masses_of(ids)
+        where = where[where >= 0]
         if kind == "GRAV":
             size, *direction = term.values
             force = size * np.array(direction)

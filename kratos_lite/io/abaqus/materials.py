@@ -148,14 +148,10 @@ def _rubber(definition: Definition, density: float) -> Material:
     if kinds == ["OGDEN"] and order in ("1", "2", "3"):
         n = int(order)
         constants = definition.constants(card.keyword, 3 * n)
-        mu, alpha, D = (
-            np.array(constants[: 2 * n : 2]),
-            np.array(constants[1 : 2 * n : 2]),
-            constants[2 * n :],
-        )
+        mu, alpha = np.reshape(constants[: 2 * n], (n, 2)).T
         if not alpha.all():
             card.wrong("the exponents alpha of OGDEN are not 0")
-        bulk = _bulk(D, mu.sum())
+        bulk = _bulk(constants[2 * n :], mu.sum())
         terms = zip(("mu1", "mu2", "mu3"), (2 * mu / alpha).tolist(), strict=False)
         powers = zip(("alpha1", "alpha2", "alpha3"), alpha.tolist(), strict=False)
         volume = zip(("bulk", "bulk4", "bulk6"), (2 * bulk[0], *bulk[1:]), strict=False)

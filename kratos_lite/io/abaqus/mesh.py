@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from itertools import pairwise
 
 import numpy as np
 
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import InputError, nearest
 from kratos_lite.io.abaqus.cards import Card, Row
-from kratos_lite.mesh import Block, Mesh, Part, distinct, ids_of, rows_of_ids
+from kratos_lite.mesh import Block, Mesh, Part, distinct, ids_of, mask_of, rows_of_ids, select
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array, Ints
 
@@ -150,9 +149,10 @@ class MeshCards:
             new.faces = np.concatenate([new.faces, np.full(len(ids), face_number(row.text(1), row))])
         self.surfaces[card.option("NAME").upper()] = new
 
-    def members(self, name: str, sets: dict[str, list[Ints]], at: Row | Card, kind: str) -> Ints:
+    def members(self, name: str, sets: dict[str, list[Ints]], at: Row | Card | None, kind: str) -> Ints:
         """Return the ids in a set."""
         if (found := sets.get(name.upper())) is None:
+            assert at is not None
             at.wrong(f"there is no {kind} {name!r}.{nearest(name.upper(), sets)}")
         return np.concatenate([np.zeros(0, dtype=np.int64), *found])
 
@@ -160,8 +160,8 @@ class MeshCards:
         """Return the ids of nodes that a number or the name of a set means."""
         return np.array([int(word)]) if word.isdigit() else self.members(word, self.node_sets, at, "NSET")
 
-    def elements_of(self, word: str, at: Row | Card) -> Ints:
-        """Return the ids of elements that a number or the name of a set means."""
+    def elements_of(self, word: str, at: Row | Card | None = None) -> Ints:
+        """Return the ids of elements of a number or the name of a set; `at` may lack if it is known."""
         return np.array([int(word)]) if word.isdigit() else self.members(word, self.element_sets, at, "ELSET")
 
     def nodes_of_elements(self, members: Ints) -> Ints:
@@ -169,17 +169,12 @@ class MeshCards:
         found = [c.nodes[np.isin(c.ids, members)].ravel() for c in self.cells]
         return np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *found]))
 
-    def masses_of(self, name: str | None) -> Array:
-        """Return the masses (n,) in kg at nodes, of all elements or those of a set or number."""
+    def masses_of(self, elements: Ints | None = None) -> Array:
+        """Return the masses (n,) in kg at nodes, of all elements or of some ids."""
         masses = np.zeros(len(self.twin))
         for ids, nodes, mass in self.masses:
-            some = np.isin(ids, ids if name is None else self.elements_in(name))
-            np.add.at(masses, nodes[some], mass)
+            np.add.at(masses, nodes if elements is None else nodes[np.isin(ids, elements)], mass)
         return masses
-
-    def elements_in(self, name: str) -> Ints:
-        """Return the ids of elements that a number or the name of a set means, which is known."""
-        return np.array([int(name)]) if name.isdigit() else np.concatenate(self.element_sets[name])
 
     def reference(self, card: Card) -> None:
         """Note the reference node of *RIGID BODY or *COUPLING, and the node of its rotations, or 0."""
@@ -233,24 +228,11 @@ class MeshCards:
             elements = rows_of_ids(of_elements, distinct(cells))
             elements = elements[elements >= 0]  # springs and masses are no elements of the mesh
             if len(elements) and not len(rows):
-                used = np.zeros(len(ids), dtype=bool)
-                for block, at in _within(blocks, elements):
-                    used[block.nodes[at]] = True
-                rows = np.flatnonzero(used)
+                found = [block.nodes.ravel() for block in select(blocks, elements)]
+                rows = np.flatnonzero(mask_of(np.concatenate(found), len(ids)))
             if len(rows) or len(elements):
                 parts[name] = Part(nodes=rows, elements=elements)
         return parts
-
-
-def _within(blocks: list[Block], elements: Ints) -> list[tuple[Block, Ints]]:
-    """Return the blocks of elements, each with the rows in it."""
-    ends = np.cumsum([0, *map(len, blocks)])
-    order = np.sort(elements)
-    cuts = np.searchsorted(order, ends)
-    return [
-        (block, order[a:b] - start)
-        for block, (a, b), start in zip(blocks, pairwise(cuts), ends[:-1], strict=True)
-    ]
 
 
 def _last(ids: Ints) -> tuple[Ints, Ints]:

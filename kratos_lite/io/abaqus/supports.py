@@ -1,9 +1,8 @@
-"""Supports and equations of a deck, on its mesh."""
+"""Supports of a deck, on its mesh."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TypeAlias
 
 import numpy as np
 
@@ -60,10 +59,6 @@ class Nodal:
         self.given[rows, axis], self.amplitudes[rows, axis] = True, amplitude
 
 
-Equation: TypeAlias = tuple[Ints, Ints, Array, str]
-"""Rows of nodes, directions from 0, coefficients, and its place."""
-
-
 @dataclass
 class Axes:
     """Local axes of nodes (*TRANSFORM)."""
@@ -109,6 +104,8 @@ def rotation_rows(rows: Ints, cards: MeshCards, mesh: Mesh, row: Row) -> Ints:
 def boundary(card: Card, held: Nodal, cards: MeshCards, mesh: Mesh) -> None:
     """Read *BOUNDARY."""
     card.check_options(("OP", "AMPLITUDE", "FIXED"))
+    if card.options.get("OP", "").upper() == "NEW":
+        held.clear()
     if "FIXED" in card.options:
         card.wrong("option FIXED is not supported; give the value")
     for row in card.rows():
@@ -121,35 +118,11 @@ def boundary(card: Card, held: Nodal, cards: MeshCards, mesh: Mesh) -> None:
             row.wrong(f"directions {first} to {last}: give the first and the last of 1, 2, 3")
         if first == 11:
             row.wrong("temperatures are given by *TEMPERATURE; degree of freedom 11 is not supported")
-        value, name = row.number(3, 0.0), card.options.get("AMPLITUDE", "").upper()
-        held.put(rows, slice(first - 1, min(last, 3)), value, name)
+        value = row.number(3, 0.0)
+        held.put(rows, slice(first - 1, min(last, 3)), value, card.amplitude)
         if last > 3:  # rotations, which solids do not have
             turned = rotation_rows(rows, cards, mesh, row)
-            held.put(turned, slice(max(first, 4) - 4, min(last, 6) - 3), value, name)
-
-
-def equations(card: Card, cards: MeshCards, mesh: Mesh) -> list[Equation]:
-    """Return the equations of *EQUATION: nodes, directions from 0, coefficients, place."""
-    card.check_options(())
-    found, rows = list[Equation](), card.rows()
-    for row in rows:
-        count, values = row.integer(0), list[float]()
-        while len(values) < 3 * count:
-            line = next(rows, None) or row.wrong(f"an equation of {count} terms has {3 * count} values")
-            values += [line.number(i) for i in range(len(line.fields))]
-        table = np.array(values[: 3 * count]).reshape(-1, 3)
-        nodes = mesh.node_rows(table[:, 0].astype(np.int64))
-        if (nodes < 0).any():
-            row.wrong(f"there is no node {table[nodes < 0, 0][0]:g}")
-        if not np.isin(table[:, 1], (1, 2, 3)).all():
-            row.wrong("an equation has directions 1, 2, 3 of solids alone")
-        found.append((nodes, table[:, 1].astype(int) - 1, table[:, 2], row.place))
-    return found
-
-
-def scaled(series: TimeSeries, factor: float) -> TimeSeries:
-    """Return a series times a factor."""
-    return TimeSeries(series.times, factor * series.values)
+            held.put(turned, slice(max(first, 4) - 4, min(last, 6) - 3), value, card.amplitude)
 
 
 def apply(model: Model, held: Nodal, axes: Axes, series: dict[str, TimeSeries]) -> None:
@@ -167,5 +140,7 @@ def apply(model: Model, held: Nodal, axes: Axes, series: dict[str, TimeSeries]) 
                 if not name:
                     model.fix(some, letter, values[:, None], local=frame)
                     continue
+                times, factors = series[name].times, series[name].values
                 for value in np.unique(values).tolist():
-                    model.fix(some[values == value], letter, scaled(series[name], value), local=frame)
+                    moved = TimeSeries(times, value * factors)
+                    model.fix(some[values == value], letter, moved, local=frame)
