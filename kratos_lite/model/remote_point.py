@@ -14,6 +14,7 @@ from kratos_lite.mesh import Mesh, Where
 from kratos_lite.model.supports import AXES, Supports, axis_numbers
 from kratos_lite.model.ties import Coupling
 from kratos_lite.solvers.constraints import Constraints, independent_rows, rigid_modes
+from kratos_lite.solvers.elimination import ROUNDING
 from kratos_lite.typing import Array, ArrayLike, Ints, Mask
 from kratos_lite.validation import finite, short
 
@@ -23,8 +24,6 @@ if TYPE_CHECKING:
 
 MOST = 1000
 """Nodes of a part whose mean motion is prescribed or has springs: all of them then meet in matrices."""
-ROUNDING = 1e-13
-"""Fraction of the largest weight that is 0."""
 
 
 class RemotePoint(Coupling):

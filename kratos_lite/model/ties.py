@@ -14,6 +14,7 @@ from kratos_lite.errors import ModelError
 from kratos_lite.mesh import Block, Mesh, Where
 from kratos_lite.model.mortar import NEAR, Cells, Mortar, mortar
 from kratos_lite.solvers.constraints import Constraints
+from kratos_lite.solvers.elimination import rounded
 from kratos_lite.tabular import in_units
 from kratos_lite.typing import Array, Csr, Ints, Mask
 from kratos_lite.validation import number
@@ -118,16 +119,7 @@ class Tie(PartTie):
         rest = R @ S - diags_array(D[free]) @ own @ S @ own.T @ own
         on_all = csr_array((np.ones(len(dofs)), (np.arange(len(dofs)), dofs)), shape=(len(dofs), size))
         rows = T[free][:, free] @ diags_array(1 / D[free]) @ (R @ self.W - rest @ on_all)
-        return constraints_of(dofs[free], csr_array(rows))
-
-
-def constraints_of(dependents: Ints, rows: Any) -> Constraints:
-    """Return u[dependents] = rows u."""
-    rows.data[np.abs(rows.data) < 1e-14] = 0.0
-    rows.eliminate_zeros()
-    rows.sort_indices()
-    start, others = rows.indptr.astype(np.int64), rows.indices.astype(np.int64)
-    return Constraints(dependents, start, others, rows.data, np.zeros(len(dependents)))
+        return Constraints.of_rows(dofs[free], rounded(csr_array(rows)), np.zeros(len(free)))
 
 
 def _checked(tie: Tie) -> Mortar:

@@ -37,6 +37,13 @@ class Constraints:
         return cls(dependents, start, independents.ravel(), weights.ravel(), constants)
 
     @classmethod
+    def of_rows(cls, dependents: Ints, W: Any, constants: Array) -> Constraints:
+        """Return u[dependents] = W u + constants, by a sparse W (c, n)."""
+        W.sort_indices()
+        start, independents = W.indptr.astype(np.int64), W.indices.astype(np.int64)
+        return cls(dependents, start, independents, W.data, constants)
+
+    @classmethod
     def none(cls) -> Constraints:
         """Return no constraints."""
         empty = np.zeros(0, dtype=np.int64)

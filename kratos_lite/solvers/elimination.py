@@ -42,7 +42,7 @@ def eliminate(constraints: Constraints, fixed: Mask, values: Array) -> Constrain
     W, constants = _followed(W, constants, constraints.dependents)
     W = W @ diags_array(1.0 * ~is_fixed)
     W.eliminate_zeros()
-    return _as_constraints(constraints.dependents, W, constants)
+    return Constraints.of_rows(constraints.dependents, W, constants)
 
 
 def _followed(W: Any, constants: Array, dependents: Ints) -> tuple[Any, Array]:
@@ -66,12 +66,6 @@ def _weights(constraints: Constraints, size: int) -> Any:
 
     entries = constraints.weights, constraints.independents, constraints.start
     return csr_array(entries, shape=(len(constraints), size))
-
-
-def _as_constraints(dependents: Ints, W: Any, constants: Array) -> Constraints:
-    W.sort_indices()
-    start, dofs = W.indptr.astype(np.int64), W.indices.astype(np.int64)
-    return Constraints(dependents, start, dofs, W.data, constants)
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,18 +186,18 @@ def _solved(constraints: Constraints, dofs: Ints, free: Mask) -> tuple[Constrain
         redundant.append(rows[weight == 0])
         one = csr_array((np.ones(len(p)), (np.arange(len(p)), p)), shape=(len(p), n + 1))
         pivots.append(p)
-        found.append(_rounded(diags_array(-1 / weight[first]) @ A[first] + one))
+        found.append(rounded(diags_array(-1 / weight[first]) @ A[first] + one))
         others = np.ones(n + 1)
         others[p] = 0.0
         K, W = A[rest][:, p], _followed(found[-1], np.zeros(len(p)), p)[0]
         before, along = A[rest] @ diags_array(others), K @ W
-        A, rows = _rounded(csr_array(before + along)), rows[rest]
+        A, rows = rounded(csr_array(before + along)), rows[rest]
         # What cancels out of a row says how small the rest of it may be.
         gone = (abs(before) + abs(K) @ abs(W) - abs(A))[:, columns]
         lost = np.maximum(lost[rest], gone.max(axis=1).toarray()) if len(rows) else lost[rest]
     dependents = np.concatenate(pivots)
-    W = _rounded(_followed(csr_array(vstack(found)), np.zeros(len(dependents)), dependents)[0])
-    solved = _as_constraints(dependents, W[:, :n], W[:, [n]].toarray().ravel())
+    W = rounded(_followed(csr_array(vstack(found)), np.zeros(len(dependents)), dependents)[0])
+    solved = Constraints.of_rows(dependents, W[:, :n], W[:, [n]].toarray().ravel())
     solved = replace(solved, dependents=dofs[dependents], independents=dofs[solved.independents])
     return solved, Redundant(constraints, dofs, free, np.concatenate(redundant), csr_array(vstack(left)))
 
@@ -228,8 +222,8 @@ def _pivots(A: Any, free: Mask, stated: Ints, chance: Array, rest: Array) -> tup
     return pivot, weight, (weight != 0) & (place == earliest[pivot])
 
 
-def _rounded(A: Any) -> Any:
-    """Return rows without weights that are 0 but for rounding."""
+def rounded(A: Any) -> Any:
+    """Return sparse rows without weights that are 0 but for rounding."""
     A.data[np.abs(A.data) < ROUNDING] = 0.0
     A.eliminate_zeros()
     return A

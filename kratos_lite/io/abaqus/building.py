@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import numpy as np
 
 from kratos_lite.analysis.model import Model
-from kratos_lite.errors import InputError
+from kratos_lite.errors import InputError, ModelError
 from kratos_lite.io.abaqus.deck import Deck, Step
-from kratos_lite.io.abaqus.loads import Acting, loads_of, with_faces
+from kratos_lite.io.abaqus.loads import Acting, with_faces
 from kratos_lite.io.abaqus.materials import OURS, material_of
 from kratos_lite.io.abaqus.mesh import ELEMENT_TYPES, FINITE
-from kratos_lite.io.abaqus.supports import Nodal, apply
+from kratos_lite.io.abaqus.supports import Nodal
 from kratos_lite.mesh import Mesh, rows_of_ids, with_rows
 from kratos_lite.model.loads.base import Load
+from kratos_lite.model.loads.body import Gravity
+from kratos_lite.model.loads.nodal import NodalForces
+from kratos_lite.model.loads.surface import ConditionLoads
+from kratos_lite.model.loads.temperature import Temperature
 from kratos_lite.time_series import TimeSeries
+from kratos_lite.typing import Array
 
 
 class Building:
@@ -58,13 +63,62 @@ class Building:
         return model
 
     def hold(self, model: Model, held: Nodal, series: dict[str, TimeSeries] | None = None) -> None:
-        """Add supports and connections to a model."""
-        apply(model, held, self.deck.axes, series or {})
+        """Add supports and connections to a model; nodes that share axis, amplitude and axes are one call."""
+        axes, series = self.deck.axes, series or {}
+        local = axes.of_node
+        for system in np.unique(local[held.given.any(axis=1)]).tolist():
+            of = held.given & (local == system)[:, None]
+            frame = axes.each[system] if system >= 0 else None
+            for axis in range(3):
+                rows = np.flatnonzero(of[:, axis])
+                for name in sorted(set(held.amplitudes[rows, axis])):
+                    some = rows[held.amplitudes[rows, axis] == name]
+                    values = held.values[some, axis]
+                    letter = "xyz"[axis] if frame is None else frame.letters[axis]
+                    if not name:
+                        model.fix(some, letter, values[:, None], local=frame)
+                        continue
+                    times, factors = series[name].times, series[name].values
+                    for value in np.unique(values).tolist():
+                        moved = TimeSeries(times, value * factors)
+                        model.fix(some[values == value], letter, moved, local=frame)
         self.deck.connections.connect(model)
 
     def loads(self, model: Model, acting: Acting) -> Iterable[tuple[Load, str]]:
         """Yield the loads that act, each with the name of its amplitude."""
-        return loads_of(model, acting, self.number, self.deck.axes, self.deck.initial, self.deck.cards)
+        deck = self.deck
+        mesh, n = model.mesh, model.mesh.n_nodes
+        F, carried = acting.forces, np.asarray if model.references is None else model.references.carried
+        for name in sorted(set(F.amplitudes[F.given])):
+            values = np.where(F.given & (F.amplitudes == name), F.values, 0.0)
+            turned = np.flatnonzero(values.any(axis=1) & (deck.axes.of_node >= 0))
+            values[turned] = np.einsum("ni,nij->nj", values[turned], deck.axes.directions(mesh, turned))
+            yield NodalForces(carried(values)), name
+        for name in sorted({term.amplitude for term in acting.faces.values()}):
+            pressure = np.zeros(len(self.number))
+            for face, term in acting.faces.items():
+                if term.amplitude == name:
+                    pressure[self.number[face]] = term.values[0]
+            none = {cell: np.zeros((n, 3)) for cell in ("point", "line", "triangle", "quadrilateral")}
+            yield ConditionLoads(np.zeros((len(self.number), 3)), none, pressure, np.zeros(n)), name
+        for (kind, at, _), term in acting.bodies.items():
+            ids = np.unique(deck.cards.elements_of(at))
+            where, masses = rows_of_ids(mesh.element_ids, ids), deck.cards.masses_of(ids)
+            where = where[where >= 0]
+            if kind == "GRAV":
+                size, *direction = term.values
+                force = size * np.array(direction)
+                if masses.any():
+                    yield NodalForces(carried(masses[:, None] * force)), term.amplitude
+                yield Gravity(force, where), term.amplitude
+            elif masses.any():
+                raise ModelError("*DLOAD: CENTRIF on masses is not supported; give their force by *CLOAD")
+            else:
+                yield Gravity(_centrifugal(term.values), where), term.amplitude
+        T = acting.temperatures
+        for name in sorted(set(T.amplitudes[T.given])):
+            of = T.given[:, 0] & (T.amplitudes[:, 0] == name)
+            yield Temperature(np.where(of, T.values[:, 0] - deck.initial, 0.0)[deck.cards.twin]), name
 
     def is_nonlinear(self, step: Step) -> bool:
         """Return whether a step has large displacements or laws that are not linear."""
@@ -109,3 +163,15 @@ class Building:
             if np.abs(table[:, 2:] - table[first[each], 2:]).max() > 0:
                 card.wrong("a stress that differs between the points of an element is not supported")
             model.add_prestress(table[first, 2:][:, OURS], some)
+
+
+def _centrifugal(values: tuple[float, ...]) -> Callable[[Array], Array]:
+    """Return ω² times the distance from an axis, of places."""
+    square, center, axis = values[0], np.array(values[1:4]), np.array(values[4:7])
+    axis /= np.linalg.norm(axis)
+
+    def acceleration(X: Array) -> Array:
+        arm = X - center
+        return np.asarray(square * (arm - (arm @ axis)[:, None] * axis))
+
+    return acceleration

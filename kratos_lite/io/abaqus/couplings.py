@@ -24,8 +24,8 @@ from kratos_lite.mesh.hanging import is_corner
 from kratos_lite.mesh.join import split
 from kratos_lite.model.attachments import OnNodes
 from kratos_lite.model.loads.surface import Pressure, Traction
-from kratos_lite.model.ties import constraints_of
-from kratos_lite.solvers.constraints import independent_rows, rigid_modes
+from kratos_lite.solvers.constraints import Constraints, independent_rows, rigid_modes
+from kratos_lite.solvers.elimination import rounded
 from kratos_lite.typing import Array, Csr, Ints, Mask
 
 HELD, CORNER, MIDDLE = 1.0, 0.3, 0.1
@@ -42,6 +42,7 @@ class Connections:
         self.springs = list[tuple[Card, Ints, Array, float]]()  # dofs (m, k), directions (m, k), N/m
         self.turning = list[tuple[Ints, Card]]()  # rotations (3,) of rigid parts
         cards.twin = np.arange(mesh.n_nodes)
+        self.axes: Axes  # of nodes
         self._coupling: tuple[int, Card] | None = None
         for card in cuts:
             self._cut(card)
@@ -131,7 +132,7 @@ class Connections:
         for cells in self._others(card, ("MASS",)):
             self.cards.masses.append((cells.ids, self.mesh.node_rows(cells.nodes[:, 0]), line.number(0)))
 
-    def equation(self, card: Card, axes: Axes) -> None:
+    def equation(self, card: Card) -> None:
         """Read *EQUATION, along local axes."""
         card.check_options(())
         rows = card.rows()
@@ -146,7 +147,7 @@ class Connections:
                 row.wrong(f"there is no node {table[nodes < 0, 0][0]:g}")
             if not np.isin(directions, (1, 2, 3)).all():
                 row.wrong("an equation has directions 1, 2, 3 of solids alone")
-            along = axes.directions(self.mesh, nodes)[range(len(nodes)), directions.astype(int) - 1]
+            along = self.axes.directions(self.mesh, nodes)[range(len(nodes)), directions.astype(int) - 1]
             w = table[:, 2:] * along
             order = np.argsort(-np.abs(w[0]), kind="stable")  # the first has the largest weight of its node
             dofs = 3 * nodes[:, None] + np.arange(3)
@@ -340,4 +341,4 @@ def _depend(model: Model, E: Csr, first: Ints) -> None:
     free = diags_array(np.where(model.supports.fixed.ravel(), 1e-3, 1.0))
     first = np.asarray(((abs(E) + 9 * abs(E).multiply(at(first))) @ free).argmax(axis=1)).ravel()
     rows = at(first) - diags_array(1 / E.multiply(at(first)).sum(axis=1)) @ E
-    model.supports.add_constraints(constraints_of(first, csr_array(rows)))
+    model.supports.add_constraints(Constraints.of_rows(first, rounded(csr_array(rows)), np.zeros(len(first))))

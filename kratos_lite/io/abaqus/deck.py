@@ -12,7 +12,7 @@ from kratos_lite.errors import InputError, naming, nearest
 from kratos_lite.io.abaqus.cards import Card, read_cards
 from kratos_lite.io.abaqus.couplings import Connections
 from kratos_lite.io.abaqus.loads import Acting, LoadCards
-from kratos_lite.io.abaqus.materials import Definition, orientation
+from kratos_lite.io.abaqus.materials import Definition, axes_of, orientation
 from kratos_lite.io.abaqus.mesh import MeshCards
 from kratos_lite.io.abaqus.supports import Axes, Nodal, boundary, node_rows
 from kratos_lite.model.local_axes import LocalAxes
@@ -130,7 +130,7 @@ class Deck:
         self.start = dict[str, Array]()  # DISPLACEMENT and VELOCITY (n, 3) at the beginning
         self.stresses = list[Card]()  # at the beginning
         self.held, self.acting = Nodal.none(n), Acting.none(n)
-        self.axes = Axes(of_node=np.full(n, -1))
+        self.axes = self.connections.axes = Axes(np.full(n, -1))
         self.initial = np.zeros(n)  # temperatures
         self.loads = LoadCards(self.cards, mesh)
         self.steps = list[Step]()
@@ -205,7 +205,11 @@ class Deck:
 
     def transform(self, card: Card) -> None:
         """Read *TRANSFORM."""
-        self.axes.transform(card, self.cards, self.mesh)
+        card.check_options(("NSET", "TYPE"))
+        rows = node_rows(card.option("NSET"), card, self.cards, self.mesh)
+        line = next(card.rows(), None) or card.wrong("two points are needed on its data line")
+        self.axes.each.append(axes_of(line, card.option("TYPE", "R")))
+        self.axes.of_node[rows] = len(self.axes.each) - 1
 
     def initial_conditions(self, card: Card) -> None:
         """Read *INITIAL CONDITIONS."""
@@ -224,10 +228,6 @@ class Deck:
                 field[node_rows(row.text(0), row, self.cards, mesh), axis - 1] = row.number(2)
         else:
             card.wrong(f"TYPE={kind} is not supported; TEMPERATURE, STRESS, DISPLACEMENT and VELOCITY are")
-
-    def equation(self, card: Card) -> None:
-        """Read *EQUATION."""
-        self.connections.equation(card, self.axes)
 
     def connection(self, card: Card) -> None:
         """Read a card that connects nodes."""
@@ -309,12 +309,12 @@ class Deck:
 CARDS: dict[str, Callable[[Deck, Card], None]] = {
     "MATERIAL": Deck.material, "SOLIDSECTION": Deck.section, "ORIENTATION": Deck.orientation,
     "AMPLITUDE": Deck.amplitude, "TRANSFORM": Deck.transform, "INITIALCONDITIONS": Deck.initial_conditions,
-    "MODALDAMPING": Deck.modal_damping, "EQUATION": Deck.equation, "BOUNDARY": Deck.boundary,
+    "MODALDAMPING": Deck.modal_damping, "BOUNDARY": Deck.boundary,
     "STEP": Deck.step, "ENDSTEP": Deck.end_step,
     **dict.fromkeys(PROCEDURES, Deck.procedure),
     "PRE-TENSIONSECTION": lambda deck, card: None,  # read with the mesh
     **dict.fromkeys("RIGIDBODY COUPLING KINEMATIC DISTRIBUTING".split(), Deck.connection),
-    **dict.fromkeys("DISTRIBUTINGCOUPLING TIE SPRING MASS".split(), Deck.connection),
+    **dict.fromkeys("DISTRIBUTINGCOUPLING TIE SPRING MASS EQUATION".split(), Deck.connection),
     **dict.fromkeys(("CLOAD", "DLOAD", "DSLOAD", "TEMPERATURE"), Deck.load),
     **dict.fromkeys(("NODEFILE", "ELFILE", "NODEPRINT", "ELPRINT", "SECTIONPRINT", "FACEPRINT"), Deck.output),
 }  # fmt: skip

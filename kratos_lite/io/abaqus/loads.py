@@ -1,26 +1,19 @@
-"""Loads of a deck: what acts at the end of a step, and the loads of a model that these are."""
+"""Loads of a deck: the cards of loads, and what acts at the end of a step."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 import numpy as np
 
-from kratos_lite.analysis.model import Model
-from kratos_lite.errors import ModelError
 from kratos_lite.io.abaqus.cards import Card, Row
 from kratos_lite.io.abaqus.mesh import MeshCards, face_number, face_rows
-from kratos_lite.io.abaqus.supports import Axes, Nodal, node_rows, rotation_rows
+from kratos_lite.io.abaqus.supports import Nodal, node_rows, rotation_rows
 from kratos_lite.mesh import Block, Mesh, rows_of_ids, with_rows
-from kratos_lite.model.loads.base import Load
-from kratos_lite.model.loads.body import Gravity
-from kratos_lite.model.loads.nodal import NodalForces
-from kratos_lite.model.loads.surface import ConditionLoads
-from kratos_lite.model.loads.temperature import Temperature
 from kratos_lite.shapes.faces import FACE_SHAPES
-from kratos_lite.typing import Array, Ints
+from kratos_lite.typing import Ints
 
 Face: TypeAlias = tuple[int, int]
 """Row of an element, and the number of a face in it, from 0."""
@@ -184,58 +177,3 @@ def with_faces(mesh: Mesh, every: Iterable[Face], name: str) -> tuple[Mesh, dict
         nodes = np.array([n for _, n in found])
         conditions.append(Block(f"{name}3D{nodes.shape[1]}N", nodes, ids, shape=shape))
     return mesh.replace(conditions=conditions) if conditions else mesh, number
-
-
-def loads_of(
-    model: Model,
-    acting: Acting,
-    number: dict[Face, int],
-    axes: Axes,
-    initial: Array,
-    cards: MeshCards,
-) -> Iterable[tuple[Load, str]]:
-    """Yield the loads of a model, each with the name of its amplitude."""
-    mesh, n = model.mesh, model.mesh.n_nodes
-    F, carried = acting.forces, np.asarray if model.references is None else model.references.carried
-    for name in sorted(set(F.amplitudes[F.given])):
-        values = np.where(F.given & (F.amplitudes == name), F.values, 0.0)
-        turned = np.flatnonzero(values.any(axis=1) & (axes.of_node >= 0))
-        values[turned] = np.einsum("ni,nij->nj", values[turned], axes.directions(mesh, turned))
-        yield NodalForces(carried(values)), name
-    for name in sorted({term.amplitude for term in acting.faces.values()}):
-        pressure = np.zeros(len(number))
-        for face, term in acting.faces.items():
-            if term.amplitude == name:
-                pressure[number[face]] = term.values[0]
-        none = {cell: np.zeros((n, 3)) for cell in ("point", "line", "triangle", "quadrilateral")}
-        yield ConditionLoads(np.zeros((len(number), 3)), none, pressure, np.zeros(n)), name
-    for (kind, at, _), term in acting.bodies.items():
-        ids = np.unique(cards.elements_of(at))
-        where, masses = rows_of_ids(mesh.element_ids, ids), cards.masses_of(ids)
-        where = where[where >= 0]
-        if kind == "GRAV":
-            size, *direction = term.values
-            force = size * np.array(direction)
-            if masses.any():
-                yield NodalForces(carried(masses[:, None] * force)), term.amplitude
-            yield Gravity(force, where), term.amplitude
-        elif masses.any():
-            raise ModelError("*DLOAD: CENTRIF on masses is not supported; give their force by *CLOAD")
-        else:
-            yield Gravity(_centrifugal(term.values), where), term.amplitude
-    T = acting.temperatures
-    for name in sorted(set(T.amplitudes[T.given])):
-        of = T.given[:, 0] & (T.amplitudes[:, 0] == name)
-        yield Temperature(np.where(of, T.values[:, 0] - initial, 0.0)[cards.twin]), name
-
-
-def _centrifugal(values: tuple[float, ...]) -> Callable[[Array], Array]:
-    """Return ω² times the distance from an axis, of places."""
-    square, center, axis = values[0], np.array(values[1:4]), np.array(values[4:7])
-    axis /= np.linalg.norm(axis)
-
-    def acceleration(X: Array) -> Array:
-        arm = X - center
-        return np.asarray(square * (arm - (arm @ axis)[:, None] * axis))
-
-    return acceleration

@@ -6,13 +6,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from kratos_lite.analysis.model import Model
 from kratos_lite.io.abaqus.cards import Card, Row
-from kratos_lite.io.abaqus.materials import axes_of
 from kratos_lite.io.abaqus.mesh import MeshCards
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.local_axes import LocalAxes
-from kratos_lite.time_series import TimeSeries
 from kratos_lite.typing import Array, Ints, Mask
 
 
@@ -63,16 +60,8 @@ class Nodal:
 class Axes:
     """Local axes of nodes (*TRANSFORM)."""
 
+    of_node: Ints  # index of `each`, or -1
     each: list[LocalAxes] = field(default_factory=list)
-    of_node: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))  # index of `each`, or -1
-
-    def transform(self, card: Card, cards: MeshCards, mesh: Mesh) -> None:
-        """Read *TRANSFORM."""
-        card.check_options(("NSET", "TYPE"))
-        rows = node_rows(card.option("NSET"), card, cards, mesh)
-        line = next(card.rows(), None) or card.wrong("two points are needed on its data line")
-        self.each.append(axes_of(line, card.option("TYPE", "R")))
-        self.of_node[rows] = len(self.each) - 1
 
     def directions(self, mesh: Mesh, rows: Ints) -> Array:
         """Return the axes (m, 3, 3) of nodes."""
@@ -123,24 +112,3 @@ def boundary(card: Card, held: Nodal, cards: MeshCards, mesh: Mesh) -> None:
         if last > 3:  # rotations, which solids do not have
             turned = rotation_rows(rows, cards, mesh, row)
             held.put(turned, slice(max(first, 4) - 4, min(last, 6) - 3), value, card.amplitude)
-
-
-def apply(model: Model, held: Nodal, axes: Axes, series: dict[str, TimeSeries]) -> None:
-    """Support a model; nodes that share axis, amplitude and local axes are one call."""
-    local = axes.of_node
-    for system in np.unique(local[held.given.any(axis=1)]).tolist():
-        of = held.given & (local == system)[:, None]
-        frame = axes.each[system] if system >= 0 else None
-        for axis in range(3):
-            rows = np.flatnonzero(of[:, axis])
-            for name in sorted(set(held.amplitudes[rows, axis])):
-                some = rows[held.amplitudes[rows, axis] == name]
-                values = held.values[some, axis]
-                letter = "xyz"[axis] if frame is None else frame.letters[axis]
-                if not name:
-                    model.fix(some, letter, values[:, None], local=frame)
-                    continue
-                times, factors = series[name].times, series[name].values
-                for value in np.unique(values).tolist():
-                    moved = TimeSeries(times, value * factors)
-                    model.fix(some[values == value], letter, moved, local=frame)
