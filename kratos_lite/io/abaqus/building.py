@@ -14,7 +14,7 @@ from kratos_lite.io.abaqus.loads import Acting, with_faces
 from kratos_lite.io.abaqus.materials import OURS, material_of
 from kratos_lite.io.abaqus.mesh import ELEMENT_TYPES, FINITE
 from kratos_lite.io.abaqus.supports import Nodal
-from kratos_lite.mesh import Mesh, rows_of_ids, with_rows
+from kratos_lite.mesh import NO_ROWS, Mesh, rows_of_ids, with_rows
 from kratos_lite.model.loads.base import Load
 from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.loads.nodal import NodalForces
@@ -50,7 +50,7 @@ class Building:
             if large and (plastic := deck.materials[name].cards.get("PLASTIC")):
                 plastic.wrong("plastic flow at large strains is not supported; leave NLGEOM out")
             deck.cards.elements_of(elset, card)
-            rows = mesh.parts[elset].elements if elset in mesh.parts else np.zeros(0, dtype=np.int64)
+            rows = mesh.parts[elset].elements if elset in mesh.parts else NO_ROWS
             material = material_of(deck.materials[name], deck.orientations.get(axes), finite=large)
             model.assign(material, rows)
             assigned[rows] = True
@@ -143,12 +143,11 @@ class Building:
 
     def _finite(self) -> Mesh:
         """Return the mesh with elements and loads of large displacements."""
-        names = {ELEMENT_TYPES[kind]: name for kind, name in FINITE.items()}
         kinds = {name: kind for kind, name in ELEMENT_TYPES.items()}
         for block in self.mesh.blocks:
-            if block.name not in names:
+            if block.name not in FINITE:
                 raise InputError(f"{self.deck.path}: NLGEOM with {kinds[block.name]} is not supported")
-        blocks = [replace(b, name=names[b.name]) for b in self.mesh.blocks]
+        blocks = [replace(b, name=FINITE[b.name]) for b in self.mesh.blocks]
         faces = [replace(b, name=b.name.removeprefix("SmallDisplacement")) for b in self.mesh.conditions]
         return self.mesh.replace(blocks=blocks, conditions=faces)
 

@@ -9,7 +9,7 @@ import numpy as np
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import InputError, nearest
 from kratos_lite.io.abaqus.cards import Card, Row
-from kratos_lite.mesh import Block, Mesh, Part, distinct, ids_of, mask_of, rows_of_ids, select
+from kratos_lite.mesh import NO_ROWS, Block, Mesh, Part, distinct, ids_of, mask_of, rows_of_ids, select
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array, Ints
 
@@ -20,9 +20,11 @@ ELEMENT_TYPES = {
 }  # fmt: skip
 """Our element of each solid of CalculiX."""
 FINITE = {
-    kind: f"TotalLagrangianElement3D{kind[3:].rstrip('R')}N" for kind in ELEMENT_TYPES if kind != "C3D8I"
+    name: f"TotalLagrangianElement3D{kind[3:].rstrip('R')}N"
+    for kind, name in ELEMENT_TYPES.items()
+    if kind != "C3D8I"
 }
-"""Our element of each where displacements are large (NLGEOM)."""
+"""The element of each of these where displacements are large (NLGEOM)."""
 FACES = {
     "tetrahedron": ((0, 1, 2), (0, 1, 3), (1, 2, 3), (0, 2, 3)),
     "wedge": ((0, 1, 2), (3, 4, 5), (0, 1, 3, 4), (1, 2, 4, 5), (0, 2, 3, 5)),
@@ -47,8 +49,8 @@ class Cells:
 class Surface:
     """A surface: faces of elements, or nodes."""
 
-    elements: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))  # ids
-    faces: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))  # from 0
+    elements: Ints = field(default_factory=NO_ROWS.copy)  # ids
+    faces: Ints = field(default_factory=NO_ROWS.copy)  # from 0
     nodes: Ints | None = None  # ids
 
 
@@ -154,7 +156,7 @@ class MeshCards:
         if (found := sets.get(name.upper())) is None:
             assert at is not None
             at.wrong(f"there is no {kind} {name!r}.{nearest(name.upper(), sets)}")
-        return np.concatenate([np.zeros(0, dtype=np.int64), *found])
+        return np.concatenate([NO_ROWS, *found])
 
     def nodes_of(self, word: str, at: Row | Card) -> Ints:
         """Return the ids of nodes that a number or the name of a set means."""
@@ -167,7 +169,7 @@ class MeshCards:
     def nodes_of_elements(self, members: Ints) -> Ints:
         """Return the ids of the nodes of solids."""
         found = [c.nodes[np.isin(c.ids, members)].ravel() for c in self.cells]
-        return np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *found]))
+        return np.unique(np.concatenate([NO_ROWS, *found]))
 
     def masses_of(self, elements: Ints | None = None) -> Array:
         """Return the masses (n,) in kg at nodes, of all elements or of some ids."""
@@ -222,8 +224,8 @@ class MeshCards:
         """Return the sets as parts; one of nodes and one of elements of the same name are one part."""
         parts, of_elements = {}, ids_of(blocks)
         for name in dict.fromkeys([*self.node_sets, *self.element_sets]):
-            nodes = np.concatenate([np.zeros(0, dtype=np.int64), *self.node_sets.get(name, [])])
-            cells = np.concatenate([np.zeros(0, dtype=np.int64), *self.element_sets.get(name, [])])
+            nodes = np.concatenate([NO_ROWS, *self.node_sets.get(name, [])])
+            cells = np.concatenate([NO_ROWS, *self.element_sets.get(name, [])])
             rows = rows_of_ids(ids, distinct(nodes))
             elements = rows_of_ids(of_elements, distinct(cells))
             elements = elements[elements >= 0]  # springs and masses are no elements of the mesh
