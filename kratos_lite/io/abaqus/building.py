@@ -16,6 +16,7 @@ from kratos_lite.io.abaqus.mesh import ELEMENT_TYPES, FINITE
 from kratos_lite.io.abaqus.supports import Nodal, apply
 from kratos_lite.mesh import Mesh, rows_of_ids, with_rows
 from kratos_lite.model.loads.base import Load
+from kratos_lite.quadrature import Rule, by_order
 from kratos_lite.time_series import TimeSeries
 
 
@@ -32,10 +33,9 @@ class Building:
         deck = self.deck
         mesh = self._finite() if large else self.mesh
         model = Model(mesh)
-        if large:
-            for block, at in with_rows(self.mesh.blocks):
-                if block.name == ELEMENT_TYPES["C3D20R"]:
-                    model.use_rule(2, np.arange(at.start, at.stop))
+        for block, at in with_rows(self.mesh.blocks):
+            if rule := self._rule(block.name, large):
+                model.use_rule(rule, np.arange(at.start, at.stop))
         assigned = np.zeros(mesh.n_elements, dtype=bool)
         for elset, name, axes, card in deck.sections:
             if name not in deck.materials:
@@ -64,7 +64,10 @@ class Building:
 
     def loads(self, model: Model, acting: Acting) -> Iterable[tuple[Load, str]]:
         """Yield the loads that act, each with the name of its amplitude."""
-        return loads_of(model, acting, self.number, self.deck.axes, self.deck.initial, self.deck.cards)
+        for _, name, _, _ in self.deck.sections if acting.bodies else ():
+            if "DENSITY" not in self.deck.materials[name].cards:
+                self.deck.materials[name].card.wrong("GRAV and CENTRIF need its *DENSITY")
+        yield from loads_of(model, acting, self.number, self.deck.axes, self.deck.initial, self.deck.cards)
 
     def is_nonlinear(self, step: Step) -> bool:
         """Return whether a step has large displacements or laws that are not linear."""
@@ -86,6 +89,15 @@ class Building:
     def last(self, kind: str, step: Step) -> Step | None:
         """Return the last step of a kind before one, or None."""
         return next((s for s in reversed(self.earlier(step)) if s.kind == kind), None)
+
+    def _rule(self, name: str, large: bool) -> Rule | int | None:
+        """Return the Gauss points of CalculiX where they are others than ours."""
+        if name == ELEMENT_TYPES["C3D6"]:
+            thirds = np.array([(1 / 3, 1 / 3, -(3**-0.5)), (1 / 3, 1 / 3, 3**-0.5)])
+            return Rule(thirds, np.full(2, 0.5), 1, "CalculiX C3D6")
+        if name == ELEMENT_TYPES["C3D15"]:
+            return by_order("wedge", 3)
+        return 2 if large and name == ELEMENT_TYPES["C3D20R"] else None
 
     def _finite(self) -> Mesh:
         """Return the mesh with elements and loads of large displacements."""

@@ -139,8 +139,9 @@ class LoadCards:
     def dsload(self, card: Card, acting: Acting, step: int) -> None:
         """Read *DSLOAD."""
         card.check_options(("OP", "AMPLITUDE"))
-        if _op(card) == "NEW":
+        if _op(card) == "NEW":  # as those of *DLOAD
             acting.faces.clear()
+            acting.bodies.clear()
         name = card.options.get("AMPLITUDE", "").upper()
         for row in card.rows():
             if row.text(1).upper() != "P":
