@@ -148,6 +148,9 @@ class Dynamics(Building):
         ]
         self._move(model, steps, times, reached)
         for k, step in enumerate(steps):
+            T = step.acting.temperatures
+            if self.deck.initial.any() and T.amplitudes[T.given].any():
+                step.card.wrong("amplitudes of temperatures need initial temperatures of 0 in this step")
             if k and step.ramps and step.acting.names():
                 step.card.wrong("amplitudes after the first of several nonlinear steps are not supported")
             factor = {name: _window(times, reached, k, each) for name, each in self._series(step).items()}

@@ -74,6 +74,8 @@ class Job:
                 self.tell(f"{card.place}: *{card.keyword}: not written: {', '.join(other)}")
             if card.keyword.endswith("FILE") and card.options.get("GLOBAL", "YES").upper() == "NO":
                 self.tell(f"{card.place}: *{card.keyword}: GLOBAL=NO is ignored, all axes are global")
+        if np.ptp(self.deck.initial) and any("NT" in _words(card) for card in step.outputs):
+            self.tell(f"{step.card.place}: *STEP: NT is the difference to the initial temperatures")
         words = [word for card in self.asked if card.keyword.endswith("FILE") for word in _words(card)]
         words += ["ERR"] if "S" in words else []  # as CalculiX does
         self.fields = [name for word, name in FILED.items() if word in ("U", *words)]
@@ -88,6 +90,8 @@ class Job:
             return outcome.summary()
         if outcome.modes is not None:
             values, shapes = outcome.modes
+            if other := [name for name in self.fields if name not in ("DISP", "ERROR")]:
+                self.tell(f"step {step}: not written of modes: {', '.join(other)}")
             self.frd += steps_of_modes(values, shapes, case.buckling)
             self.dat += dat.buckling(values) if case.buckling else self._frequencies(case, values, shapes)
         elif outcome.response is not None:

@@ -240,10 +240,11 @@ def loads_of(
             raise ModelError("*DLOAD: CENTRIF on masses is not supported; give their force by *CLOAD")
         else:
             yield Gravity(_centrifugal(term.values), where), term.amplitude
-    T = acting.temperatures
+    T, same = acting.temperatures, float(initial[0]) if (initial == initial[0]).all() else 0.0
     for name in sorted(set(T.amplitudes[T.given])):
         of = T.given[:, 0] & (T.amplitudes[:, 0] == name)
-        yield Temperature(np.where(of, T.values[:, 0] - initial, 0.0)[cards.twin]), name
+        difference = np.where(of, T.values[:, 0] - initial, 0.0)[cards.twin]
+        yield Temperature(difference + same, same), name
 
 
 def _centrifugal(values: tuple[float, ...]) -> Callable[[Array], Array]:

@@ -51,10 +51,12 @@ class _Building(Dynamics):
             name: series(step.period + (step.start if name in deck.in_total_time else 0.0))
             for name, series in deck.amplitudes.items()
         }
+        acting = step.acting.copy()
         held.settle(factor)
+        acting.settle(factor)
         self.hold(model, held)
-        for load, name in self.loads(model, step.acting):
-            model.add(load, amplitude=factor.get(name))
+        for load, _ in self.loads(model, acting):
+            model.add(load)
         return model
 
     def _static(self, *steps: Step) -> Case:

@@ -20,6 +20,10 @@ TABLES = {
     "in the order of cards and sets": SETS
     + LOADED
     + "*EL PRINT, ELSET=TWICE, TOTALS=YES\nS, EVOL\n*NODE PRINT, NSET=MIXED, TOTALS=YES\nU, RF\n*END STEP\n",
+    "temperatures": "*MATERIAL, NAME=M\n*ELASTIC\n1e3,.25\n*EXPANSION\n1e-5\n"
+    "*SOLID SECTION, ELSET=EALL, MATERIAL=M\n*AMPLITUDE, NAME=A\n0.,0.,1.,.5\n"
+    "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nALL,20.\n"
+    "*STEP\n*STATIC\n*TEMPERATURE, AMPLITUDE=A\nTOP,100.\n*NODE PRINT, NSET=ALL\nU, NT\n*END STEP\n",
     "along local axes": SETS
     + AXES
     + LOADED
@@ -45,12 +49,14 @@ def test_tables_are_those_of_ccx(text: str, ccx: Callable[[str], str], tmp_path:
 
 def test_words_that_are_not_written_are_named(tmp_path: Path) -> None:
     told: list[str] = []
+    modes = "*STEP\n*FREQUENCY\n3\n*EL FILE\nS\n*END STEP\n"
     words = "*NODE FILE, GLOBAL=NO\nU\n*EL FILE\nS, HFL\n*NODE PRINT, NSET=ALL\nQQ\n*END STEP\n"
-    (tmp_path / "job.inp").write_text(CUBE + LOADED + words)
+    (tmp_path / "job.inp").write_text(CUBE + LOADED + words + modes)
     Job(tmp_path / "job.inp", told.append).run()
     assert any("*NODEFILE: GLOBAL=NO is ignored" in line for line in told)
     assert any("*ELFILE: not written: HFL" in line for line in told)
     assert any("*NODEPRINT: not written: QQ" in line for line in told)
+    assert "step 2: not written of modes: STRESS" in told
 
 
 @pytest.mark.parametrize(
