@@ -74,6 +74,9 @@ class Job:
                 self.tell(f"{card.place}: *{card.keyword}: not written: {', '.join(other)}")
             if card.keyword.endswith("FILE") and card.options.get("GLOBAL", "YES").upper() == "NO":
                 self.tell(f"{card.place}: *{card.keyword}: GLOBAL=NO is ignored, all axes are global")
+            local = card.keyword == "ELPRINT" and card.options.get("GLOBAL", "NO").upper() == "NO"
+            if local and any(axes for _, _, axes, _ in self.deck.sections):
+                self.tell(f"{card.place}: *ELPRINT: tables have global axes, not those of *ORIENTATION")
         if np.ptp(self.deck.initial) and any("NT" in _words(card) for card in step.outputs):
             self.tell(f"{step.card.place}: *STEP: NT is the difference to the initial temperatures")
         words = [word for card in self.asked if card.keyword.endswith("FILE") for word in _words(card)]

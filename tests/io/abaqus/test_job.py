@@ -50,12 +50,18 @@ def test_tables_are_those_of_ccx(text: str, ccx: Callable[[str], str], tmp_path:
 def test_words_that_are_not_written_are_named(tmp_path: Path) -> None:
     told: list[str] = []
     modes = "*STEP\n*FREQUENCY\n3\n*EL FILE\nS\n*END STEP\n"
-    words = "*NODE FILE, GLOBAL=NO\nU\n*EL FILE\nS, HFL\n*NODE PRINT, NSET=ALL\nQQ\n*END STEP\n"
-    (tmp_path / "job.inp").write_text(CUBE + LOADED + words + modes)
+    axes = "*ORIENTATION, NAME=O\n1.,1.,0.,-1.,1.,0.\n"
+    cube = CUBE.replace("MATERIAL=STEEL", "MATERIAL=STEEL, ORIENTATION=O").replace(
+        "*MATERIAL", f"{axes}*MATERIAL"
+    )
+    words = "*EL PRINT, ELSET=EALL\nS\n*NODE FILE, GLOBAL=NO\nU\n*EL FILE\nS, HFL\n"
+    words += "*NODE PRINT, NSET=ALL\nQQ\n*END STEP\n"
+    (tmp_path / "job.inp").write_text(cube + LOADED + words + modes)
     Job(tmp_path / "job.inp", told.append).run()
     assert any("*NODEFILE: GLOBAL=NO is ignored" in line for line in told)
     assert any("*ELFILE: not written: HFL" in line for line in told)
     assert any("*NODEPRINT: not written: QQ" in line for line in told)
+    assert any("*ELPRINT: tables have global axes" in line for line in told)
     assert "step 2: not written of modes: STRESS" in told
 
 
