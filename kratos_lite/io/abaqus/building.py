@@ -20,6 +20,7 @@ from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.loads.nodal import NodalForces
 from kratos_lite.model.loads.surface import ConditionLoads
 from kratos_lite.model.loads.temperature import Temperature
+from kratos_lite.quadrature import Rule, by_order
 from kratos_lite.time_series import TimeSeries
 from kratos_lite.typing import Array
 
@@ -37,10 +38,9 @@ class Building:
         deck = self.deck
         mesh = self._finite() if large else self.mesh
         model = Model(mesh)
-        if large:
-            for block, at in with_rows(self.mesh.blocks):
-                if block.name == ELEMENT_TYPES["C3D20R"]:
-                    model.use_rule(2, np.arange(at.start, at.stop))
+        for block, at in with_rows(self.mesh.blocks):
+            if rule := self._rule(block.name, large):
+                model.use_rule(rule, np.arange(at.start, at.stop))
         assigned = np.zeros(mesh.n_elements, dtype=bool)
         for elset, name, axes, card in deck.sections:
             if name not in deck.materials:
@@ -87,6 +87,9 @@ class Building:
     def loads(self, model: Model, acting: Acting) -> Iterable[tuple[Load, str]]:
         """Yield the loads that act, each with the name of its amplitude."""
         deck = self.deck
+        for _, name, _, _ in deck.sections if acting.bodies else ():
+            if "DENSITY" not in deck.materials[name].cards:
+                deck.materials[name].card.wrong("GRAV and CENTRIF need its *DENSITY")
         mesh, n = model.mesh, model.mesh.n_nodes
         F, carried = acting.forces, np.asarray if model.references is None else model.references.carried
         for name in sorted(set(F.amplitudes[F.given])):
@@ -115,10 +118,12 @@ class Building:
                 raise ModelError("*DLOAD: CENTRIF on masses is not supported; give their force by *CLOAD")
             else:
                 yield Gravity(_centrifugal(term.values), where), term.amplitude
-        T = acting.temperatures
+        T, initial = acting.temperatures, deck.initial
+        same = float(initial[0]) if (initial == initial[0]).all() else 0.0
         for name in sorted(set(T.amplitudes[T.given])):
             of = T.given[:, 0] & (T.amplitudes[:, 0] == name)
-            yield Temperature(np.where(of, T.values[:, 0] - deck.initial, 0.0)[deck.cards.twin]), name
+            difference = np.where(of, T.values[:, 0] - initial, 0.0)[deck.cards.twin]
+            yield Temperature(difference + same, same), name
 
     def is_nonlinear(self, step: Step) -> bool:
         """Return whether a step has large displacements or laws that are not linear."""
@@ -140,6 +145,15 @@ class Building:
     def last(self, kind: str, step: Step) -> Step | None:
         """Return the last step of a kind before one, or None."""
         return next((s for s in reversed(self.earlier(step)) if s.kind == kind), None)
+
+    def _rule(self, name: str, large: bool) -> Rule | int | None:
+        """Return the Gauss points of CalculiX where they are others than ours."""
+        if name == ELEMENT_TYPES["C3D6"]:
+            thirds = np.array([(1 / 3, 1 / 3, -(3**-0.5)), (1 / 3, 1 / 3, 3**-0.5)])
+            return Rule(thirds, np.full(2, 0.5), 1, "CalculiX C3D6")
+        if name == ELEMENT_TYPES["C3D15"]:
+            return by_order("wedge", 3)
+        return 2 if large and name == ELEMENT_TYPES["C3D20R"] else None
 
     def _finite(self) -> Mesh:
         """Return the mesh with elements and loads of large displacements."""

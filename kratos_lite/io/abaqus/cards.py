@@ -146,8 +146,10 @@ def read_cards(path: Path, *, depth: int = 0) -> Iterator[Card]:
         line += data.count(b"\n", before, at)
         before, end = at, _line_end(data, at)
         header = data[at:end].strip()
-        while header.endswith(b",") and end < after:  # the options go on in the next line
+        while header.endswith(b",") and end < after:  # the options may go on in the next line
             stop = _line_end(data, end + 1)
+            if b"=" not in data[end + 1 : stop]:
+                break
             header, end = header + data[end + 1 : stop].strip(), stop
         body = data[end:after]
         body = _COMMENT.sub(b"", body) if has_comments and b"**" in body else body
@@ -156,6 +158,8 @@ def read_cards(path: Path, *, depth: int = 0) -> Iterator[Card]:
             yield card
         elif depth == DEEPEST:
             card.wrong("files include each other; remove one of the cards")
+        elif row := next(card.rows(), None):
+            row.wrong("a line after *INCLUDE belongs to no card; begin it by one")
         else:
             yield from read_cards(_included(path, card), depth=depth + 1)
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -135,6 +135,7 @@ class Deck:
         self.loads = LoadCards(self.cards, mesh)
         self.steps = list[Step]()
         self.open: Step | None = None  # the step that is being read
+        self._given = set[str]()  # kinds of supports and loads in it
         self._material: Definition | None = None
         self._read([card for card in cards if card.keyword not in OF_MESH])
 
@@ -175,7 +176,7 @@ class Deck:
     def material(self, card: Card) -> None:
         """Read *MATERIAL."""
         card.check_options(("NAME",))
-        self._material = self.materials[card.option("NAME").upper()] = Definition(card)
+        self._material = self.materials[_new_name(card, self.materials)] = Definition(card)
 
     def section(self, card: Card) -> None:
         """Read *SOLID SECTION."""
@@ -185,7 +186,7 @@ class Deck:
 
     def orientation(self, card: Card) -> None:
         """Read *ORIENTATION."""
-        self.orientations[card.option("NAME").upper()] = orientation(card)
+        self.orientations[_new_name(card, self.orientations)] = orientation(card)
 
     def amplitude(self, card: Card) -> None:
         """Read *AMPLITUDE, pairs of a time and a factor."""
@@ -195,8 +196,8 @@ class Deck:
         pairs = card.every()
         if pairs.size % 2 or not pairs.size:
             card.wrong(f"times and factors come in pairs; got {pairs.size} numbers")
+        name = _new_name(card, self.amplitudes)
         try:
-            name = card.option("NAME").upper()
             self.amplitudes[name] = TimeSeries(pairs[::2], pairs[1::2])
         except InputError as error:
             card.wrong(str(error))
@@ -235,6 +236,7 @@ class Deck:
 
     def boundary(self, card: Card) -> None:
         """Read *BOUNDARY, of the model or of a step."""
+        card = self._checked(card, "BOUNDARY")
         boundary(card, self.held, self.cards, self.mesh)
 
     # ---- steps ----------------------------------------------------------------------------------------
@@ -253,6 +255,7 @@ class Deck:
             large = card.options["NLGEOM"].upper() != "NO"
         start = sum(step.period for step in self.steps)
         self.open = Step(card, large, start)
+        self._given.clear()
 
     def procedure(self, card: Card) -> None:
         """Read the kind of a step, such as *STATIC, and its data line."""
@@ -275,6 +278,7 @@ class Deck:
         """Read a card of loads."""
         if self._in_step(card).procedure is None:
             card.wrong("it belongs after the procedure of the step, such as *STATIC")
+        card = self._checked(card, card.keyword.replace("DSLOAD", "DLOAD"))
         self.loads.read(card, self.acting, len(self.steps) + 1)
 
     def output(self, card: Card) -> None:
@@ -300,10 +304,26 @@ class Deck:
         self.acting.settle(end)
         self.held.settle(end)
 
+    def _checked(self, card: Card, kind: str) -> Card:
+        """Check the amplitude of a card; OP=NEW counts on the first of its kind in a step alone."""
+        if (name := card.options.get("AMPLITUDE", "").upper()) and name not in self.amplitudes:
+            card.wrong(f"there is no *AMPLITUDE {name}.{nearest(name, self.amplitudes)}")
+        if kind in self._given and card.options.get("OP", "").upper() == "NEW":
+            self.notes.append(f"{card.place}: OP=NEW counts on the first *{kind} of a step alone")
+            card = replace(card, options={**card.options, "OP": "MOD"})
+        self._given.add(kind)
+        return card
+
     def _in_step(self, card: Card) -> Step:
         if self.open is None:
             card.wrong("it belongs between *STEP and *END STEP")
         return self.open
+
+
+def _new_name(card: Card, known: Collection[str]) -> str:
+    """Return the name that a card gives; InputError where another has it."""
+    name = card.option("NAME").upper()
+    return card.wrong(f"the name {name} is taken; choose another") if name in known else name
 
 
 CARDS: dict[str, Callable[[Deck, Card], None]] = {

@@ -22,15 +22,19 @@ from kratos_lite.io.writers.calculix import at_nodes, averaged
 from kratos_lite.io.writers.frd import FrdStep, steps_of_modes, write_frd
 from kratos_lite.io.writers.recorded import recorded
 from kratos_lite.mesh import rows_of_ids
+from kratos_lite.typing import Ints
 
 if TYPE_CHECKING:
     from kratos_lite.analysis.harmonic import HarmonicResponse
 
 FILED = {
-    "U": "DISP", "RF": "FORC", "NT": "NDTEMP", "V": "VELO", "S": "STRESS", "E": "TOSTRAIN", "ME": "MESTRAIN",
+    "U": "DISP", "V": "VELO", "NT": "NDTEMP", "S": "STRESS", "E": "TOSTRAIN", "ME": "MESTRAIN", "RF": "FORC",
     "PEEQ": "PE", "ENER": "ENER", "ERR": "ERROR",
 }  # fmt: skip
-"""Fields of `.frd` files by the words of *NODE FILE and *EL FILE."""
+"""Fields of `.frd` files by the words of *NODE FILE and *EL FILE, in order."""
+OF_SET = {"NODEPRINT": "NSET", "ELPRINT": "ELSET"}
+OF_FACES = ("SECTIONPRINT", "FACEPRINT")
+"""Cards that print tables, of sets and of surfaces."""
 STATUS = (
     "SUMMARY OF JOB INFORMATION\n  STEP      INC     ATT  ITRS     TOT TIME     STEP TIME      INC TIME\n"
 )
@@ -42,7 +46,7 @@ class Job:
     def __init__(self, path: Path, tell: Callable[[str], None]) -> None:
         self.deck, self.tell = Deck(path), tell
         self.frd, self.dat, self.sta = list[FrdStep](), list[str](), [STATUS]
-        self.asked = dict[str, list[Card]]()  # cards of output; each kind holds until it is given anew
+        self.asked = list[Card]()  # cards of output; each kind holds until it is given anew
         self.fields = list[str]()
 
     def run(self) -> None:
@@ -61,11 +65,23 @@ class Job:
 
     def _ask(self, step: Step) -> None:
         """Take the cards of output of a step."""
-        for kind in {card.keyword for card in step.outputs}:
-            self.asked[kind] = [card for card in step.outputs if card.keyword == kind]
-        words = [w.upper() for k in ("NODEFILE", "ELFILE") for c in self.asked.get(k, []) for w in _words(c)]
+        new = {card.keyword for card in step.outputs}
+        self.asked = [card for card in self.asked if card.keyword not in new] + step.outputs
+        for card in step.outputs:
+            self._rows(card)
+            known = {*FILED, *dat.VARIABLES} if card.keyword.endswith("PRINT") else FILED
+            if other := [w for w in _words(card) if w not in known and card.keyword not in OF_FACES]:
+                self.tell(f"{card.place}: *{card.keyword}: not written: {', '.join(other)}")
+            if card.keyword.endswith("FILE") and card.options.get("GLOBAL", "YES").upper() == "NO":
+                self.tell(f"{card.place}: *{card.keyword}: GLOBAL=NO is ignored, all axes are global")
+            local = card.keyword == "ELPRINT" and card.options.get("GLOBAL", "NO").upper() == "NO"
+            if local and any(axes for _, _, axes, _ in self.deck.sections):
+                self.tell(f"{card.place}: *ELPRINT: tables have global axes, not those of *ORIENTATION")
+        if np.ptp(self.deck.initial) and any("NT" in _words(card) for card in step.outputs):
+            self.tell(f"{step.card.place}: *STEP: NT is the difference to the initial temperatures")
+        words = [word for card in self.asked if card.keyword.endswith("FILE") for word in _words(card)]
         words += ["ERR"] if "S" in words else []  # as CalculiX does
-        self.fields = list(dict.fromkeys(["DISP", *(FILED[word] for word in words if word in FILED)]))
+        self.fields = [name for word, name in FILED.items() if word in ("U", *words)]
 
     def _run(self, case: Case, step: int) -> Iterable[str]:
         """Run a case, keep what the files get, and return the lines of its summary."""
@@ -77,6 +93,8 @@ class Job:
             return outcome.summary()
         if outcome.modes is not None:
             values, shapes = outcome.modes
+            if other := [name for name in self.fields if name not in ("DISP", "ERROR")]:
+                self.tell(f"step {step}: not written of modes: {', '.join(other)}")
             self.frd += steps_of_modes(values, shapes, case.buckling)
             self.dat += dat.buckling(values) if case.buckling else self._frequencies(case, values, shapes)
         elif outcome.response is not None:
@@ -111,24 +129,35 @@ class Job:
 
     def _print(self, result: Any, time: float) -> None:
         """Print tables of a result."""
-        cards, mesh = self.deck.cards, result.mesh
-        for kind, name in (("NODEPRINT", "NSET"), ("ELPRINT", "ELSET")):
-            for card in self.asked.get(kind, []):
-                where, totals = card.option(name).upper(), card.options.get("TOTALS", "NO").upper()
-                if name == "NSET":
-                    rows = node_rows(where, card, cards, mesh)
-                else:
-                    rows = rows_of_ids(mesh.element_ids, cards.elements_of(where, card))
-                for word in _words(card):
-                    if word in dat.VARIABLES:
-                        self.dat += dat.prints(result, rows, word, where, time, totals)
-        for card in self.asked.get("SECTIONPRINT", []):
-            surface = cards.surfaces[card.option("SURFACE").upper()]
-            loads, faces = self.deck.loads, []
-            for face in np.unique(surface.faces).tolist():
-                faces += loads.faces(surface.elements[surface.faces == face], face, card)
+        mesh, axes = result.mesh, self.deck.axes
+        for card in (card for card in self.asked if card.keyword in OF_SET):
+            where, totals = (
+                card.option(OF_SET[card.keyword]).upper(),
+                card.options.get("TOTALS", "NO").upper(),
+            )
+            rows, frames = self._rows(card), None
+            if card.keyword == "NODEPRINT" and card.options.get("GLOBAL", "NO").upper() == "NO":
+                frames = axes.of_node[rows] >= 0, axes.directions(mesh, rows)
+            for word in _words(card):
+                if word in dat.VARIABLES:
+                    self.dat += dat.prints(result, rows, word, where, time, totals, frames)
+        for card in (card for card in self.asked if card.keyword in OF_FACES):
+            name = card.option("SURFACE")
+            faces = self.deck.loads.surface(name, card)
             blocks = with_faces(mesh.replace(conditions=()), faces, "SurfaceCondition")[0].conditions
-            self.dat += dat.section_print(result, blocks, card.option("SURFACE").upper(), time)
+            self.dat += dat.section_print(result, blocks, name.upper(), time)
+
+    def _rows(self, card: Card) -> Ints:
+        """Return the nodes or elements that a card prints, in the order of their set."""
+        mesh, cards = self.deck.mesh, self.deck.cards
+        if card.keyword in OF_FACES:
+            self.deck.loads.surface(card.option("SURFACE"), card)
+        if card.keyword == "NODEPRINT":
+            return node_rows(card.option("NSET").upper(), card, cards, mesh)
+        if card.keyword != "ELPRINT":
+            return np.zeros(0, dtype=np.int64)
+        rows = rows_of_ids(mesh.element_ids, cards.elements_of(card.option("ELSET").upper(), card))
+        return np.asarray(rows[rows >= 0])
 
     def _frequencies(self, case: Case, omega: Any, shapes: Any) -> list[str]:
         """Return the tables of frequencies."""

@@ -99,7 +99,7 @@ class LoadCards:
             card.wrong(f"OP is NEW or MOD; got {op}")
         if op == "NEW":
             kinds: dict[str, tuple[Any, ...]] = {"CLOAD": (forces,), "TEMPERATURE": (acting.temperatures,)}
-            kinds |= {"DLOAD": (acting.faces, acting.bodies), "DSLOAD": (acting.faces,)}
+            kinds |= dict.fromkeys(("DLOAD", "DSLOAD"), (acting.faces, acting.bodies))
             for loads in kinds[card.keyword]:
                 loads.clear()
         for row in card.rows():

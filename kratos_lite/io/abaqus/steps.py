@@ -66,10 +66,12 @@ class _Cases(Building):
         """Return the model with the supports and loads at the end of a linear step."""
         model, held = self.model(), step.held.copy()
         factor = {name: series(step.period) for name, series in self._series(step).items() if series}
+        acting = step.acting.copy()
         held.settle(factor)
+        acting.settle(factor)
         self.hold(model, held)
-        for load, name in self.loads(model, step.acting):
-            model.add(load, amplitude=factor.get(name))
+        for load, _ in self.loads(model, acting):
+            model.add(load)
         return model
 
     def _static(self, *steps: Step) -> Case:
@@ -214,6 +216,9 @@ class _Cases(Building):
         ]
         self._move(model, steps, times, reached)
         for k, step in enumerate(steps):
+            T = step.acting.temperatures
+            if self.deck.initial.any() and T.amplitudes[T.given].any():
+                step.card.wrong("amplitudes of temperatures need initial temperatures of 0 in this step")
             if k and step.ramps and step.acting.names():
                 step.card.wrong("amplitudes after the first of several nonlinear steps are not supported")
             factor = {name: _window(times, reached, k, each) for name, each in self._series(step).items()}

@@ -14,7 +14,7 @@ from kratos_lite.io.writers.calculix import AT_NODES, at_gauss, at_nodes, order
 from kratos_lite.mesh import Block
 from kratos_lite.quadrature import rule_for
 from kratos_lite.shapes.base import at_points
-from kratos_lite.typing import Array, Ints
+from kratos_lite.typing import Array, Ints, Mask
 from kratos_lite.validation import choice
 from kratos_lite.voigt import tensor
 
@@ -38,26 +38,50 @@ HEAD = ["MODE NO.   " + "".join(PARTS).rstrip()]
 
 
 def prints(
-    result: Result, rows: Ints, variable: str, where: str, time: float = 1.0, totals: str = "NO"
+    result: Result,
+    rows: Ints,
+    variable: str,
+    where: str,
+    time: float = 1.0,
+    totals: str = "NO",
+    frames: tuple[Mask, Array] | None = None,
 ) -> list[str]:
-    """Return the table of a variable of nodes or elements, of the set `where`; `totals` NO, YES or ONLY."""
+    """Return the table of a variable of nodes or elements in order, of the set `where`.
+
+    `totals` is NO, YES or ONLY; vectors of some of the nodes are along the axes (n, 3, 3) of `frames`.
+    """
     field, title, total = VARIABLES[choice(variable, "a printed variable", VARIABLES)]
+    ids = result.mesh.node_ids[rows] if field in AT_NODES else result.mesh.element_ids[rows]
     if field in AT_NODES:
-        ids, found = result.mesh.node_ids[rows, None], at_nodes(result, [field]).values()
-        tables = [(ids, values[rows].reshape(len(rows), -1)) for values in found]
+        found = at_nodes(result, [field]).values()
+        tables = [(ids[:, None], values[rows].reshape(len(rows), -1)) for values in found]
     else:
         tables = _of_elements(result, rows, field, bool(total))
     if not tables:
         return []
-    ids, table = map(np.vstack, zip(*tables, strict=True))
-    of, lines = f"for set {where} and time{_fortran(time):>15}", list[str]()
+    numbers, table = map(np.vstack, zip(*tables, strict=True))
+    if field not in AT_NODES:
+        some = _in_turn(numbers, ids)
+        numbers, table = numbers[some], table[some]
+    of, lines, shown = f"for set {where} and time{_fortran(time):>15}", list[str](), table
+    marks = np.full(len(table), "", dtype=object)
+    if frames is not None and field in AT_NODES and table.shape[1] == 3:
+        marks[frames[0]], shown = " L", np.einsum("nij,nj->ni", frames[1], table)
     if totals != "ONLY" or not total:
-        form = "%10d" + "%4d" * (ids.shape[1] - 1) + "%14.6E" * table.shape[1]
-        ordered = np.hstack([ids, table])[np.lexsort(ids.T[::-1])]
-        lines += ["", f" {title}{of}", "", *(form % tuple(row) for row in ordered.tolist())]
+        form = "%10d" + "%4d" * (numbers.shape[1] - 1) + "%14.6E" * table.shape[1]
+        values = np.hstack([numbers, shown]).tolist()
+        lines += ["", f" {title}{of}", ""]
+        lines += [form % tuple(row) + mark for row, mark in zip(values, marks, strict=True)]
     if totals != "NO" and total:
         lines += ["", f" {total}{of}", "", "      " + "".join(f"{sum_:14.6E}" for sum_ in table.sum(axis=0))]
     return lines
+
+
+def _in_turn(numbers: Ints, ids: Ints) -> Ints:
+    """Return the rows of elements in the order of their ids, and of their points."""
+    order = np.lexsort(numbers.T[::-1])
+    first, last = (np.searchsorted(numbers[order, 0], ids, side) for side in ("left", "right"))
+    return order[np.concatenate([np.arange(0), *map(np.arange, first, last)])]
 
 
 def _of_elements(result: Result, rows: Ints, field: str, whole: bool) -> list[tuple[Ints, Array]]:

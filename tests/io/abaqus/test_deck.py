@@ -40,6 +40,15 @@ STEPS = {
         "*STEP\n*STATIC\n*BOUNDARY\nTOP,3,3,0.1\n" + PRINT,
         "*STEP\n*STATIC\n*BOUNDARY,OP=NEW\nBOTTOM,1,3\n" + PRINT,
     ),
+    "OP=NEW counts on the first card of a kind": (
+        "*STEP\n*STATIC\n*BOUNDARY,OP=NEW\nBOTTOM,1,3\n*BOUNDARY,OP=NEW\n8,1,1,.01\n"
+        "*CLOAD,OP=NEW\nTOP,3,1.\n*CLOAD,OP=NEW\n7,1,2.\n" + PRINT,
+        "*SURFACE,NAME=S\n1,S4\n*STEP\n*STATIC\n*CLOAD\n5,1,1.\n*CLOAD,OP=NEW\n6,1,1.\n"
+        "*DLOAD,OP=NEW\nEALL,P2,-4.\n*DSLOAD,OP=NEW\nS,P,2.\n" + PRINT,
+        "*STEP\n*STATIC\n*CLOAD,OP=NEW\n*DLOAD\nEALL,GRAV,9.81,0.,0.,-1.\n" + PRINT,
+        "*STEP\n*STATIC\n*DSLOAD,OP=NEW\nS,P,3.\n" + PRINT,
+    ),
+    "a comma ends a card": ("*STEP\n*STATIC\n*CLOAD,\nTOP,3,1.\n" + PRINT,),
     "weight, rotation and a surface": (
         "*STEP\n*STATIC\n*DLOAD\nEALL,GRAV,9.81,0.,0.6,-0.8\n" + PRINT,
         "*STEP\n*STATIC\n*DLOAD,OP=NEW\nEALL,CENTRIF,4.,1.,0.,0.,0.,0.,1.\n" + PRINT,
@@ -131,6 +140,10 @@ WRONG = {  # what is added to the cube, and the message, which begins with the l
     "*SOLID SECTION, ELSET=EALL, MATERIAL=X\n" + STEP: "0: *SOLIDSECTION: there is no *MATERIAL X",
     "*DENSITY\n1.\n" + STEP: "0: *DENSITY: it belongs after *MATERIAL",
     "*INCLUDE, INPUT=../x.inp\n" + STEP: "leaves the folder",
+    "*INCLUDE, INPUT=x.inp\n5,6\n" + STEP: "1: a line after *INCLUDE belongs to no card",
+    "*MATERIAL, NAME=STEEL\n" + STEP: "0: *MATERIAL: the name STEEL is taken",
+    "*STEP\n*STATIC\n*CLOAD, AMPLITUDE=A\nTOP,1,1.\n*END STEP\n": "2: *CLOAD: there is no *AMPLITUDE A",
+    "*BOUNDARY, AMPLITUDE=A\nTOP,1,1,1.\n" + STEP: "0: *BOUNDARY: there is no *AMPLITUDE A",
 }
 
 
@@ -140,3 +153,22 @@ def test_damaged_decks_get_one_clear_error(text: str, read: Read) -> None:
         read(text)
     message = re.sub(r"^(\d+)", lambda m: f"job.inp:{CUBE.count(chr(10)) + 1 + int(m[1])}", WRONG[text])
     assert message in str(caught.value)
+
+
+def test_weight_needs_a_density(read: Read) -> None:
+    weight = "*STEP\n*STATIC\n*DLOAD\nEALL,GRAV,9.81,0.,0.,-1.\n*END STEP\n"
+    with pytest.raises(kl.InputError, match=r"\*MATERIAL: GRAV and CENTRIF need its \*DENSITY"):
+        read(weight, CUBE.replace("*DENSITY\n2.\n", ""))
+
+
+WEDGE = (
+    "*NODE, NSET=ALL\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n5,1,.1,1\n6,0,1,1.2\n"
+    "*ELEMENT, TYPE=C3D6, ELSET=EALL\n1,1,2,3,4,5,6\n*NSET, NSET=BOTTOM\n1,2,3\n"
+)
+
+
+def test_a_wedge_has_the_points_of_calculix(read: Read, ccx: Callable[..., str]) -> None:
+    deck = WEDGE + CUBE[CUBE.index("*MATERIAL") :]
+    step = "*STEP\n*STATIC\n*CLOAD\n4,1,1.\n6,3,2.\n" + PRINT
+    ours, theirs = solved(read(step, deck)), displacements(ccx(step, deck))
+    assert np.abs(ours - theirs).max() < 1e-6 * np.abs(theirs).max()

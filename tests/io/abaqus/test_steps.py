@@ -201,7 +201,9 @@ def test_a_deck_without_steps_is_a_model(read: Read) -> None:
 
 REDUCED = CUBE.replace("C3D8,", "C3D8I,")
 NEXT = "*STEP\n*STATIC\n*CLOAD\nTOP,3,1.\n*END STEP\n"
+HOT = "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nTOP,20.\n" + AMPLITUDES + IN_TIME
 WRONG = {
+    f"{HOT}*TEMPERATURE, AMPLITUDE=A\nTOP,50.\n*END STEP\n": "amplitudes of temperatures need initial",
     "*STEP, PERTURBATION\n*STATIC\n*END STEP\n": "PERTURBATION is supported with *FREQUENCY; got *STATIC",
     "*STEP\n*CLOAD\nTOP,1,1.\n*STATIC\n*END STEP\n": "it belongs after the procedure of the step",
     "*STEP\n*DYNAMIC, EXPLICIT\n1.,1.\n*END STEP\n": "option EXPLICIT is not supported",

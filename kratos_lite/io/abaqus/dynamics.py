@@ -1,0 +1,220 @@
+"""Steps of a deck in time and in frequency."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import ceil, pi
+from typing import Any
+
+import numpy as np
+
+from kratos_lite.analysis.integrators import HHT
+from kratos_lite.analysis.model import Model
+from kratos_lite.io.abaqus.building import Building
+from kratos_lite.io.abaqus.cards import Row
+from kratos_lite.io.abaqus.deck import Step
+from kratos_lite.io.abaqus.loads import Acting
+from kratos_lite.io.case import Case, TimeIntegration
+from kratos_lite.time_series import TimeSeries
+from kratos_lite.typing import Array
+
+AT_ONCE = 1e-9
+"""Fraction of a step in which loads act that do not grow over it."""
+GROWTH = 1.5
+"""Of automatic increments, from one to the next, as in CalculiX."""
+MOVING = ("DYNAMIC", "MODALDYNAMIC")
+FINER = 20
+"""Our steps in an increment of *MODAL DYNAMIC, which answers exactly to loads that are linear in it."""
+
+
+class Dynamics(Building):
+    """Makes the cases of steps in time and in frequency."""
+
+    def nonlinear(self, steps: Sequence[Step]) -> Case:
+        """Return the case of steps at rest in turn, whose loads grow from those of the step before."""
+        sizes = [size for step in steps for size in self._increments(step)]
+        time = TimeIntegration(sizes[0], len(sizes), quasi_static={}, sizes=tuple(sizes))
+        return Case(self._in_turn(steps, any(step.large for step in steps)), time)
+
+    def _dynamic(self, *steps: Step) -> Case:
+        model = self._in_turn(steps, any(step.large for step in steps))
+        card = steps[0].procedure
+        assert card is not None
+        alpha = Row(card.place, (card.option("ALPHA", "-0.05"),)).number(0)
+        return Case(model, self._time(model, steps, 1, HHT(alpha), self._damping_of_materials()))
+
+    def _modaldynamic(self, *steps: Step) -> Case:
+        model = self._in_turn(steps, False)
+        rayleigh = {self._rayleigh(step) for step in steps}
+        if len(rayleigh) > 1:
+            steps[1].card.wrong("another damping than that of the step before is not supported")
+        self._modes(steps[0])
+        if any(damping := rayleigh.pop()) and steps[0].held.values.any():
+            steps[0].card.wrong("supports that move with *MODAL DAMPING are not supported")
+        model.notes.append("*MODAL DYNAMIC: all modes answer, not those of *FREQUENCY alone")
+        return Case(model, self._time(model, steps, FINER if steps[0].is_direct else 1, None, damping))
+
+    def _steadystatedynamics(self, step: Step) -> Case:
+        """Return the case of a harmonic response."""
+        assert step.procedure is not None
+        if step.procedure.option("HARMONIC", "YES").upper() != "YES":
+            step.procedure.wrong("HARMONIC=NO is not supported; loads are harmonic")
+        if step.acting.names() or step.held.values.any():
+            step.card.wrong("amplitudes over the frequency and supports that move are not supported")
+        modes, model = self._modes(step), self.model()
+        self.hold(model, step.held)
+        quarter = Acting.none(model.mesh.n_nodes)
+        quarter.forces = step.acting.imaginary
+        loads: list[Any] = [load for load, _ in self.loads(model, step.acting)]
+        loads += [(load, 1j) for load, _ in self.loads(model, quarter)]
+        options: dict[str, Any] = {"loads": loads, "modes": modes}
+        if step.damping is not None and "RAYLEIGH" not in step.damping.options:
+            options["damping"] = damping = np.zeros(modes)
+            for row in step.damping.rows():
+                damping[row.integer(0) - 1 : row.integer(1)] = row.number(2)
+        else:
+            options["rayleigh"] = self._rayleigh(step)
+        low, high, count, bias = [*step.numbers(), *[20.0, 3.0][max(len(step.numbers()) - 2, 0) :]][:4]
+        return Case(model, harmonic=options | {"frequencies": _sweep(low, high, int(count), bias, modes)})
+
+    def _modes(self, step: Step) -> int:
+        """Return how many modes the *FREQUENCY before a step finds."""
+        before = self.last("FREQUENCY", step)
+        if before is None:
+            step.card.wrong(f"*{step.kind} needs a step with *FREQUENCY before it")
+        if before.perturbs:
+            step.card.wrong("the response about a stressed state is not supported")
+        return self.count(before)
+
+    def _rayleigh(self, step: Step) -> tuple[float, float]:
+        """Return α and β of *MODAL DAMPING."""
+        if step.damping is None:
+            return 0.0, 0.0
+        row = next(step.damping.rows(), None)
+        if "RAYLEIGH" not in step.damping.options or row is None:
+            step.damping.wrong("in time RAYLEIGH with α and β on its data line is supported alone")
+        return row.number(2, 0.0), row.number(3, 0.0)
+
+    def _damping_of_materials(self) -> tuple[float, float]:
+        """Return α and β that all materials share."""
+        cards = [self.deck.materials[name].cards.get("DAMPING") for _, name, _, _ in self.deck.sections]
+        every = [(c.option("ALPHA", "0"), c.option("BETA", "0")) if c else ("0", "0") for c in cards]
+        if len(set(every)) > 1:
+            self.deck.steps[0].card.wrong("materials with different *DAMPING are not supported")
+        alpha, beta = Row(cards[0].place if cards[0] else "", every[0]).numbers(2)
+        return alpha, beta
+
+    def _increment(self, step: Step) -> float:
+        """Return the first increment of a step."""
+        return min((step.numbers() or [step.period])[0] or step.period, step.period)
+
+    def _increments(self, step: Step) -> list[float]:
+        """Return the increments of a step at rest, which grow unless they are DIRECT."""
+        h, rest, sizes = self._increment(step), step.period, list[float]()
+        largest = [*step.numbers(), 0.0, 0.0, 0.0, 0.0][3] or step.period
+        while rest > 1e-6 * h:
+            sizes.append(min(h, rest))
+            rest -= sizes[-1]
+            if len(sizes) > 1 and not step.is_direct:
+                h = min(GROWTH * h, largest)
+        return sizes
+
+    def _time(
+        self, model: Model, steps: Sequence[Step], finer: int, integrator: HHT | None, rayleigh: Any
+    ) -> TimeIntegration:
+        """Return equal steps in time over some steps, whose increments are divided."""
+        sizes = [step.period / ceil(step.period / self._increment(step) - 1e-6) for step in steps]
+        if np.ptp(sizes) > 1e-6 * sizes[0]:
+            steps[1].card.wrong("increments that differ between dynamic steps are not supported")
+        h, count = sizes[0] / finer, round(sum(step.period for step in steps) / sizes[0])
+        model.notes.append(f"steps of {h:g}, without automatic increments")
+        if len(steps) > 1:
+            model.notes.append("loads that change at once between steps are integrated with order 1")
+        more: dict[str, Any] = {name.lower(): values for name, values in self.deck.start.items()}
+        more |= {"integrator": integrator, "rayleigh": rayleigh}
+        return TimeIntegration(h, finer * count, finer, **more)
+
+    def _in_turn(self, steps: Sequence[Step], large: bool) -> Model:
+        """Return the model whose loads and supports are those of steps in turn."""
+        is_moving = steps[0].kind in MOVING
+        for before in self.earlier(steps[0]):
+            if before.kind in MOVING or self.is_nonlinear(before) or (is_moving and before.period):
+                steps[0].card.wrong("to go on from the state of another kind of step is not supported")
+        model, times = self.model(large), np.cumsum([0.0, *(step.period for step in steps)])
+        # when the loads of each step act as a whole
+        reached = [
+            end if step.ramps else start + AT_ONCE * (end - start)
+            for start, end, step in zip(times, times[1:], steps, strict=False)
+        ]
+        self._move(model, steps, times, reached)
+        for k, step in enumerate(steps):
+            T = step.acting.temperatures
+            if self.deck.initial.any() and T.amplitudes[T.given].any():
+                step.card.wrong("amplitudes of temperatures need initial temperatures of 0 in this step")
+            if k and step.ramps and step.acting.names():
+                step.card.wrong("amplitudes after the first of several nonlinear steps are not supported")
+            factor = {name: _window(times, reached, k, each) for name, each in self._series(step).items()}
+            for load, name in self.loads(model, step.acting):
+                model.add(load, amplitude=factor[name])
+        return model
+
+    def _series(self, step: Step) -> dict[str, TimeSeries | None]:
+        """Return the amplitudes by names over the time of a step, and None for what has none."""
+        found: dict[str, TimeSeries | None] = {"": None}
+        for name, series in self.deck.amplitudes.items():
+            shift = step.start if name in self.deck.in_total_time else 0.0
+            found[name] = TimeSeries(series.times - shift, series.values)
+        return found
+
+    def _move(self, model: Model, steps: Sequence[Step], times: Array, reached: list[float]) -> None:
+        """Support a model in steps in turn, with the displacements that each prescribes."""
+        held = steps[0].held.copy()
+        for step in steps[1:]:
+            if (step.held.given != held.given).any():
+                step.card.wrong("supports that change between nonlinear steps are not supported")
+            if held.amplitudes[held.given].any() or step.held.amplitudes[held.given].any():
+                step.card.wrong("amplitudes of supports in one of several steps are not supported")
+        values = np.stack([step.held.values for step in steps], axis=-1)
+        series = {name: each for name, each in self._series(steps[0]).items() if each is not None}
+        moved = held.given & (held.amplitudes == "") & values.any(axis=-1)
+        knots = np.column_stack([reached, times[1:]]).ravel()
+        for key in np.unique(values[moved], axis=0):
+            name, at = f"steps {len(series)}", moved & (values == key).all(axis=-1)
+            held.values[at], held.amplitudes[at] = 1.0, name
+            series[name] = _table([0.0, *knots], [0.0 if steps[0].ramps else key[0], *np.repeat(key, 2)])
+        self.hold(model, held, series)
+
+
+def _window(times: Array, reached: list[float], k: int, series: TimeSeries | None) -> TimeSeries:
+    """Return the factor of what acts in step k: 0 before it, then 1 or an amplitude, and 0 in the next."""
+    start, end = times[k], times[k + 1]
+    knots, values = [reached[k], end], [1.0, 1.0]
+    if series is not None:
+        inner = (series.times > 0) & (series.times < end - start)
+        knots = [start + AT_ONCE * (end - start), *(start + series.times[inner]), end]
+        values = [series(0.0), *series.values[inner], series(end - start)]
+    if k or (series is None and reached[0] == end):
+        knots, values = [start, *knots], [0.0, *values]
+    if k + 1 < len(reached):
+        knots, values = [*knots, reached[k + 1]], [*values, 0.0]
+    return _table(knots, values)
+
+
+def _table(times: list[float], values: list[float]) -> TimeSeries:
+    """Return a series of times that ascend, some of them twice."""
+    knots, at = np.unique(times, return_index=True)
+    return TimeSeries(knots, np.array(values)[at])
+
+
+def _sweep(low: float, high: float, count: int, bias: float, modes: int) -> Callable[[Model], Array]:
+    """Return what gives the frequencies between bounds in Hz, which gather at the natural ones of a model."""
+    x = np.linspace(-1.0, 1.0, max(count, 2))
+    x = np.sign(x) * np.abs(x) ** (1 / bias)
+
+    def frequencies(model: Model) -> Array:
+        natural = model.modes(modes)[0] / (2 * pi)
+        ends = np.array([low, *natural[(natural > low) & (natural < high)], high])
+        middle, half = (ends[1:] + ends[:-1]) / 2, np.diff(ends) / 2
+        return np.asarray(2 * pi * np.unique(middle[:, None] + half[:, None] * x))
+
+    return frequencies
