@@ -292,13 +292,13 @@ class InTime(Generic[T]):
             groups.setdefault(id(getattr(load, "amplitude", load)), []).append(load)
         self._groups, self._forces_of = list(groups.values()), forces_of
         self._kept: dict[int, tuple[list[Load], T]] = {}
-        self._last: tuple[float, list[tuple[float, T]]] | None = None
+        self._last: dict[float, list[tuple[float, T]]] = {}  # of the last two times
 
     def __call__(self, time: float) -> list[tuple[float, T]]:
         """Return pairs of a factor and what the loads with it give."""
-        if self._last is None or self._last[0] != time:
-            self._last = time, self._at(time)
-        return self._last[1]
+        if time not in self._last:
+            self._last = {**dict([*self._last.items()][-1:]), time: self._at(time)}
+        return self._last[time]
 
     def _at(self, time: float) -> list[tuple[float, T]]:
         found = []
