@@ -28,8 +28,8 @@ class J2Plasticity3D(VonMises):
     The yield stress grows with the accumulated plastic strain p, and its center, the back stress, with the
     plastic strain:
 
-        σ_Y(p) = yield_stress + c(p) + hardening p
-                 + (saturation_stress - yield_stress) (1 - exp(-exponent p)),
+        σ_Y(p) = yield_stress + c(p) + hardening p + v(p),
+        v(p) = (saturation_stress - yield_stress) (1 - exp(-exponent p)),
         dα = ⅔ kinematic dε_p.
 
     Parameters
