@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 NAMES = ("XX", "YY", "ZZ", "XY", "YZ", "ZX")
 PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
 """Tensor indices of the six components."""
+ABAQUS = [0, 1, 2, 3, 5, 4]
+"""Components xx yy zz xy xz yz of Abaqus and CalculiX among those here, and these among those."""
 PLACES = ((0, 3, 5), (3, 1, 4), (5, 4, 2))
 """Component of each entry of a tensor."""
 HALF_SHEAR = np.array([1, 1, 1, 0.5, 0.5, 0.5])

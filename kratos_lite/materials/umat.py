@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from kratos_lite import voigt
 from kratos_lite.errors import MaterialError, SolveError
 from kratos_lite.materials.material import GaussState, Material, Response
 from kratos_lite.registry import remembered
 from kratos_lite.validation import finite, number, path_of, whole_number
 
-ORDER = [0, 1, 2, 3, 5, 4]
-"""Components xx yy zz xy xz yz of Abaqus among those here, and these among those."""
+ORDER = voigt.ABAQUS
 GUARD = np.full(100, np.nan)
 """What stands behind constants and state variables, which a subroutine must not use."""
 ARGUMENTS = (

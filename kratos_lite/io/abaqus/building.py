@@ -1,4 +1,4 @@
-"""The model that a deck describes, without the loads of its steps."""
+"""The models of a deck: its elements and laws, and the supports and loads of steps on them."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from kratos_lite import voigt
 from kratos_lite.analysis.model import Model
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.io.abaqus.deck import Deck, Step
 from kratos_lite.io.abaqus.loads import Acting, with_faces
-from kratos_lite.io.abaqus.materials import OURS, material_of
+from kratos_lite.io.abaqus.materials import material_of
 from kratos_lite.io.abaqus.mesh import ELEMENT_TYPES, FINITE
 from kratos_lite.io.abaqus.supports import Nodal
 from kratos_lite.mesh import NO_ROWS, Mesh, rows_of_ids, with_rows
@@ -47,8 +48,6 @@ class Building:
                 card.wrong(f"there is no *MATERIAL {name}")
             if axes and axes not in deck.orientations:
                 card.wrong(f"there is no *ORIENTATION {axes}")
-            if large and (plastic := deck.materials[name].cards.get("PLASTIC")):
-                plastic.wrong("plastic flow at large strains is not supported; leave NLGEOM out")
             deck.cards.elements_of(elset, card)
             rows = mesh.parts[elset].elements if elset in mesh.parts else NO_ROWS
             material = material_of(deck.materials[name], deck.orientations.get(axes), finite=large)
@@ -175,7 +174,7 @@ class Building:
             some, first, each = np.unique(rows, return_index=True, return_inverse=True)
             if np.abs(table[:, 2:] - table[first[each], 2:]).max() > 0:
                 card.wrong("a stress that differs between the points of an element is not supported")
-            model.add_prestress(table[first, 2:][:, OURS], some)
+            model.add_prestress(table[first, 2:][:, voigt.ABAQUS], some)
 
 
 def _centrifugal(values: tuple[float, ...]) -> Callable[[Array], Array]:

@@ -164,8 +164,6 @@ class Deck:
             self.notes.append(f"cards without effect here: {', '.join(sorted(ignored))}")
 
     def _of_material(self, card: Card) -> None:
-        if card.keyword == "DAMPING" and self._material is None:
-            card.wrong("damping is read in a *MATERIAL alone")
         if self._material is None:
             card.wrong("it belongs after *MATERIAL")
         card.check_options(OF_MATERIAL[card.keyword])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from math import pi
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -51,12 +52,10 @@ class Job:
 
     def run(self) -> None:
         """Run all steps, and write the files, or none of them."""
-        done = 0
         for case, steps in cases_of(self.deck):
             self._ask(steps[-1])
-            for line in self._run(case, done + 1):
+            for line in self._run(case, steps):
                 self.tell(line)
-            done += len(steps)
         path = self.deck.path
         with all_or_none():
             write_frd(path.with_suffix(".frd"), case.model.mesh, self.frd)
@@ -83,19 +82,23 @@ class Job:
         words += ["ERR"] if "S" in words else []  # as CalculiX does
         self.fields = [name for word, name in FILED.items() if word in ("U", *words)]
 
-    def _run(self, case: Case, step: int) -> Iterable[str]:
-        """Run a case, keep what the files get, and return the lines of its summary."""
+    def _run(self, case: Case, steps: list[Step]) -> Iterable[str]:
+        """Run the case of some steps, keep what the files get, and return the lines of its summary."""
         if case.time is not None:
-            return self._in_time(case, step)
-        outcome = run(case)
+            return self._in_time(case, steps)
+        outcome, step = run(case), self.deck.steps.index(steps[0]) + 1
         if outcome.result is not None:
-            self._keep(outcome.result, 1.0, step, 1)
-            return outcome.summary()
+            period = steps[0].period
+            self.frd.append(
+                FrdStep(at_nodes(outcome.result, self.fields), steps[0].start + period, step=step)
+            )
+            self._print(outcome.result, steps[0].start + period)
+            self._tell_status(steps[0], 1, period, period)
         if outcome.modes is not None:
             values, shapes = outcome.modes
             if other := [name for name in self.fields if name not in ("DISP", "ERROR")]:
                 self.tell(f"step {step}: not written of modes: {', '.join(other)}")
-            self.frd += steps_of_modes(values, shapes, case.buckling)
+            self.frd += [replace(one, step=step) for one in steps_of_modes(values, shapes, case.buckling)]
             self.dat += dat.buckling(values) if case.buckling else self._frequencies(case, values, shapes)
         elif outcome.response is not None:
             self._swing(outcome.response, step)
@@ -110,22 +113,27 @@ class Job:
                 fields["STRESS"] = parts[0] + 1j * parts[1]
             self.frd.append(FrdStep(fields, omega / (2 * pi), "time", step, 0))
 
-    def _in_time(self, case: Case, step: int) -> Iterable[str]:
-        """Take the steps of a case in time."""
+    def _in_time(self, case: Case, steps: list[Step]) -> Iterable[str]:
+        """Take the increments of steps in time, which count anew in each."""
         subject, states = prepare(case)
-        record = recorded(subject, self.deck.path)
-        for number, state in enumerate(states, 1):
-            fields = {k: v for k, v in record.at_nodes(state).items() if k in self.fields}
-            self.frd.append(FrdStep(fields, state.time, record.kind, step, number))
-            self._print(subject.result(state), state.time)
-            self.sta.append(_status(step, number, state.time, case.time.step if case.time else 0.0))
-        return [f"{number} increments to {state.time:g} s"]
+        record, ends = recorded(subject, self.deck.path), np.cumsum([step.period for step in steps])
+        before, number, last = 0, 0, 0.0
+        for state in states:
+            k = min(int(np.searchsorted(ends, state.time * (1 - 1e-9))), len(steps) - 1)
+            before, number = k, 1 if k > before else number + 1
+            step, total = steps[k], steps[0].start + state.time
+            fields = {name: v for name, v in record.at_nodes(state).items() if name in self.fields}
+            at = self.deck.steps.index(step) + 1, number
+            self.frd.append(FrdStep(fields, total, record.kind, *at))
+            self._print(subject.result(state), total)
+            self._tell_status(step, number, total - step.start, state.time - last)
+            last = state.time
+        return [f"{len(steps)} steps to {last:g} s"]
 
-    def _keep(self, result: Any, time: float, step: int, increment: int) -> None:
-        """Keep the fields of a result at rest, and what is printed of it."""
-        self.frd.append(FrdStep(at_nodes(result, self.fields), float(step), "static", step, increment))
-        self._print(result, float(step))
-        self.sta.append(_status(step, increment, float(step), 1.0))
+    def _tell_status(self, step: Step, increment: int, time: float, length: float) -> None:
+        """Note an increment at a time of its step."""
+        words = f"{self.deck.steps.index(step) + 1:6d}{increment:11d}{1:7d}{1:6d}"
+        self.sta.append(f"{words}{step.start + time:14.6E}{time:14.6E}{length:14.6E}\n")
 
     def _print(self, result: Any, time: float) -> None:
         """Print tables of a result."""
@@ -169,7 +177,3 @@ class Job:
 def _words(card: Card) -> list[str]:
     """Return the words on the data lines of a card."""
     return [word.upper() for row in card.rows() for word in row.fields if word]
-
-
-def _status(step: int, increment: int, time: float, length: float) -> str:
-    return f"{step:6d}{increment:11d}{1:7d}{1:6d}{time:14.6E}{time:14.6E}{length:14.6E}\n"

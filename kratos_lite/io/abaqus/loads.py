@@ -86,7 +86,8 @@ class LoadCards:
 
     def __init__(self, cards: MeshCards, mesh: Mesh) -> None:
         self.cards, self.mesh = cards, mesh
-        self._order = np.argsort(mesh.element_ids, kind="stable")
+        self._ids = mesh.element_ids  # kept, as decks may name faces line by line
+        self._order = np.argsort(self._ids, kind="stable")
         self._faces = [
             (at.start, at.stop, face_rows(block.known_shape)) for block, at in with_rows(mesh.blocks)
         ]
@@ -149,14 +150,14 @@ class LoadCards:
 
     def faces(self, ids: Ints, face: int, at: Row | Card) -> list[Face]:
         """Return a face of elements."""
-        rows = rows_of_ids(self.mesh.element_ids, ids, self._order)
+        rows = rows_of_ids(self._ids, ids, self._order)
         if (rows < 0).any():
             at.wrong(f"there is no solid element {ids[rows < 0][0]}")
         found = list[Face]()
         for start, stop, ours in self._faces:
             some = rows[(rows >= start) & (rows < stop)].tolist()
             if some and face >= len(ours):
-                text = f"element {self.mesh.element_ids[some[0]]} has {len(ours)} faces"
+                text = f"element {self._ids[some[0]]} has {len(ours)} faces"
                 at.wrong(f"{text}; got number {face + 1}")
             found += [(row, ours[face]) for row in some]
         return found

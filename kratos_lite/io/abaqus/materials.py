@@ -16,8 +16,6 @@ from kratos_lite.materials.orthotropic3d import Orthotropic3D
 from kratos_lite.model.local_axes import Cartesian, Cylindrical, LocalAxes
 from kratos_lite.typing import Array
 
-OURS = [0, 1, 2, 3, 5, 4]
-"""Where each of our components stands among those of a deck, 11 22 33 12 13 23."""
 ELASTIC = {"ISO": 2, "ORTHO": 9, "ENGINEERINGCONSTANTS": 9, "ANISO": 21}
 EXPANSION = {"ISO": 1, "ORTHO": 3, "ANISO": 6}
 """Types of cards and their numbers of constants."""
@@ -83,7 +81,7 @@ def _law(definition: Definition, axes: LocalAxes | None, finite: bool) -> Materi
         if "PLASTIC" not in cards:
             return Isotropic3D(E, nu, density, float(alpha[0]))
         if finite:
-            cards["PLASTIC"].wrong("plasticity with large displacements (NLGEOM) is not supported")
+            cards["PLASTIC"].wrong("plastic flow at large strains is not supported; leave NLGEOM out")
         return _plastic(cards["PLASTIC"], E, nu, density, float(alpha[0]))
     if "PLASTIC" in cards:
         cards["PLASTIC"].wrong("it is supported with *ELASTIC and *EXPANSION of TYPE=ISO alone")
@@ -99,7 +97,7 @@ def _expansion(definition: Definition) -> Array:
         return np.zeros(6)
     kind, given = definition.typed("EXPANSION", EXPANSION)
     given = 3 * given if kind == "ISO" else given
-    return np.array([*given, 0.0, 0.0, 0.0])[OURS] * voigt.SHEAR_TWICE
+    return np.array([*given, 0.0, 0.0, 0.0])[voigt.ABAQUS] * voigt.SHEAR_TWICE
 
 
 def _plastic(card: Card, E: float, nu: float, density: float, alpha: float) -> Material:
@@ -135,7 +133,7 @@ def _elasticity(kind: str, constants: list[float]) -> Array:
     j, i = np.tril_indices(6)  # 1111, 1122, 2222, 1133, …
     used = range(21) if kind == "ANISO" else [0, 1, 2, 3, 4, 5, 9, 14, 20]
     C[i[used], j[used]] = C[j[used], i[used]] = constants
-    return C[np.ix_(OURS, OURS)]
+    return C[np.ix_(voigt.ABAQUS, voigt.ABAQUS)]
 
 
 def _rubber(definition: Definition, density: float) -> Material:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from kratos_lite import voigt
 from kratos_lite.analysis.result import Result
 from kratos_lite.elements.surface import area_vectors
 from kratos_lite.io.writers.calculix import AT_NODES, at_gauss, at_nodes, order
@@ -16,7 +17,6 @@ from kratos_lite.quadrature import rule_for
 from kratos_lite.shapes.base import at_points
 from kratos_lite.typing import Array, Ints, Mask
 from kratos_lite.validation import choice
-from kratos_lite.voigt import tensor
 
 TENSOR = "(elem, integ.pnt.,{0}xx,{0}yy,{0}zz,{0}xy,{0}xz,{0}yz) "
 VARIABLES = {
@@ -91,7 +91,7 @@ def _of_elements(result: Result, rows: Ints, field: str, whole: bool) -> list[tu
         chosen, places = np.isin(group.rows, rows), order(group.rule)
         ids, there = result.mesh.element_ids[group.rows[chosen]], values[chosen][:, places]
         there = there.sum(axis=1, keepdims=True) if whole else there
-        there = there[..., [0, 1, 2, 3, 5, 4]] if there.shape[-1] == 6 else there
+        there = there[..., voigt.ABAQUS] if there.shape[-1] == 6 else there
         numbers = np.tile(np.arange(1, there.shape[1] + 1), len(ids))
         named = np.column_stack([ids.repeat(there.shape[1]), numbers])[:, : 1 if whole else 2]
         tables.append((named, there.reshape(len(numbers), there.shape[2])))
@@ -107,7 +107,7 @@ def section_print(result: Result, faces: Sequence[Block], where: str, time: floa
         shape, nodes = block.known_shape, block.nodes
         rule = rule_for(shape.cell, degrees[nodes.shape[1]])
         N, n = at_points(shape.N, rule.points), area_vectors(shape, X[nodes], rule)
-        force, place = np.einsum("fgij,fgj->fgi", tensor(N @ stress[nodes]), n), N @ X[nodes]
+        force, place = np.einsum("fgij,fgj->fgi", voigt.tensor(N @ stress[nodes]), n), N @ X[nodes]
         area = np.linalg.norm(n, axis=-1, keepdims=True)
         parts += np.concatenate([force, np.cross(place, force), place * area, n, area], -1).sum(axis=(0, 1))
     F, M, center, normal, area = np.split(parts, [3, 6, 9, 12])

@@ -1,79 +1,53 @@
-"""Tables of a deck that is run in place of ccx, line by line, and what is said of its cards."""
+"""What the stand-in of ccx writes: steps, increments and times, and its exit codes."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+import shutil
+import subprocess
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from kratos_lite.cli.ccx import ERROR, main
-from kratos_lite.io.abaqus.job import Job
+from kratos_lite.cli.ccx import main
 from tests.io.abaqus.conftest import CUBE
 
-SETS = "*NSET, NSET=MIXED\n8,1,6,1\n*ELSET, ELSET=TWICE\n1,1\n"
-AXES = "*TRANSFORM, NSET=TOP, TYPE=C\n0.,-1.,0.,0.,-1.,1.\n"
-LOADED = "*STEP\n*STATIC\n*CLOAD\nTOP,1,3.\n7,3,2.\n"
-TABLES = {
-    "in the order of cards and sets": SETS
-    + LOADED
-    + "*EL PRINT, ELSET=TWICE, TOTALS=YES\nS, EVOL\n*NODE PRINT, NSET=MIXED, TOTALS=YES\nU, RF\n*END STEP\n",
-    "temperatures": "*MATERIAL, NAME=M\n*ELASTIC\n1e3,.25\n*EXPANSION\n1e-5\n"
-    "*SOLID SECTION, ELSET=EALL, MATERIAL=M\n*AMPLITUDE, NAME=A\n0.,0.,1.,.5\n"
-    "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nALL,20.\n"
-    "*STEP\n*STATIC\n*TEMPERATURE, AMPLITUDE=A\nTOP,100.\n*NODE PRINT, NSET=ALL\nU, NT\n*END STEP\n",
-    "along local axes": SETS
-    + AXES
-    + LOADED
-    + "*NODE PRINT, NSET=MIXED, TOTALS=YES\nU, RF\n*NODE PRINT, NSET=ALL, GLOBAL=YES\nU\n*END STEP\n",
+OUTPUT = "*NODE FILE\nU\n*NODE PRINT, NSET=TOP\nU\n*END STEP\n"
+IN_TURN = (
+    f"*STEP,NLGEOM\n*STATIC,DIRECT\n.5,1.\n*CLOAD\nTOP,3,1.\n{OUTPUT}"
+    f"*STEP,NLGEOM\n*STATIC,DIRECT\n1.,2.\n*CLOAD\nTOP,3,2.\n{OUTPUT}"
+)
+AND_MODES = f"*STEP\n*STATIC\n.5,2.\n*CLOAD\nTOP,3,1.\n{OUTPUT}*STEP\n*FREQUENCY\n2\n{OUTPUT}"
+# step, increment, total time, time of the step, increment of time
+STATUS = {
+    IN_TURN: [(1, 1, 0.5, 0.5, 0.5), (1, 2, 1, 1, 0.5), (2, 1, 2, 1, 1), (2, 2, 3, 2, 1)],
+    AND_MODES: [(1, 1, 2, 2, 2)],
 }
 
 
-def lines(dat: str) -> list[tuple[str, np.ndarray]]:
-    """Return the words and the numbers of each line."""
-    number = re.compile(r"-?\d\.\d+E[+-]\d+")
-    found = [line for line in dat.splitlines() if line.strip()]
-    return [(number.sub("", line).strip(), np.array(number.findall(line), dtype=float)) for line in found]
+@pytest.mark.parametrize("text", STATUS, ids=["nonlinear", "modes"])
+def test_steps_increments_and_times_are_those_of_ccx(text: str, tmp_path: Path) -> None:
+    job = tmp_path / "job"
+    job.with_suffix(".inp").write_text(CUBE + text)
+
+    def heads() -> list[str]:
+        return re.findall(r"(?m)^ +1PSTEP.*|^ +100CL.*", job.with_suffix(".frd").read_text())
+
+    assert main(["-i ", str(job)]) == 0
+    rows = [line.split() for line in job.with_suffix(".sta").read_text().splitlines()[2:]]
+    assert [tuple(map(float, (*row[:2], *row[4:]))) for row in rows] == STATUS[text]
+    ours = heads()
+    assert [int(line.split()[3]) for line in ours[::2]] == ([1, 1, 2, 2] if text == IN_TURN else [1, 2, 2])
+    if shutil.which("ccx"):
+        subprocess.run(["ccx", "job"], cwd=tmp_path, capture_output=True, check=True, timeout=60)
+        assert [line[:36] + line[48:] for line in ours] == [line[:36] + line[48:] for line in heads()]
 
 
-@pytest.mark.parametrize("text", TABLES.values(), ids=TABLES)
-def test_tables_are_those_of_ccx(text: str, ccx: Callable[[str], str], tmp_path: Path) -> None:
-    (tmp_path / "job.inp").write_text(CUBE + text)
-    Job(tmp_path / "job.inp", print).run()
-    ours, theirs = lines((tmp_path / "job.dat").read_text()), lines(ccx(text))
-    assert [words.split() for words, _ in ours] == [words.split() for words, _ in theirs]
-    assert all(np.allclose(a, b, rtol=2e-6, atol=1e-10) for (_, a), (_, b) in zip(ours, theirs, strict=True))
-
-
-def test_words_that_are_not_written_are_named(tmp_path: Path) -> None:
-    told: list[str] = []
-    modes = "*STEP\n*FREQUENCY\n3\n*EL FILE\nS\n*END STEP\n"
-    axes = "*ORIENTATION, NAME=O\n1.,1.,0.,-1.,1.,0.\n"
-    cube = CUBE.replace("MATERIAL=STEEL", "MATERIAL=STEEL, ORIENTATION=O").replace(
-        "*MATERIAL", f"{axes}*MATERIAL"
-    )
-    words = "*EL PRINT, ELSET=EALL\nS\n*NODE FILE, GLOBAL=NO\nU\n*EL FILE\nS, HFL\n"
-    words += "*NODE PRINT, NSET=ALL\nQQ\n*END STEP\n"
-    (tmp_path / "job.inp").write_text(cube + LOADED + words + modes)
-    Job(tmp_path / "job.inp", told.append).run()
-    assert any("*NODEFILE: GLOBAL=NO is ignored" in line for line in told)
-    assert any("*ELFILE: not written: HFL" in line for line in told)
-    assert any("*NODEPRINT: not written: QQ" in line for line in told)
-    assert any("*ELPRINT: tables have global axes" in line for line in told)
-    assert "step 2: not written of modes: STRESS" in told
-
-
-@pytest.mark.parametrize(
-    "card", ["*SECTION PRINT, SURFACE=A, NAME=B\nSOF\n", "*EL PRINT, ELSET=A\nS\n", "*NODE PRINT\nU\n"]
-)
-def test_what_is_printed_of_nothing_is_refused(
-    card: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "job.inp").write_text(CUBE + LOADED + card + "*END STEP\n")
-    assert main(["-i", str(tmp_path / "job")]) == ERROR
-    out, err = capsys.readouterr()
-    assert "job.inp:34: *" in out
-    assert not err
+def test_an_error_is_one_line_with_the_exit_code_of_ccx_and_leaves_no_file(tmp_path: Path, capsys) -> None:
+    (tmp_path / "job.inp").write_text(CUBE + "*STEP\n*STATIC\n*CLOAD\n99,1,1.\n*END STEP\n")
+    assert main(["-i", str(tmp_path / "job")]) == 201
+    told, said = capsys.readouterr()
+    assert "*ERROR: " in told
+    assert "there is no node 99" in told
+    assert not said
     assert [path.name for path in tmp_path.iterdir()] == ["job.inp"]
