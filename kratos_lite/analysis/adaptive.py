@@ -40,7 +40,7 @@ from kratos_lite.validation import fraction, short, whole_number
 Geometry: TypeAlias = Mapping[str, Callable[[Array], Array]]
 """By part, a function that takes places (k, 3) near its true surface onto it."""
 LEAST = 1e-8  # relative error that can be requested: what rounding leaves of a solution
-BULK, BULK_FAR, FAR = 0.5, 0.8, 3.0
+BULK, BULK_FAR, FAR = 0.6, 0.8, 3.0
 """Fraction θ of the squared error that is cut, and that where the error is `FAR` times the one requested."""
 GROWTH = 1.2  # how many times more elements the next mesh has at least
 FLAT = 0.05
