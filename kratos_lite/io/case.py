@@ -194,7 +194,7 @@ class Case:
     solver, tolerance, error, backend, petsc : of a model at rest, as for `Model.solve`.
     outputs : files to write.
     expected : comparisons of the end of a model with expected values, each of which returns a line, or a
-        `Comparison` after some steps.
+        `Comparison` after some steps; of modes, each takes their frequencies.
     files : files that were read.
     then : further analyses that the input asks for, run after this one.
     """
