@@ -18,7 +18,7 @@ from kratos_lite.analysis.state import ModelInTime, State, check_state
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.gauss_point_fields import internal_load
 from kratos_lite.assembly.nonlinear_assembly import NonlinearAssembly, States, named, unnamed
-from kratos_lite.errors import InputError, ModelError, SolveError
+from kratos_lite.errors import InputError, ModelError, SolveError, naming
 from kratos_lite.mesh.mesh import place_of
 from kratos_lite.model.loads.temperature import heated
 from kratos_lite.model.structure import Structure
@@ -191,7 +191,8 @@ class QuasiStaticAnalysis(ModelInTime):
         """Come to the loads of a time, in parts where one step does not converge."""
         acting = self.model.supports.acting(end)
         if not np.array_equal(acting.fixed, self.prescribed.supports.fixed):
-            self._hold(acting)
+            with naming(f"at t = {end:g} s"):
+                self._hold(acting)
         start, begin, dead = self.time, self.load, self.applied(end)
         fields = self.prescribed.part(self.u), self.prescribed(end)
         cold, hot = self.temperatures, temperatures(self.model, end)
