@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -93,14 +93,16 @@ class TimeSeries:
 Factor: TypeAlias = "float | TimeSeries | Callable[[float], float]"
 
 
-def function_of(value: Factor, what: str) -> Callable[[float], float]:
-    """Return a number, time series or function as a function of the time."""
+def function_of(
+    value: Factor, what: str, checked: Callable[[Any, str], Any] = number
+) -> Callable[[float], Any]:
+    """Return a number, time series or function as a function of the time, whose values are checked."""
     if isinstance(value, TimeSeries):
         return value
     if callable(value):
         if isinstance(value, type) or not takes(value, 1):
             raise InputError(f"{what} must be a function of the time alone; got {short(value)}")
-        return lambda time: number(value(time), f"{what} at t = {time:g} s")
+        return lambda time: checked(value(time), f"{what} at t = {time:g} s")
     constant = finite(value, what)
     if constant.ndim:
         raise InputError(f"{what} must be a number, a TimeSeries or a function of time; got {value!r}")

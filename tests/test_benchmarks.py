@@ -303,15 +303,15 @@ def test_laws_beside_another_program():
     assert "failed" in laws.timed(sys.executable, "ours", "clay", 2)
 
 
-def folder_rows(folder, monkeypatch, law, *names):
+def folder_rows(folder, monkeypatch, law, *names, **solver):
     """Return the rows of a pulled box with a law, in a folder below that from which names count."""
     lift = process("assign_scalar_variable_process", "Structure.Top", "DISPLACEMENT_Z", value="0.01*t")
     variables = {"YIELD_STRESS": 4e6, "ISOTROPIC_HARDENING_MODULUS": 1e8}
     write(folder, box_mdpa(), "box.mdpa")
-    write(folder, materials("Structure.Body", 0.0, 2e9, 0.3, law, **variables), "materials.json")
+    write(folder, materials("Body", 7800.0, 2e9, 0.3, law, **variables), "materials.json")
     (folder / "below").mkdir()
     for name in names:
-        content = run_file([CLAMP, lift], [], mesh=name, step=0.5, analysis_type="non_linear")
+        content = run_file([CLAMP, lift], [], mesh=name, step=0.5, analysis_type="non_linear", **solver)
         write(folder / "below", content, f"{name}_parameters.json")
     monkeypatch.setattr(folders, "PAGE", folder / "page.md")
     command.main(["folders", str(folder), "--python", sys.executable])
@@ -331,6 +331,14 @@ def test_folders_of_kratos_that_are_refused_say_why(tmp_path, monkeypatch):
 def test_folders_of_kratos_agree(tmp_path, monkeypatch):
     page = folder_rows(tmp_path, monkeypatch, "PlasticityIsotropicKinematicJ2Law", "box")
     assert "| 2 | agrees | " in page
+
+
+@pytest.mark.skipif(not CONSTITUTIVE_LAWS, reason="KratosConstitutiveLawsApplication is not installed")
+def test_frequencies_of_kratos_agree_with_those_asked_of_a_solver_that_it_lacks(tmp_path, monkeypatch):
+    settings = {"solver_type": "feast", "search_dimension": 3}
+    solver = {"solver_type": "eigen_value", "eigensolver_settings": settings}
+    page = folder_rows(tmp_path, monkeypatch, "LinearElastic3DLaw", "box", **solver)
+    assert "| 3 | agrees | " in page
 
 
 def test_scenes_that_may_stall_have_ratios_to_the_block_and_to_other_solvers():

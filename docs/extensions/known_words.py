@@ -11,6 +11,7 @@ from kratos_lite.analysis.fields import FIELDS
 from kratos_lite.analysis.subjects import names_of_parts
 from kratos_lite.io.formats.mdpa.scan import LISTS, TOP
 from kratos_lite.io.kratos import (
+    eigenvalues,
     expected_values,
     expressions,
     motion,
@@ -83,6 +84,11 @@ TABLES: dict[str, Callable[[], list[str]]] = {
     "functions": lambda: [_code(sorted(expressions._FUNCTIONS))],
     "solver_settings": lambda: [_code(sorted(run_file.HARMLESS))],
     "dynamic": lambda: [_code(time_dependent.DYNAMIC_KEYS)],
+    "eigenvalues": lambda: [
+        _code(eigenvalues.EIGEN_KEYS),
+        "",
+        *_table(*((f"`{k}`", _code(v)) for k, v in eigenvalues.KEYS.items()), head="| solver | keys |"),
+    ],
     "fields": _fields,
     "ale": lambda: _table(*((f"`{k}`", _code(v)) for k, v in motion.KEYS.items()), head="| motion | keys |"),
 }

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
+from kratos_lite.errors import ModelError
 from kratos_lite.model.supports import Supports
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Mask
 
 Kinematics: TypeAlias = tuple[Array, Array, Array]
 """Displacement, velocity and acceleration (3a,)."""
@@ -29,19 +30,27 @@ class PrescribedMotion:
 
     def __call__(self, time: float) -> Array:
         """Return the displacements (3a,) in m at a time in s where the free ones are 0."""
-        resting, moving = self._fields
-        return resting + sum(function(time) * field for function, field in moving)
+        values, resting, moving = self._fields
+        total = resting.copy()
+        for function, moved, field in moving:
+            size = function(time)
+            if np.isnan(size).any():
+                text = "a support whose function returns None is one of quasi-static analysis alone"
+                raise ModelError(f"at t = {time:g} s: {text}")
+            many = np.ndim(size) > 0
+            total += self._at(np.where(moved, size[:, None], values)) - resting if many else size * field
+        return total
 
     @cached_property
-    def _fields(self) -> tuple[Array, list[tuple[Callable[[float], float], Array]]]:
-        """What is prescribed while all that moves is at 0, and the field (3a,) of each motion, at 1."""
+    def _fields(self) -> tuple[Array, Array, list[tuple[Callable[[float], Any], Mask, Array]]]:
+        """Values (n, 3) while all that moves is at 0, what they prescribe, and the motions, (3a,) at 1."""
         values = self.supports.values.copy()
         motions = self.supports.motions
         for _, moved in motions:
             values[moved] = 0.0
         resting = self._at(values)
-        moving = [(function, self._at(np.where(moved, 1.0, values)) - resting) for function, moved in motions]
-        return resting, moving
+        fields = (self._at(np.where(moved, 1.0, values)) - resting for _, moved in motions)
+        return values, resting, [(*motion, field) for motion, field in zip(motions, fields, strict=True)]
 
     def _at(self, values: Array) -> Array:
         """Return the displacements (3a,) for prescribed values (n, 3), 0 where they are free."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import replace
 from functools import partial
 from typing import Any, TypeAlias
@@ -17,10 +18,11 @@ from kratos_lite.analysis.state import ModelInTime, State, check_state
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.gauss_point_fields import internal_load
 from kratos_lite.assembly.nonlinear_assembly import NonlinearAssembly, States, named, unnamed
-from kratos_lite.errors import InputError, ModelError, SolveError
+from kratos_lite.errors import InputError, ModelError, SolveError, naming
 from kratos_lite.mesh.mesh import place_of
 from kratos_lite.model.loads.temperature import heated
 from kratos_lite.model.structure import Structure
+from kratos_lite.model.supports import Supports
 from kratos_lite.solvers.arc_length import along_path
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.direct import one_thread
@@ -103,20 +105,15 @@ class QuasiStaticAnalysis(ModelInTime):
         if model.motion is not None:
             raise ModelError("a model with a motion has no quasi-static analysis; leave the motion out")
         self.groups, self.warnings = model.checked()
-        model.free_motions(self.groups).check((), moving=False)
         mesh, supports = model.mesh, model.supports
         what = mesh.points, self.groups, supports.constraint_map
         how: dict[str, Any] = {"patterns": model.patterns, "hanging": mesh.hanging}
         self.system = ConstrainedSystem(*what, **how, attached=model.attached)
         self.applied = AppliedLoads(model, self.system, self.groups, initial=False)
-        self.prescribed = PrescribedMotion(supports, self.system)
         self.assembly = assembly_of(model, self.system)
-        plan = stepped(len(self.system.constraint_map.free), solver)
-        if arc_length:
-            plan = Plan("direct", "tangents beyond a limit point are not positive definite")
-        self.tangents = Tangents(self.system, plan, self.assembly.symmetric and not arc_length, self._at_rest)
-        self.arc_length = arc_length
+        self.solver, self.arc_length = solver, arc_length
         super().__init__(model)
+        self._hold(supports)
         self.work = 0.0
         self.u = np.zeros(3 * len(self.system.nodes))
         self.states = self.assembly.start()
@@ -134,6 +131,19 @@ class QuasiStaticAnalysis(ModelInTime):
         self.temperatures = [(factor, load) for factor, load in acting if factor]
         groups = heated(self.model.mesh, self.groups, self.temperatures)
         self.heating = [group.heating for group in groups]
+
+    def _hold(self, supports: Supports) -> None:
+        """Let the supports that act at a time hold the model."""
+        held = copy(self.model)
+        held.supports = supports
+        held.free_motions(self.groups).check((), moving=False)
+        self.system.constraint_map = supports.constraint_map(self.system.nodes)
+        self.prescribed = PrescribedMotion(supports, self.system)
+        plan = stepped(len(self.system.constraint_map.free), self.solver)
+        if self.arc_length:
+            plan = Plan("direct", "tangents beyond a limit point are not positive definite")
+        symmetric, constant = self.assembly.symmetric and not self.arc_length, self.assembly.constant
+        self.tangents = Tangents(self.system, plan, symmetric, self._at_rest, constant is not None)
 
     def _forces(self, u: Array) -> Array:
         """Return the internal forces (3a,) of the committed states at displacements (3a,)."""
@@ -179,6 +189,10 @@ class QuasiStaticAnalysis(ModelInTime):
 
     def _advance_to(self, end: float) -> None:
         """Come to the loads of a time, in parts where one step does not converge."""
+        acting = self.model.supports.acting(end)
+        if not np.array_equal(acting.fixed, self.prescribed.supports.fixed):
+            with naming(f"at t = {end:g} s"):
+                self._hold(acting)
         start, begin, dead = self.time, self.load, self.applied(end)
         fields = self.prescribed.part(self.u), self.prescribed(end)
         cold, hot = self.temperatures, temperatures(self.model, end)
@@ -323,8 +337,9 @@ class QuasiStaticAnalysis(ModelInTime):
         """Return what solves the body at rest."""
         system = self.system
         how = system.constraint_map, system.points, self.tangents.plan
-        springs = system.attached and system.attached.K
-        return LinearSolver(system.assembled(), *how, groups=system.groups, springs=springs)
+        springs, K = system.attached and system.attached.K, self.assembly.constant
+        K = system.assembled() if K is None else K
+        return LinearSolver(K, *how, groups=system.groups, springs=springs)
 
     def _shortened(self, u: Array, du: Array, r: Array, load: Callable[[Array], Load], dt: float) -> Array:
         """Return a correction, shortened until the residual does little work over it."""

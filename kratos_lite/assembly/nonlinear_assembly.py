@@ -72,6 +72,18 @@ class NonlinearAssembly:
         at_rest = internal_load(self.points, self._linear, np.zeros_like(self.points))
         return assemble_stiffness(self.points, self._linear, self.pattern), at_rest
 
+    @cached_property
+    def constant(self) -> BlockMatrix | None:
+        """The tangent of elements that are all linear, which is always the same; None of others."""
+        if not all(group.is_linear for group in self.groups):
+            return None
+        K = self._linear_part[0]
+        if self.springs is None:
+            return K
+        data = K.data.copy()
+        self.pattern.add_matrix(data, self.springs)
+        return BlockMatrix(data, K.indices, K.indptr)
+
     def evaluate(
         self, u: Array, states: States, dt: float, heating: Heating = (), *, tangent: bool = True
     ) -> tuple[Array, BlockMatrix | None, States]:
@@ -88,7 +100,7 @@ class NonlinearAssembly:
             linear = _only(groups, (group.is_linear for group in groups))
             at_rest = internal_load(self.points, linear, np.zeros_like(self.points))
         forces = at_rest + (K @ u.ravel()).reshape(-1, 3)
-        data = K.data.copy() if tangent else None
+        data = K.data.copy() if tangent and self.constant is None else None
         if any(map(len, self._lagrange)):
             for number, group in enumerate(self._lagrange):
                 if len(group):  # it looks for inverted elements
@@ -109,7 +121,8 @@ class NonlinearAssembly:
             forces += (self.springs @ displacement).reshape(-1, 3)
             if data is not None:
                 self.pattern.add_matrix(data, self.springs)
-        return forces.ravel(), None if data is None else BlockMatrix(data, K.indices, K.indptr), new
+        found = self.constant if data is None else BlockMatrix(data, K.indices, K.indptr)
+        return forces.ravel(), found, new
 
     def strained(self, u: Array) -> Array:
         """Return the displacements (n, 3) that strain the body, those beyond the stress-free ones."""

@@ -114,9 +114,10 @@ def _take_modes(case: Case, options: Namespace) -> None:
     (name, value), *others = given(options, *MODAL).items()
     if others:
         raise InputError(f"--{name} and --{others[0][0]}: give one of them")
-    refuse(options, ("json", "state"), "does not hold modes or responses; -o OUT does")
+    other = ("state", *(["json"] if name == "harmonic" else []))
+    refuse(options, other, "does not hold modes or responses; -o OUT does")
     refuse(options, ("error",), "is for statics; modes are those of the mesh as it is")
-    case.time, case.outputs, case.buckling = None, Outputs(), name == "buckling"
+    case.time, case.above, case.outputs, case.buckling = None, None, Outputs(), name == "buckling"
     case.modes, case.harmonic = (0, value) if name == "harmonic" else (value, None)
 
 

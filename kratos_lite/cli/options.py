@@ -73,7 +73,11 @@ def _all(*options: Option, **columns: Any) -> tuple[Option, ...]:
 GROUPS = {
     "output (instead of the files that the input names)": (
         Option("-o --output", "OUT", OUTPUT, many=True),
-        Option("--json", "OUT.json", "summary, displacements and reactions by node id"),
+        Option(
+            "--json",
+            "OUT.json",
+            "summary, displacements and reactions by node id; of modes their frequencies",
+        ),
         Option("--picture", "OUT.png", PICTURE),
         Option(
             "--state", "OUT.npz", "last state in time, for --restart; written after Ctrl-C too", only="time"

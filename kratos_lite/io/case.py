@@ -186,6 +186,7 @@ class Case:
     subject : the model, whose `notes` tell what was not used; or the body, which may hold many.
     time : how it moves through time, or None where it rests.
     modes : number of requested natural frequencies, or 0.
+    above : rad/s, the frequency from which on the modes are, or None for the lowest ones.
     buckling : whether the modes are shapes of buckling, with factors of the loads.
     preload : whether the stress of the loads stiffens or softens in natural frequencies.
     harmonic : options of `Model.harmonic` for the response to loads that swing, or None; its frequencies may
@@ -193,7 +194,7 @@ class Case:
     solver, tolerance, error, backend, petsc : of a model at rest, as for `Model.solve`.
     outputs : files to write.
     expected : comparisons of the end of a model with expected values, each of which returns a line, or a
-        `Comparison` after some steps.
+        `Comparison` after some steps; of modes, each takes their frequencies.
     files : files that were read.
     then : further analyses that the input asks for, run after this one.
     """
@@ -201,6 +202,7 @@ class Case:
     subject: Model | Body
     time: TimeIntegration | None = None
     modes: int = 0
+    above: float | None = None
     buckling: bool = False
     preload: bool = False
     harmonic: dict[str, Any] | None = None

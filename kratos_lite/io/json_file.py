@@ -25,7 +25,7 @@ def read_json(path: str | Path) -> Any:
     InputError for anything that is not strict JSON in UTF-8, with line and column of wrong syntax: also for a
     key that is given twice, NaN or Infinity, an integer of more than 19 digits, a number that overflows.
     """
-    data = read_bytes(path)
+    data = read_bytes(path, long_lines=True)
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:

@@ -15,14 +15,14 @@ from kratos_lite.io.formats.document import Note
 from kratos_lite.typing import Ints
 
 MAX_LINE = 1_000_000
-"""Longest line that is read, in bytes."""
+"""Longest line that is read, in bytes, but for JSON, which programs write in one."""
 MAX_ID = 2**63 - 1
 _REAL = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?", re.ASCII)
 # An unclosed comment runs to the end, so that the search stays linear in time.
 _COMMENT = re.compile(rb"//[^\n]*|/\*.*?(?:\*/|(\Z))", re.DOTALL)
 
 
-def read_bytes(path: str | Path) -> bytes:
+def read_bytes(path: str | Path, long_lines: bool = False) -> bytes:
     """Return an input file with LF line ends, unzipped if it is gzipped; InputError where it is no text."""
     path = Path(path)
     try:
@@ -46,7 +46,7 @@ def read_bytes(path: str | Path) -> bytes:
     if (nul := data.find(b"\0")) >= 0:
         line, column = line_column(data, nul)
         raise InputError(f"{path}:{line}:{column}: NUL byte; is this a text file?")
-    if len(data) > MAX_LINE and (long := _long_line(data)):
+    if not long_lines and len(data) > MAX_LINE and (long := _long_line(data)):
         raise InputError(f"{path}:{long}: a line of more than {MAX_LINE} bytes; break it up")
     return data
 

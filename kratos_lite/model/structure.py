@@ -79,7 +79,7 @@ class Structure(Solid):
         self,
         where: Where,
         axes: str = "xyz",
-        value: ArrayLike | Callable[[float], float] = 0.0,
+        value: ArrayLike | Callable[[float], Any] = 0.0,
         *,
         field: Callable[[Array], ArrayLike] | None = None,
         override: bool = False,
@@ -93,7 +93,8 @@ class Structure(Solid):
         where : part name, point (x, y, z) in m, predicate on the points (n, 3), mask or node indices.
         axes : some of ``"x"``, ``"y"``, ``"z"``, such as ``"xz"``.
         value : m; one number, one per axis, or one row per node; or a `TimeSeries` or function of time in s,
-            which statics take at the time 0.
+            which statics take at the time 0.  A function returns a number, or (n,) for all nodes; in
+            quasi-static analysis also None, where the support does not act.
         field : in place of a value, a function of places (k, 3) in m that returns one row per node or one
             number per axis in m.  A mesh that is made finer takes its values, others are interpolated.
         override : let this value win over an earlier one for the same degree of freedom, and this support

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,7 +18,7 @@ from kratos_lite.solvers.constraints import ConstraintMap, Constraints, constrai
 from kratos_lite.solvers.elimination import Redundant, eliminate, independent
 from kratos_lite.time_series import function_of
 from kratos_lite.typing import Array, ArrayLike, Csr, Ints, Mask
-from kratos_lite.validation import finite, short, whole_numbers
+from kratos_lite.validation import finite, number, short, whole_numbers
 
 AXES = "xyz"
 CONSTANT = -1
@@ -42,7 +43,7 @@ class DirichletCondition:
     where: Where  # the nodes as the caller chose them, and their indices
     nodes: Ints
     axes: str  # such as ``"xz"``
-    value: ArrayLike | Callable[[float], float] = 0.0  # m; as the caller gave it, or a function of time in s
+    value: ArrayLike | Callable[[float], Any] = 0.0  # m; as the caller gave it, or a function of time in s
     field: Callable[[Array], ArrayLike] | None = None  # function of places, or None
     override: bool = False  # whether it replaces earlier ones
     name: str | None = None  # of the support, or None
@@ -73,7 +74,7 @@ class Supports:
         self._fixed: Mask = np.zeros(mesh.points.shape, dtype=bool)
         self._values: Array = np.zeros(mesh.points.shape)
         self._function = np.full(mesh.points.shape, CONSTANT, dtype=np.int32)
-        self._functions: list[tuple[object, Callable[[float], float]]] = []
+        self._functions: list[tuple[object, Callable[[float], Any]]] = []
         self.fixed, self.values = self._fixed.view(), self._values.view()  # values at the time 0, in m
         self.fixed.flags.writeable = self.values.flags.writeable = False
         self.hanging = self._constraints = hanging_constraints(mesh)
@@ -156,6 +157,7 @@ class Supports:
             if condition.local is not None:
                 raise InputError("a support in local axes has a constant value; got a function of time")
             function, value = self._number(value)
+            value = value[nodes, None] if np.ndim(value) else value
         elif condition.field is not None:
             value = condition.field(self.mesh.points[nodes])
         new = finite(value, "a prescribed displacement")
@@ -198,15 +200,23 @@ class Supports:
         self._inclined += Constraints.of(dependents[some], others[some], weights[some], constants[some])
         self.changed()
 
-    def _number(self, function: Callable[[float], float]) -> tuple[int, float]:
+    def _number(self, function: Callable[[float], Any]) -> tuple[int, Any]:
         """Return the number of a function of time, and its value at the time 0."""
-        checked = function_of(function, "a prescribed displacement")
+        checked = function_of(function, "a prescribed displacement", self._displacement)
         start = checked(0.0)
-        for number, (known, _) in enumerate(self._functions):
+        if np.isnan(start).any():
+            raise InputError("a prescribed displacement at t = 0 s must be a number; got None")
+        for i, (known, _) in enumerate(self._functions):
             if known is function:
-                return number, start
+                return i, start
         self._functions.append((function, checked))
         return len(self._functions) - 1, start
+
+    def _displacement(self, found: Any, what: str) -> Any:
+        """Return a displacement in m, or those of all nodes (n,); nan for None."""
+        if found is None:
+            return np.nan
+        return finite(found, what, (self.mesh.n_nodes,)) if np.ndim(found) else number(found, what)
 
     def _check_prescribed_once(self, at: tuple[Ints, ...], new: Array, function: int) -> None:
         """Raise ModelError if degrees of freedom have another value, or another function of time."""
@@ -222,10 +232,22 @@ class Supports:
             )
 
     @property
-    def motions(self) -> list[tuple[Callable[[float], float], Mask]]:
-        """Functions of the time in s that return m, each with the degrees of freedom (n, 3) that it moves."""
+    def motions(self) -> list[tuple[Callable[[float], Any], Mask]]:
+        """Functions of the time in s that return m, for all nodes (n,) or one; and what each moves (n, 3)."""
         moved = [(function, self._function == number) for number, (_, function) in enumerate(self._functions)]
         return [(function, mask) for function, mask in moved if mask.any()]
+
+    def acting(self, time: float) -> Supports:
+        """Return the supports at a time in s: these, without what has a function that returns None then."""
+        idle = [moved for function, moved in self.motions if np.isnan(function(time)).any()]
+        if not idle:
+            return self
+        other, kept = copy(self), ~np.any(idle, axis=0)
+        other._fixed, other._values = self._fixed & kept, self._values * kept
+        other._function = np.where(kept, self._function, CONSTANT)
+        other.fixed, other.values = other._fixed, other._values
+        other.changed()
+        return other
 
     # ---- multi-point constraints ------------------------------------------------------------------------
 

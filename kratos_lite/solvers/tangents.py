@@ -25,12 +25,18 @@ class Tangents:
     """What solves (K - changes) du = f with the tangents K of a step."""
 
     # Where multigrid solves them, a step begins with that of the body at rest, not with the last one of the
-    # step before, which a restart does not know, and keeps it while it serves.
+    # step before, which a restart does not know, and keeps it while it serves.  A constant K is that at rest.
 
     def __init__(
-        self, system: ConstrainedSystem, plan: Plan, symmetric: bool, rest: Callable[[], LinearSolver]
+        self,
+        system: ConstrainedSystem,
+        plan: Plan,
+        symmetric: bool,
+        rest: Callable[[], LinearSolver],
+        constant: bool = False,
     ) -> None:
         self._system, self.plan, self._symmetric, self._make_rest = system, plan, symmetric, rest
+        self._constant = constant
         self._near: LinearSolver | None = None
 
     @cached_property
@@ -51,6 +57,8 @@ class Tangents:
         The residuals of the step so far say how far a correction is worth being solved.
         """
         iterates = self.plan.iterates
+        if self._constant and not changes:
+            return [self._rest.solve(each, 0.1 * tolerance, None, jump, jump).x for each in forces]
         if iterates and len(residuals) == 1:
             self._near = self._rest
         if iterates and changes and self._near is None:

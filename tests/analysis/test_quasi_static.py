@@ -287,3 +287,31 @@ def test_a_step_begins_where_the_last_ones_lead():
     bar_of_glue.add(kl.Traction("z+", (0, 0, 1e3)), amplitude=lambda t: t**2)  # a parabola all the way
     parts = steps(bar_of_glue, 1.0, 8).reports
     assert [report.iterations for report in parts][3:] == [0] * 5
+
+
+def test_supports_that_let_go_where_they_must_not_are_refused():
+    bar = kl.Model(kl.box(), kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0))
+    bar.fix("z-", "xyz", lambda t: None if t > 1.5 else 0.0)
+    states = kl.integrate(bar.quasi_static(), 1.0, 2)
+    next(states)
+    with pytest.raises(kl.ModelError, match=r"at t = 2 s: .*rigid-body modes free"):
+        next(states)
+    with pytest.raises(kl.InputError, match=r"at t = 0 s must be a number; got None"):
+        bar.fix("z+", "z", lambda t: None)
+    with pytest.raises(kl.ModelError, match=r"returns None is one of quasi-static analysis alone"):
+        list(kl.integrate(bar.transient(), 1.0, 2))
+
+
+def test_a_support_moves_with_places_and_time():
+    """A twist that grows: the same as its field, at each time."""
+    mesh = kl.box((2.0, 1.0, 1.0), (2, 1, 1))
+    bar = kl.Model(mesh, kl.Isotropic3D(E=1e9, nu=0.3))
+    bar.fix("x-")
+    bar.fix("x+", "y", lambda t: -0.01 * t * mesh.points[:, 2])
+    bar.fix("x+", "z", lambda t: 0.01 * t * mesh.points[:, 1])
+    still = kl.Model(mesh, kl.Isotropic3D(E=1e9, nu=0.3))
+    still.fix("x-")
+    still.fix("x+", "yz", field=lambda X: 0.01 * np.stack([-X[:, 2], X[:, 1]], axis=1))
+    u = still.solve().u
+    for state in kl.integrate(bar.quasi_static(), 0.5, 3):
+        assert np.abs(state.u - state.time * u).max() < 1e-12

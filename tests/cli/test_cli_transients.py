@@ -326,7 +326,7 @@ def test_shapes_of_buckling_are_told_and_written_as_modes_are(run, folder):
     ("words", "said"),
     [
         (("-o", "a.vtu"), "a.vtu: modes are written as .pvd (for ParaView), .html or .frd"),
-        (("--json", "a.json"), "--json does not hold modes or responses; -o OUT does"),
+        (("--json", "a.txt"), "a.txt"),
         (("--vtu", "ascii"), "--vtu ascii: there is no output to write so; add -o OUT.pvd"),
         (("--picture", "a.xyz"), "a.xyz: pictures cannot be written as .xyz"),
     ],

@@ -82,6 +82,11 @@ def test_byte_order_mark_is_skipped_and_other_encodings_are_refused(tmp_path):
         read_json(path)
 
 
+def test_a_line_of_megabytes_is_read_as_kratos_writes_it(tmp_path):
+    (tmp_path / "results.json").write_text('{"TIME": [' + "0.5, " * 250_000 + "1.0]}")
+    assert len(read_json(tmp_path / "results.json")["TIME"]) == 250_001
+
+
 def test_a_missing_file_and_a_folder_are_named(tmp_path):
     with pytest.raises(InputError, match="no such file"):
         read_json(tmp_path / "none.json")

@@ -58,6 +58,12 @@ class RunContext:
     moved: bool = True  # Kratos would move the nodes with the displacement.
     outside: bool = False  # files outside the folder may be named.
 
+    def rounded(self, time: float) -> float:
+        """Return a time in s, or that of a step which it is but for rounding."""
+        slack = 1e-9 * abs(time)
+        near = self.times[min(bisect_left(self.times, time - slack), len(self.times) - 1)]
+        return near if abs(near - time) <= slack else float(time)
+
     def part(self, settings: Settings, key: str = "model_part_name") -> Part:
         """Return the part that a key names; the root's name may stand before it, or alone for all."""
         mesh, name = self.mesh, settings.text(key)

@@ -1,8 +1,7 @@
 """Processes of a Kratos run file: what they set and fix on nodes and conditions, and when.
 
 Kratos runs all processes before every time step, in order, and takes their supports back after
-it; values stay.  A static linear solution depends on the last step alone, so each process acts
-here once, at the last time at which Kratos would run it, in the order of those times.
+it; values stay.
 """
 
 from __future__ import annotations
@@ -185,22 +184,10 @@ def _fixed(settings: Settings, process: Process) -> list[bool]:
 
 
 def run(actions: Sequence[Action], context: RunContext, notes: list[str], values: Variables) -> None:
-    """Bring the values and supports to what they are at the last step; add notes."""
+    """Bring the values and supports to what they are in the one step of a run; add notes."""
     set_values(actions, context.times, values)
-    last, supports = len(context.times) - 1, [action for action in actions if action.fixed and action.steps]
-    for action in supports:
-        if action.steps[0] < last:  # a support of an earlier step is taken back after it
-            values.fix(action.component, action.indices, False)
-    for action in supports:
-        # What is fixed at the start, before the first step, stays so through that step.
-        if action.steps[-1] == last or (action.steps == [0] and last == 1):
-            is_whole = bool(action.factors) or len(action.steps) == last
-            text = (
-                f"{action.component} is fixed only from a later step on, at the value solved before; "
-                'kratos_lite solves one step: use the interval [0.0, "End"] or assign a value'
-            )
-            is_displacement = action.component.startswith("DISPLACEMENT")
-            action.settings.expect(is_whole or not is_displacement, "interval", text)
+    for action in actions:
+        if action.fixed and action.steps:
             values.fix(action.component, action.indices)
     notes += notes_of(actions, context)
 

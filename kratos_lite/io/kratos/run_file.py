@@ -1,22 +1,23 @@
 """Kratos run files: ``ProjectParameters.json`` with its materials file and its mesh.
 
-Solids at rest, in quasi-static steps or in time, in the style of 2019 and in the present one.
+Solids at rest, in quasi-static steps or in time, or their modes, in the style of 2019 and the present one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from kratos_lite.analysis.model import Model
-from kratos_lite.analysis.result import Result
 from kratos_lite.errors import Problems, nearest
 from kratos_lite.io.case import Case
 from kratos_lite.io.formats import read_document
 from kratos_lite.io.formats.document import Document
 from kratos_lite.io.formats.part_files import part_files, read_part
 from kratos_lite.io.kratos.context import RunContext, module_of, times_of
+from kratos_lite.io.kratos.eigenvalues import EIGEN, EIGEN_KEYS, eigenvalue_comparisons, modes_of
 from kratos_lite.io.kratos.expected_values import COMPARISONS
 from kratos_lite.io.kratos.initial_state import MODULE, initial_state_of
 from kratos_lite.io.kratos.laws import is_nonlinear, make_linear, notes_on_stress, quasi_static_of
@@ -46,6 +47,7 @@ OTHER_PHYSICS = (
     "use_orthogonal_subscales", "contact_settings", "mpc_contact_settings", "computing_sub_model_part_name",
 )  # fmt: skip
 """Solver settings that, unless false or empty, ask for equations that kratos_lite does not have."""
+CHECK = "check_eigenvalues_process"
 OUTPUTS = ("save_restart_process", "timer_process", "print_info_in_file_process")
 
 
@@ -65,9 +67,12 @@ def read_kratos_project(
         text = "this is no run file of Kratos, which has 'solver_settings'"
         raise settings.error("", f"{text}; write a Python script with a 'case'")
     solver = settings.section("solver_settings", required=True)
+    dynamic, eigen = (solver.text("solver_type") in kinds for kinds in (DYNAMIC, (EIGEN,)))
     times = times_of(settings.section("problem_data", required=True), solver)
-    dynamic = solver.text("solver_type") in DYNAMIC
+    if eigen or (settings.section("ale").values and not dynamic):
+        times = [times[0], times[-1]]  # one solution, at the end
     notes = _check_solver(solver) + _check_root(settings)
+    modes, above = modes_of(solver, notes) if eigen else (0, None)
     document = set_apart(_read_mesh(solver, folder, allow_outside, notes, part))
     root, moved = solver.text("model_part_name", "Structure"), solver.flag("move_mesh_flag", True)
     context = RunContext(document.mesh, root, folder, times, moved, allow_outside)
@@ -76,18 +81,16 @@ def read_kratos_project(
     notes += make_linear(document) if small else []
     nonlinear = is_nonlinear(document)
     notes += notes_on_stress(document)
-    if not small and not nonlinear:
+    if not (small or nonlinear or eigen):
         notes.append("analysis_type is non_linear: the linear solution is computed, on the undeformed body")
-    steps = quasi_static_of(solver, times) if nonlinear and not dynamic else None
+    steps = quasi_static_of(solver, times) if not (dynamic or eigen) else None
     in_steps = steps is not None and len(times) > 2
-    if not dynamic and not in_steps:
-        text = "supports, loads and motion are taken at the end of the run"
-        notes.append(f"{text}: those at t = {times[-1]:g} s")
-    actions, checks, states = _read_processes(settings, context, notes)
+    compare = {CHECK: eigenvalue_comparisons} if eigen else COMPARISONS
+    actions, checks, states = _read_processes(settings, context, notes, compare)
     for action in actions:
         if action.component == TEMPERATURE:
             action.settings.expect(expanding(document, True), "variable_name", NO_EXPANSION)
-    in_time = ProcessesInTime(actions, context, dynamic, nonlinear) if dynamic or in_steps else None
+    in_time = ProcessesInTime(actions, context, dynamic) if dynamic or in_steps else None
     processes = partial(run, actions, context, notes) if in_time is None else in_time.prepare
     initial_displacement = initial_displacement and in_time is None
     model = model_from(document, initial_displacement=initial_displacement, processes=processes)
@@ -96,7 +99,7 @@ def read_kratos_project(
     add_motion(model, settings, None if in_time else times[-1])
     model.notes += notes
     if in_time is None:
-        return Case(model, expected=checks, files=settings.files)
+        return Case(model, modes=modes, above=above, expected=checks, files=settings.files)
     in_time.finish(model)
     time = time_integration_of(settings, in_time) if dynamic else steps
     return Case(model, time, expected=checks, files=settings.files)
@@ -116,9 +119,8 @@ def _check_root(settings: Settings) -> list[str]:
 def _check_solver(solver: Settings) -> list[str]:
     """Refuse what is not a solid in three dimensions; note what is treated otherwise."""
     kind, analysis = solver.text("solver_type"), solver.text("analysis_type", "non_linear")
-    text = f"solver_type {kind!r}: run files are solved as 'static' or 'dynamic'"
-    is_solved = kind in ("Static", "static", *DYNAMIC)
-    solver.expect(is_solved, "solver_type", f"{text}; take 'static', then --modes for frequencies")
+    text = f"solver_type {kind!r}: run files are solved as 'static', 'dynamic' or {EIGEN!r}"
+    solver.expect(kind in ("Static", "static", EIGEN, *DYNAMIC), "solver_type", text)
     size = solver.integer("domain_size")
     solver.expect(size == 3, "domain_size", f"must be 3; got {size}")
     text = f"must be 'linear' or 'non_linear'; got {analysis!r}"
@@ -126,7 +128,8 @@ def _check_solver(solver: Settings) -> list[str]:
     for key in OTHER_PHYSICS:
         text = f"{key} is not supported; kratos_lite solves for displacements of all elements"
         solver.expect(not solver.values.get(key), key, text)
-    known = (*HARMLESS, *OTHER_PHYSICS, *(DYNAMIC_KEYS if kind in DYNAMIC else ()))
+    own = DYNAMIC_KEYS if kind in DYNAMIC else EIGEN_KEYS if kind == EIGEN else ()
+    known = (*HARMLESS, *OTHER_PHYSICS, *own)
     notes = [f"solver setting {key!r} is not used.{nearest(key, known)}" for key in solver.unknown(known)]
     chosen = solver.section("linear_solver_settings").text("solver_type", "")
     return notes + ([f"linear solver {chosen}: kratos_lite chooses its own"] if chosen else [])
@@ -167,11 +170,14 @@ def _use_materials(solver: Settings, context: RunContext, document: Document, no
 
 
 def _read_processes(
-    settings: Settings, context: RunContext, notes: list[str]
-) -> tuple[list[Action], list[Callable[[Result], str]], list[Callable[[Model], None]]]:
+    settings: Settings,
+    context: RunContext,
+    notes: list[str],
+    compare: Mapping[str, Callable[[Settings, RunContext], Iterable[Callable[[Any], str]]]],
+) -> tuple[list[Action], list[Callable[[Any], str]], list[Callable[[Model], None]]]:
     """Return what processes do, check and begin with; all that are unknown are reported together."""
     actions: list[Action] = []
-    checks: list[Callable[[Result], str]] = []
+    checks: list[Callable[[Any], str]] = []
     states: list[Callable[[Model], None]] = []
     problems = Problems()
     for section in (settings.section("processes"), settings.section("output_processes")):
@@ -183,13 +189,15 @@ def _read_processes(
                     actions += actions_of(entry, module, context)
                 elif module == MODULE:
                     states.append(initial_state_of(entry.section("Parameters", required=True), context))
-                elif module in COMPARISONS:
-                    checks += COMPARISONS[module](entry.section("Parameters", required=True), context)
+                elif module in compare:
+                    checks += compare[module](entry.section("Parameters", required=True), context)
+                elif module in (CHECK, *COMPARISONS):
+                    notes.append(f"{entry.path}: {module} is not evaluated: there are no such values")
                 elif module.endswith("_output_process") or module in OUTPUTS:
                     text = f"{module} is not run; ask kratos_lite for files with --output"
                     notes.append(f"{entry.path}: {text}")
                 else:
-                    known = [*PROCESSES, *COMPARISONS, MODULE]
+                    known = [*PROCESSES, *COMPARISONS, CHECK, MODULE]
                     text = f"unknown process {module!r}.{nearest(module, known)} Known are {', '.join(known)}"
                     problems.add(str(entry.error("", text)))
     problems.raise_if_any()

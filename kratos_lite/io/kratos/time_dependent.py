@@ -6,7 +6,7 @@ motions with the acceleration 0, as if nothing acted at the start: so loads act 
 
 from __future__ import annotations
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Sequence
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING
@@ -20,13 +20,15 @@ from kratos_lite.io.kratos.context import RunContext
 from kratos_lite.io.kratos.processes import Action, notes_of, places_of, set_values
 from kratos_lite.io.kratos.variables import LOADING, TEMPERATURE, Variables
 from kratos_lite.io.settings import Settings
+from kratos_lite.mesh.blocks import mask_of
 from kratos_lite.model.loads import Load, ScaledLoad, TimeDependentLoad
-from kratos_lite.typing import Ints
+from kratos_lite.typing import Array, Ints, Mask
 
 if TYPE_CHECKING:
     from kratos_lite.analysis.integrators import ModelIntegrator
 
 LoadOf = Callable[[Variables], "Load | None"]
+Motion = Callable[[float], "Array | float | None"]
 DYNAMIC = ("Dynamic", "dynamic")
 """Kratos' solver_type of what moves."""
 RAYLEIGH = ("rayleigh_alpha", "rayleigh_beta")
@@ -41,15 +43,12 @@ UNPRESCRIBED = ("VELOCITY", "ACCELERATION")
 class ProcessesInTime:
     """The processes of a run file as supports, loads and initial state of a transient, or of static steps."""
 
-    def __init__(
-        self, actions: Sequence[Action], context: RunContext, dynamic: bool = True, follows: bool = False
-    ) -> None:
+    def __init__(self, actions: Sequence[Action], context: RunContext, dynamic: bool = True) -> None:
         self.context, self.dynamic = context, dynamic
-        self.follows = follows  # whether loads on faces follow the body
         self.notes = notes_of(actions, context)
         self.actions = [action for action in actions if action.steps and len(action.indices)]
         self._later: list[Load] = []
-        self._moving: list[tuple[Ints, str, Callable[[float], float]]] = []
+        self._moving: list[tuple[Ints, str, Motion]] = []
 
     def prepare(self, values: Variables) -> None:
         """Bring values and supports to what stays in time, and keep what changes for `finish`."""
@@ -61,9 +60,8 @@ class ProcessesInTime:
         for action in self.actions:
             if action.fixed:
                 values.fix(action.component, action.indices)
-        for i, action in enumerate(self.actions):
-            if action.component.startswith("DISPLACEMENT") and action.factors:
-                self._move(i, action, values)
+        for axis in "XYZ":
+            self._hold(f"DISPLACEMENT_{axis}", base)
         heated = filter(values.temperature, values.expanding)
         loads: list[tuple[frozenset[str], LoadOf]] = [
             (GRAVITY, Variables.gravity),
@@ -74,9 +72,9 @@ class ProcessesInTime:
             actions = [action for action in self.actions if action.component in group]
             if any(action.mentions("t") or not self._acts_always(action) for action in actions):
                 if group is SURFACE:
-                    values.note_idle(self.notes, follows=self.follows)
+                    values.note_idle(self.notes)
                 values.drop(group)
-                self._later.append(TimeDependentLoad(_load_in_time(actions, times, base, load_of)))
+                self._later.append(TimeDependentLoad(_load_in_time(actions, self.context, base, load_of)))
         values.drop({f"{name}_{axis}" for name in UNPRESCRIBED for axis in "XYZ"})
 
     def finish(self, model: Model) -> None:
@@ -105,12 +103,6 @@ class ProcessesInTime:
             )
             prescribed = self.dynamic and action.fixed and name.startswith(UNPRESCRIBED)
             expect(not prescribed, "variable_name", text)
-            text = (
-                f"{name} is fixed in a part of the run only; fix it from start to end, "
-                '"interval": [0.0, "End"], or give "constrained": false for an initial value'
-            )
-            is_support = action.fixed and name.startswith("DISPLACEMENT")
-            expect(not is_support or self._in_turn(action), "interval", text)
         for name, fixed in values.fixed.items() if self.dynamic else ():
             if name.startswith(UNPRESCRIBED) and fixed.any():
                 raise InputError(f"{values.mesh.source}: {name} is fixed; only DISPLACEMENT can be")
@@ -136,48 +128,58 @@ class ProcessesInTime:
             self.notes.append("VELOCITY of fixed nodes is omitted; Kratos keeps it in the first step")
         self.displacement, self.velocity = u if u.any() else None, v if v.any() else None
 
-    def _move(self, i: int, action: Action, values: Variables) -> None:
-        """Keep the motion of the supports that an action gives; refuse one of a part of the run."""
-        name, expect = action.component, action.settings.expect
-        fixed = values.fixed.get(name, np.zeros(values.mesh.n_nodes, dtype=bool))
-        indices = action.indices[fixed[action.indices]]
-        if not len(indices) or self._acts(action) == 0:
+    def _hold(self, name: str, base: Variables) -> None:
+        """Keep how the supports of a component move, come and go."""
+        n, actions = base.mesh.n_nodes, [each for each in self.actions if each.component == name]
+        held = base.fixed.get(name, np.zeros(n, dtype=bool))
+        touched = np.stack([held, *(mask_of(each.indices, n) for each in actions)])
+        nodes = np.flatnonzero(touched[[True, *(each.fixed for each in actions)]].any(axis=0))
+        kinds, of = np.unique(touched[:, nodes], axis=1, return_inverse=True)
+        for k, (is_held, *acts) in enumerate(kinds.T):
+            turns = [each for each, does in zip(actions, acts, strict=True) if does]
+            if turns:
+                values = base.nodal.scalar(name)
+                self._take_turns(nodes[of.ravel() == k], name, turns, bool(is_held), values)
+
+    def _take_turns(self, nodes: Ints, name: str, turns: list[Action], held: bool, given: Array) -> None:
+        """Keep how nodes move that some actions hold in turn; refuse what only a solution would tell."""
+        fixed, when, last = _timeline(turns, held, len(self.context.times))
+        used = [turns[i - 1] if i else None for i in np.unique(last[1:][fixed[1:]])]
+        place = next((each for each in turns if each.fixed), turns[0]).settings
+        text = (
+            f"{name} is fixed in a part of the run only; fix it from start to end, "
+            '"interval": [0.0, "End"], or give "constrained": false for an initial value'
+        )
+        place.expect(not self.dynamic or bool(fixed[1:].all()), "interval", text)
+        begins = np.flatnonzero(fixed[2:] & ~fixed[1:-1]) + 2
+        text = f"{name} is fixed only from a later step on, at the value solved before; assign one there"
+        place.expect(bool((when[begins] == begins).all()), "interval", text)
+        if fixed[1:].all() and len(used) == 1 and not (used[0] and used[0].mentions("t")):
             return
         text = f"{name} of a support changes in a part of the run only; give it as one function of t"
-        turns = self._in_turn(action)
-        expect(turns, "interval", text + ' with the interval [0.0, "End"]')
-        if turns[0] is not action:
-            return
-        for later in self.actions[i + 1 :]:
-            if later.component == name and later.factors and self._acts_always(later):
-                indices = np.setdiff1d(indices, later.indices)
-        if not len(indices) or not (action.mentions("t") or turns[1:]):
-            return
-        text = f"{name}: a support may move with x, y, z or with t, not with both; "
-        mixed = any(each.mentions("xyzXYZ") for each in turns)
-        expect(not mixed, "value", text + "give each part a process of its own")
-        point, times = np.zeros((1, 3)), self.context.times
+        in_turn = sum(self._acts(each) for each in used if each) == len(fixed) - 1
+        place.expect(not self.dynamic or in_turn, "interval", text + ' with the interval [0.0, "End"]')
+        self._moving.append((nodes, name[-1].lower(), self._motion(used, fixed, given)))
 
-        def motion(time: float) -> float:
-            last = [_last_time(each, times, time) for each in turns]
-            when, i = max(((t, i) for i, t in enumerate(last) if t is not None), default=(time, 0))
-            return float(turns[i].value(point, when))
+    def _motion(self, used: list[Action | None], fixed: Mask, given: Array) -> Motion:
+        """Return the displacement by the time that actions, or None for the mesh file, give in turn."""
+        points, times = self.context.mesh.points, self.context.times
+        varies = any(each is None or each.mentions("xyzXYZ") for each in used)
+        first = times[int(fixed[1:].argmax()) + 1]
 
-        self._moving.append((indices, name[-1].lower(), motion))
+        def motion(time: float) -> Array | float | None:
+            time = self.context.rounded(time)
+            if not self.dynamic:
+                time = time if time > times[0] else first
+                if not fixed[min(bisect_left(times, time), len(times) - 1)]:
+                    return None
+            acting = [(times[0] if each is None else _last_time(each, times, time)) for each in used]
+            t, i = max(((t, i) for i, t in enumerate(acting) if t is not None), default=(time, 0))
+            action = used[i]
+            value = given if action is None else action.value(points if varies else points[:1], t)
+            return np.broadcast_to(value, len(points)) if varies else float(np.ravel(value)[0])
 
-    def _in_turn(self, action: Action) -> list[Action]:
-        """Return the actions that act in turn from start to end, one of them here; [] if none do."""
-        if self._acts_always(action):
-            return [action]
-        kind = action.component, action.fixed, bool(action.factors)
-        alike = [
-            each
-            for each in self.actions
-            if (each.component, each.fixed, bool(each.factors)) == kind
-            and np.array_equal(each.indices, action.indices)
-        ]
-        steps = {step for each in alike for step in each.steps if step}
-        return alike if len(steps) == len(self.context.times) - 1 else []
+        return motion
 
     def _acts(self, action: Action) -> int:
         """Return the number of steps, without the start, in which an action acts."""
@@ -187,11 +189,29 @@ class ProcessesInTime:
         return self._acts(action) == len(self.context.times) - 1
 
 
+def _timeline(turns: Sequence[Action], held: bool, count: int) -> tuple[Mask, Ints, Ints]:
+    """Return for each step whether nodes are fixed, when their value was set, and by which action, from 1.
+
+    0 stands for the mesh file, which sets values at the start, and may hold the nodes all the time.
+    """
+    fixed, at = np.full(count, held), np.full((len(turns) + 1, count), -1)
+    at[0] = 0
+    for each, row in zip(turns, at[1:], strict=True):
+        if each.factors:
+            row[each.steps] = each.steps
+        if each.fixed:
+            fixed[each.steps] = True
+            fixed[1] |= each.steps[0] == 0  # what is fixed before the first step is so through it
+    at = np.maximum.accumulate(at, axis=1)
+    when = at.max(axis=0)
+    return fixed, when, len(turns) - (at[::-1] == when).argmax(axis=0)
+
+
 def _load_in_time(
-    actions: Sequence[Action], times: Sequence[float], base: Variables, load_of: LoadOf
+    actions: Sequence[Action], context: RunContext, base: Variables, load_of: LoadOf
 ) -> Callable[[float], Load | None]:
     """Return the load of some actions as a function of the time; the same object while nothing changes."""
-    places = places_of(base.mesh)
+    places, times = places_of(base.mesh), context.times
 
     @lru_cache(maxsize=1)
     def load(acting: tuple[tuple[int, float], ...]) -> Load | None:
@@ -203,7 +223,7 @@ def _load_in_time(
     def at(time: float) -> Load | None:
         if not time > times[0]:
             return None
-        last = [_last_time(action, times, float(time)) for action in actions]
+        last = [_last_time(action, times, context.rounded(time)) for action in actions]
         acting = sorted((when, i) for i, when in enumerate(last) if when is not None)
         return load(tuple((i, when if actions[i].mentions("t") else 0.0) for when, i in acting))
 

@@ -51,7 +51,7 @@ def model_from(
     for number in sorted(used & document.properties.keys()):
         apply_properties(model, document.properties[number], materials, problems)
     problems.raise_if_any()
-    values = Variables(document.mesh, expanding(document, materials))
+    values = Variables(document.mesh, expanding(document, materials), model.is_nonlinear)
     _fill(values, document, model)
     u0 = values.nodal.vector("DISPLACEMENT")
     if processes:

@@ -85,8 +85,8 @@ class Fields(dict[str, Array]):
 class Variables:
     """Values of variables on the nodes and conditions of a mesh; later values replace earlier ones."""
 
-    def __init__(self, mesh: Mesh, expanding: Sequence[Properties] = ()) -> None:
-        self.mesh = mesh
+    def __init__(self, mesh: Mesh, expanding: Sequence[Properties] = (), follows: bool = False) -> None:
+        self.mesh, self.follows = mesh, follows  # whether loads on faces follow the body
         self.expanding = expanding  # the properties of elements that a temperature strains
         self.nodal, self.conditional = Fields(mesh.n_nodes), Fields(mesh.n_conditions)
         self.fixed: dict[str, Mask] = {}
@@ -98,7 +98,7 @@ class Variables:
 
     def copy(self) -> Variables:
         """Return a copy that can be changed without changing this."""
-        other = Variables(self.mesh, self.expanding)
+        other = Variables(self.mesh, self.expanding, self.follows)
         other.nodal, other.conditional = self.nodal.copy(), self.conditional.copy()
         other.fixed = {name: fixed.copy() for name, fixed in self.fixed.items()}
         return other
@@ -127,7 +127,7 @@ class Variables:
         for load in (self.gravity(), self.condition_loads(), *map(self.temperature, self.expanding)):
             if load is not None:
                 model.add(load)
-        self.note_idle(model.notes, follows=model.is_nonlinear)
+        self.note_idle(model.notes)
         idle = {*self.nodal, *self.conditional} - LOADING | {TEMPERATURE} & self.conditional.keys()
         for name in sorted(idle):
             if self.nodal.scalar(name).any() or self.conditional.scalar(name).any():
@@ -157,15 +157,16 @@ class Variables:
         )
         values = (force, *nodal_force.values(), pressure, nodal_pressure)
         is_loaded = len(carriers) > 0 and any(value.any() for value in values)
-        return ConditionLoads(force, nodal_force, pressure, nodal_pressure) if is_loaded else None
+        given = force, nodal_force, pressure, nodal_pressure
+        return ConditionLoads(*given, follower=self.follows) if is_loaded else None
 
-    def note_idle(self, notes: list[str], *, follows: bool = False) -> None:
+    def note_idle(self, notes: list[str]) -> None:
         """Note loads where nothing carries them, and pressures that follow deformed faces in Kratos only."""
         # Kratos adds the stiffness of such a pressure to K even in a linear analysis; its small-displacement
         # conditions do not.
         self._note_uncarried(notes)
         loads = self.condition_loads()
-        if not follows and loads is not None and (loads.pressure.any() or loads.nodal_pressure.any()):
+        if not self.follows and loads is not None and (loads.pressure.any() or loads.nodal_pressure.any()):
             kinds = {block.name for block in self.mesh.conditions if len(block)}
             for name in sorted(kind for kind in kinds if kind.startswith("SurfaceLoadCondition")):
                 how = f"acts on the undeformed body, as that of SmallDisplacement{name} in Kratos"

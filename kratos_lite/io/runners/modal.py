@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
+from kratos_lite.errors import SolveError
 from kratos_lite.io.case import Case
 from kratos_lite.io.runners.outcome import Outcome
-from kratos_lite.io.writers.modes import names_of_modes, write_modes
+from kratos_lite.io.writers.modes import names_of_modes, write_modes, write_modes_json
 from kratos_lite.io.writers.pictures import write_picture
-from kratos_lite.typing import Progress
+from kratos_lite.typing import Array, Progress
 
 DRAWN = 6
 """Modes in a picture."""
@@ -39,7 +40,7 @@ def run(case: Case, progress: Progress | None = None) -> Outcome:
         values, shapes = model.buckling(count, progress=progress)
         rows = [f"{i:>4}  {factor:>14.8g}" for i, factor in enumerate(values.tolist(), 1)]
     elif model.motion is None:
-        values, shapes = model.modes(count, preload=case.preload or None, progress=progress)
+        values, shapes = _real_modes(case, progress)
         rows = [f"{i:>4}  {w / (2 * pi):>14.8g}  {w:>14.8g}" for i, w in enumerate(values.tolist(), 1)]
     else:
         head += f"  {'growth 1/s':>14}"
@@ -54,9 +55,24 @@ def run(case: Case, progress: Progress | None = None) -> Outcome:
     return Outcome(case, [], lines=[head, *rows], modes=(values, shapes))
 
 
+def _real_modes(case: Case, progress: Progress | None) -> tuple[Array, Array]:
+    """Return the lowest frequencies in rad/s, or those from one on, and their shapes."""
+    model, count, above = case.model, case.modes, case.above
+    if above is None:
+        return model.modes(count, preload=case.preload or None, progress=progress)
+    for tried in (count, 2 * count, 4 * count, 8 * count):
+        values, shapes = model.modes(tried, near=above, progress=progress)
+        chosen = np.flatnonzero(values >= above)[:count]
+        if len(chosen) == count:
+            return values[chosen], shapes[chosen]
+    raise SolveError(f"{count} modes above {above:g} rad/s are not among the {tried} nearest; ask for more")
+
+
 def _write(case: Case, values: Any, shapes: Any) -> None:
     """Write the modes and their picture, which shows the first ones side by side."""
     outputs, mesh = case.outputs, case.model.mesh
+    if outputs.json is not None:
+        write_modes_json(outputs.json, values, buckling=case.buckling)
     for path in outputs.results:
         write_modes(path, mesh, values, shapes, mode=outputs.mode or "binary", buckling=case.buckling)
     if outputs.picture is not None:

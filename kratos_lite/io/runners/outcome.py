@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from kratos_lite.analysis.result import Result
-from kratos_lite.io.case import Case
+from kratos_lite.io.case import Case, Comparison
 from kratos_lite.io.outputs import write_at_end
 from kratos_lite.tabular import in_units
 
@@ -70,6 +70,9 @@ class Outcome:
         list of str
             Nothing where there is no result.
         """
+        if self.modes is not None:
+            of_modes = (each for each in self.case.expected if not isinstance(each, Comparison))
+            return [each(self.modes[0]) for each in of_modes]
         return [] if self.result is None else self.case.compare(self.result, self.found)
 
     def write(self) -> list[str]:

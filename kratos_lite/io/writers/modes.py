@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite.analysis.fields import FIELDS
+from kratos_lite.atomic import write_whole
 from kratos_lite.errors import InputError
 from kratos_lite.io.formats.vtu import write_pvd, write_vtu
 from kratos_lite.io.writers.endings import check_modes
@@ -116,3 +117,18 @@ def _name(value: complex) -> str:
     if isinstance(value, complex):
         return f"{abs(value.imag) / (2 * pi):.5g} Hz, growth {value.real:.3g} 1/s"
     return f"{value / (2 * pi):.5g} Hz"
+
+
+def write_modes_json(path: str | Path, values: Array | Complexes, buckling: bool = False) -> None:
+    """Write factors; or frequencies in Hz with ω² as Kratos names it, or with the growth in 1/s."""
+    import json
+
+    from kratos_lite import __version__
+
+    if buckling:
+        numbers = {"factors": values.tolist()}
+    elif np.iscomplexobj(values):
+        numbers = {"frequencies": (values.imag / (2 * pi)).tolist(), "growth": values.real.tolist()}
+    else:
+        numbers = {"frequencies": (values / (2 * pi)).tolist(), "EIGENVALUE_VECTOR": (values**2).tolist()}
+    write_whole(path, json.dumps({"kratos_lite": __version__, **numbers}).encode())

@@ -284,12 +284,18 @@ class ConditionLoads(Load):
     """Starts of the names of conditions whose loads act on deformed faces and lines, as in Kratos."""
 
     def __init__(
-        self, force: Array, nodal_force: dict[str, Array], pressure: Array, nodal_pressure: Array
+        self,
+        force: Array,
+        nodal_force: dict[str, Array],
+        pressure: Array,
+        nodal_pressure: Array,
+        follower: bool = True,
     ) -> None:
         self.force = force  # (c, 3) of conditions; Pa on faces, N/m on lines, N on points
         self.nodal_force = nodal_force  # (n, 3) by the cell of the conditions that carry it
         self.pressure = pressure  # (c,) Pa, against the normal by the right hand about the nodes
         self.nodal_pressure = nodal_pressure  # (n,) Pa
+        self.follower = follower  # whether they act on deformed faces
 
     def __repr__(self) -> str:
         loaded = self.force.any(axis=1) | (self.pressure != 0)
@@ -350,6 +356,7 @@ class ConditionLoads(Load):
             {cell: finer.interpolate(force) for cell, force in self.nodal_force.items()},
             self.pressure[finer.conditions],
             finer.interpolate(self.nodal_pressure),
+            self.follower,
         )
 
 

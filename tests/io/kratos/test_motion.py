@@ -145,7 +145,7 @@ def test_a_section_of_a_run_file_is_no_note_and_its_mistakes_are_located(folder)
         (("--rotation", "-z:30"), "--rotation: an axis is 'x', 'y', 'z' or a vector; got '-z'"),
         (("--rotation", "z:1", "--damping", "-2"), "a damping must be one number ≥ 0, in 1/s; got -2.0"),
         (("--damping", "2"), "--damping belongs to --rotation or --translation"),
-        (("--modes", "3", "--json", "a.json"), "does not hold modes or responses; -o OUT does"),
+        (("--harmonic", "0:1:2", "--json", "a.json"), "does not hold modes or responses; -o OUT does"),
         (("--center-velocity", "1,0,0"), "--center-velocity belongs to --rotation; give that too"),
         (
             ("--moving-part", "x-"),

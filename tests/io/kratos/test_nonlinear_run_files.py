@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from run_files import CLAMP, box_mdpa, materials, process, run_file, write
+from run_files import CLAMP, box_mdpa, cube, materials, process, run_file, write
 from scenes import SHARED
 
 import kratos_lite as kl
@@ -137,7 +137,7 @@ def test_another_stress_of_kratos_is_noted(tmp_path):
 def test_linear_takes_elements_and_laws_of_small_strains(tmp_path, run):
     path = write(box(tmp_path), pressed(step=0.5))
     case = read_case(path, linear=True)
-    assert case.analysis == "static"
+    assert case.analysis == "quasi_static"
     notes = " ".join(case.model.notes)
     assert "TotalLagrangianElement3D8N is solved as KinematicLinear3D8N with small displacements" in notes
     assert "KirchhoffSaintVenant3DLaw is solved with its elasticity at rest" in notes
@@ -152,46 +152,6 @@ def test_linear_takes_elements_and_laws_of_small_strains(tmp_path, run):
     model.add(kl.Pressure("x+", 2e8))
     assert np.abs(u - in_order(model.solve())).max() < 1e-10
     assert run("solve", path, "--linear").code == 0
-
-
-def cube(folder, intervals, checks=(), law="SmallStrainJ2Plasticity3DLaw", **settings):
-    """Write a cube of 1 m on rollers, pulled by 0.01 t along z, as a folder of Kratos's tests is made."""
-    (folder / "box.mdpa").write_text(cell_mdpa())
-    steel = {"YIELD_STRESS": 200e6, "ISOTROPIC_HARDENING_MODULUS": 400e6, "HARDENING_EXPONENT": 0.0}
-    steel |= {"EXPONENTIAL_SATURATION_YIELD_STRESS": 200e6}
-    write(folder, materials("Structure.Body", 0.0, 200e9, 0.3, law, **steel), "materials.json")
-    vector = "assign_vector_variable_process"
-    supports = [
-        process(vector, f"Structure.{axis}-", "DISPLACEMENT", **held("XYZ".index(axis), 0.0))
-        for axis in "XYZ"
-    ]
-    for value, interval in intervals:
-        supports.append(process(vector, "Structure.Top", "DISPLACEMENT", interval=interval, **held(2, value)))
-    content = run_file(supports, [], step=0.2, end=2.0, checks=checks, analysis_type="non_linear", **settings)
-    return write(folder, content)
-
-
-def cell_mdpa():
-    """Return a cube of one element and its faces as .mdpa text."""
-    corners = kl.KinematicLinear3D8N.nodes / 2 + 0.5
-    nodes = "".join(f"{i} {x} {y} {z}\n" for i, (x, y, z) in enumerate(corners, start=1))
-    text = f"Begin Properties 0\nEnd Properties\nBegin Nodes\n{nodes}End Nodes\n"
-    text += "Begin Elements SmallDisplacementElement3D8N\n1 0 1 2 3 4 5 6 7 8\nEnd Elements\n"
-    faces = {"X-": corners[:, 0] == 0, "Y-": corners[:, 1] == 0, "Z-": corners[:, 2] == 0}
-    for name, chosen in (faces | {"Top": corners[:, 2] == 1, "Body": corners[:, 0] >= 0}).items():
-        rows = "".join(f"{i + 1}\n" for i in np.flatnonzero(chosen))
-        text += f"Begin SubModelPart {name}\nBegin SubModelPartNodes\n{rows}End SubModelPartNodes\n"
-        text += "Begin SubModelPartElements\n1\nEnd SubModelPartElements\n" if name == "Body" else ""
-        text += "End SubModelPart\n"
-    return text
-
-
-def held(axis, value):
-    """Return what a process needs to prescribe one component."""
-    return {
-        "constrained": [i == axis for i in range(3)],
-        "value": [value if i == axis else None for i in range(3)],
-    }
 
 
 def in_file(**variables):
@@ -248,10 +208,29 @@ def test_processes_hold_nodes_in_turn(tmp_path):
     assert np.abs(np.array(tops) - np.array(exact)[:, None]).max() < 1e-15
 
 
-def test_a_support_in_a_part_of_the_run_is_refused(tmp_path):
-    for intervals in ([IN_TURN[0]], [IN_TURN[0], ("0.02", [1.5, 2.0])]):
-        with pytest.raises(InputError, match="DISPLACEMENT_Z is fixed in a part of the run only"):
-            read_case(cube(tmp_path, intervals))
+def test_a_support_lets_go_and_takes_hold_again(tmp_path):
+    """What is released keeps its plastic strain, and is pulled on from there."""
+    case = read_case(cube(tmp_path, [("0.01*t", [0.0, 1.1]), ("0.02", [1.5, 2.0])]))
+    analysis, states = prepare(case)
+    E, slope = 200e9, 80e12 / 200.4e3  # H E / (E + H)
+    pulled = [200e6 + slope * (e - 1e-3) for e in (0.01, 0.02)]
+    rest = 0.01 - pulled[0] / E
+    found = [(state.u[4:, 2], analysis.result().stress()[..., 2]) for state in states]
+    exact = [(e, 200e6 + slope * (e - 1e-3)) for e in (0.002, 0.004, 0.006, 0.008, 0.01)]
+    exact += [(rest, 0.0)] * 2 + [(0.02, pulled[1])] * 3 + [(0.02 - pulled[1] / E, 0.0)]
+    assert len(found) == len(exact)
+    for (u, stress), (length, wanted) in zip(found, exact, strict=True):
+        assert np.abs(u - length).max() < 1e-11
+        assert np.abs(stress - wanted).max() < 1.0
+
+
+def test_a_support_that_takes_hold_where_the_body_is_is_refused(tmp_path):
+    path = cube(tmp_path, [IN_TURN[0]])
+    content = json.loads(path.read_text())
+    late = process("fix_scalar_variable_process", "Structure.Top", "DISPLACEMENT_Z", interval=[1.5, "End"])
+    content["processes"]["constraints_process_list"].append(late)
+    with pytest.raises(InputError, match="fixed only from a later step on, at the value solved before"):
+        read_case(write(tmp_path, content))
 
 
 def test_steps_of_a_table_are_those_of_kratos(tmp_path):

@@ -26,6 +26,7 @@ from scenes import case, present
 import kratos_lite as kl
 from kratos_lite.errors import ModelError
 from kratos_lite.io.files import read_case
+from kratos_lite.io.run import prepare
 
 SCALAR, VECTOR_ON_CONDITIONS = (
     "assign_scalar_variable_process",
@@ -81,7 +82,11 @@ def test_the_same_folder_runs_in_kratos_and_here(folder, content):
     run_kratos(folder)
     expected = json.loads((folder / "kratos.json").read_text())
     project = read_case(path)
-    result = project.model.solve()
+    result = kl.run(project).result
+    if project.time is not None:
+        for state, step in zip(prepare(read_case(path))[1], expected["steps"], strict=True):
+            wanted = np.array([step[str(i)] for i in result.mesh.node_ids])
+            assert np.abs(state.u - wanted).max() < 1e-10 * np.abs(wanted).max()
     for name, found in (("DISPLACEMENT", result.displacement()), ("REACTION", result.reaction())):
         reference = np.array([expected[name][str(i)] for i in result.mesh.node_ids])
         scale = np.abs(reference).max()
@@ -117,7 +122,7 @@ def test_2019_folder_runs_and_its_own_check_passes(name, part, component, expect
     (line,) = project.compare(project.model.solve())
     assert line.startswith(f"check {component} on {part}")
     assert re.search(rf"passed \(node \d+: found {expected:g}, expected {expected:g}", line)
-    for text in ("beside the run file is read", "analysis_type is non_linear", "those at t = 1.1 s"):
+    for text in ("beside the run file is read", "analysis_type is non_linear"):
         assert any(text in note for note in project.model.notes)
 
 

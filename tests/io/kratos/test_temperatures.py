@@ -98,11 +98,12 @@ def test_temperatures_that_mean_nothing_are_refused_with_their_line(mdpa, proper
 
 
 def test_a_process_imposes_a_function(case):
-    model = case([imposed("20 + 100*x*t", interval=[0.0, "End"])], end=1.0, step=0.5).model
-    T = model.loads[0].difference(model.mesh)
+    run = case([imposed("20 + 100*x*t", interval=[0.0, "End"])], end=1.0, step=0.5)
+    model = run.model
+    T = model.loads[0].at(1.0).difference(model.mesh)
     assert np.abs(T - 100 * model.mesh.points[:, 0]).max() < 1e-12
     assert not any("TEMPERATURE" in note for note in model.notes if "static" in note or "ignored" in note)
-    result = model.solve()
+    result = kl.run(run).result
     free = kl.Model(model.mesh, kl.Isotropic3D(E, NU, alpha=ALPHA))
     free.fix("z-", "xyz")
     free.add(kl.Temperature(lambda X: 100 * X[:, 0]))

@@ -149,12 +149,12 @@ def test_a_support_that_changes_for_a_while_is_refused(write, value):
         read_case(path)
 
 
-def test_a_kratos_file_with_the_key_time_of_ours_stays_at_rest(write, run):
+def test_a_kratos_file_with_the_key_time_of_ours_keeps_its_own_steps(write, run):
     path = write(*CLAMP)
     content = {**json.loads(path.read_text()), "time": {"step": 1.0, "steps": 2}}
     content["solver_settings"]["solver_type"] = "static"
     path.write_text(json.dumps(content))
-    assert read_case(path).time is None
+    assert read_case(path).time.steps == 20
     assert "key 'time' is not used" in run("solve", path).out
 
 
