@@ -12,7 +12,7 @@ from typing import Any
 
 from kratos_lite.analysis.model import Model
 from kratos_lite.errors import Problems, nearest
-from kratos_lite.io.case import Case
+from kratos_lite.io.case import Case, Outputs
 from kratos_lite.io.formats import read_document
 from kratos_lite.io.formats.document import Document
 from kratos_lite.io.formats.part_files import part_files, read_part
@@ -22,6 +22,7 @@ from kratos_lite.io.kratos.expected_values import COMPARISONS
 from kratos_lite.io.kratos.initial_state import MODULE, initial_state_of
 from kratos_lite.io.kratos.laws import is_nonlinear, make_linear, notes_on_stress, quasi_static_of
 from kratos_lite.io.kratos.motion import add_motion
+from kratos_lite.io.kratos.outputs import OUTPUT_PROCESSES, OutputProcess
 from kratos_lite.io.kratos.point_elements import set_apart
 from kratos_lite.io.kratos.processes import PROCESSES, Action, actions_of, run
 from kratos_lite.io.kratos.properties import NO_EXPANSION, expanding, use_materials
@@ -48,7 +49,7 @@ OTHER_PHYSICS = (
 )  # fmt: skip
 """Solver settings that, unless false or empty, ask for equations that kratos_lite does not have."""
 CHECK = "check_eigenvalues_process"
-OUTPUTS = ("save_restart_process", "timer_process", "print_info_in_file_process")
+NOT_RUN = ("save_restart_process", "timer_process", "print_info_in_file_process")
 
 
 def read_kratos_project(
@@ -86,7 +87,8 @@ def read_kratos_project(
     steps = quasi_static_of(solver, times) if not (dynamic or eigen) else None
     in_steps = steps is not None and len(times) > 2
     compare = {CHECK: eigenvalue_comparisons} if eigen else COMPARISONS
-    actions, checks, states = _read_processes(settings, context, notes, compare)
+    actions, checks, states, written = _read_processes(settings, context, notes, compare)
+    outputs = Outputs(in_steps=list(written))
     for action in actions:
         if action.component == TEMPERATURE:
             action.settings.expect(expanding(document, True), "variable_name", NO_EXPANSION)
@@ -99,10 +101,10 @@ def read_kratos_project(
     add_motion(model, settings, None if in_time else times[-1])
     model.notes += notes
     if in_time is None:
-        return Case(model, modes=modes, above=above, expected=checks, files=settings.files)
+        return Case(model, modes=modes, above=above, outputs=outputs, expected=checks, files=settings.files)
     in_time.finish(model)
     time = time_integration_of(settings, in_time) if dynamic else steps
-    return Case(model, time, expected=checks, files=settings.files)
+    return Case(model, time, outputs=outputs, expected=checks, files=settings.files)
 
 
 def _check_root(settings: Settings) -> list[str]:
@@ -174,11 +176,12 @@ def _read_processes(
     context: RunContext,
     notes: list[str],
     compare: Mapping[str, Callable[[Settings, RunContext], Iterable[Callable[[Any], str]]]],
-) -> tuple[list[Action], list[Callable[[Any], str]], list[Callable[[Model], None]]]:
-    """Return what processes do, check and begin with; all that are unknown are reported together."""
+) -> tuple[list[Action], list[Callable[[Any], str]], list[Callable[[Model], None]], list[OutputProcess]]:
+    """Return what processes do, check, begin with and write; all that are unknown are reported together."""
     actions: list[Action] = []
     checks: list[Callable[[Any], str]] = []
     states: list[Callable[[Model], None]] = []
+    written: list[OutputProcess] = []
     problems = Problems()
     for section in (settings.section("processes"), settings.section("output_processes")):
         # Kratos keeps the lists in alphabetical order; later processes replace earlier values.
@@ -193,12 +196,15 @@ def _read_processes(
                     checks += compare[module](entry.section("Parameters", required=True), context)
                 elif module in (CHECK, *COMPARISONS):
                     notes.append(f"{entry.path}: {module} is not evaluated: there are no such values")
-                elif module.endswith("_output_process") or module in OUTPUTS:
-                    text = f"{module} is not run; ask kratos_lite for files with --output"
-                    notes.append(f"{entry.path}: {text}")
+                elif module in OUTPUT_PROCESSES:
+                    output = OUTPUT_PROCESSES[module](entry.section("Parameters", required=True), context)
+                    written.append(output)
+                    notes += [f"{entry.path}: {output.note}"] if output.note else []
+                elif module in NOT_RUN:
+                    notes.append(f"{entry.path}: {module} is not run")
                 else:
-                    known = [*PROCESSES, *COMPARISONS, CHECK, MODULE]
+                    known = [*PROCESSES, *COMPARISONS, CHECK, MODULE, *OUTPUT_PROCESSES]
                     text = f"unknown process {module!r}.{nearest(module, known)} Known are {', '.join(known)}"
                     problems.add(str(entry.error("", text)))
     problems.raise_if_any()
-    return actions, checks, states
+    return actions, checks, states, written
