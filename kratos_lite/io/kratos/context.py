@@ -21,6 +21,10 @@ MAX_STEPS = 1_000_000
 """Steps of a run; each process lists those in which it acts."""
 
 
+class Omission(str):
+    """A note on what Kratos would do, and kratos_lite does not: ``--strict`` makes it an error."""
+
+
 @dataclass(frozen=True)
 class Interval:
     """Span of time in s in which a process acts, with the tolerance of Kratos.
@@ -57,6 +61,7 @@ class RunContext:
     times: Sequence[float] = (0.0, 1.0)  # start time and the time of every step, s.
     moved: bool = True  # Kratos would move the nodes with the displacement.
     outside: bool = False  # files outside the folder may be named.
+    dofs: tuple[str, ...] = ("DISPLACEMENT",)  # what the names of variables that can be fixed begin with.
 
     def part(self, settings: Settings, key: str = "model_part_name") -> Part:
         """Return the part that a key names; the root's name may stand before it, or alone for all."""
