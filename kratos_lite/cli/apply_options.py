@@ -13,6 +13,7 @@ from kratos_lite.cli.options import OF_A_CASE, only
 from kratos_lite.errors import InputError, nearest
 from kratos_lite.io.case import Case, Outputs, TimeIntegration
 from kratos_lite.io.files import read_case
+from kratos_lite.io.kratos.context import Omission
 from kratos_lite.materials import MATERIALS
 from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.loads.nodal import PointLoad
@@ -49,6 +50,9 @@ def case_of(options: Namespace, part: int | None = None) -> Case:
         refuse(options, MODAL, "does not go with a file of several steps")
     for number, each in enumerate((case, *case.then), 1):
         _apply(each, options, f"-{number}" if case.then else "")
+        omitted = [n for n in each.model.notes if isinstance(n, Omission)] if each.is_of_model else []
+        if options.strict and omitted:
+            raise InputError("\n".join([f"{options.input}: --strict: Kratos would do more:", *omitted]))
     return case
 
 

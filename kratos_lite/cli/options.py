@@ -103,6 +103,7 @@ GROUPS = {
         Option("--formulation", "WORD", FORMULATION, only="models"),
         Option("--scale", "FACTOR", "on the coordinates of a mesh file: a number, or mm, cm, in, ft (1)"),
         Option("--units", "SET", UNITS),
+        Option("--strict", None, "refuse a file of Kratos of which not all is done that Kratos would do"),
         Option("--linear", None, "small displacements and linear laws, whatever a run file asks for"),
         Option("--ignore-initial-displacement", None, STRESS_FREE),
     ),

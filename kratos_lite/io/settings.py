@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from difflib import get_close_matches
 from os.path import isdir
 from pathlib import Path
 from typing import Any, TypeVar
@@ -68,7 +69,8 @@ class Settings:
         if key in self.values:
             return self.values[key]
         if default is REQUIRED:
-            raise InputError(f"{self.source}: key {self.name(key)!r} is missing")
+            slip = "".join(f"; is it {word!r}?" for word in get_close_matches(key, self.values, 1, 0.75))
+            raise InputError(f"{self.source}: key {self.name(key)!r} is missing{slip}")
         return default
 
     def _typed(self, key: str, default: Any, fits: bool, kind: str) -> Any:
@@ -133,11 +135,25 @@ class Settings:
         return [key for key in self.values if key not in set(known)]
 
     def check_keys(self, known: Iterable[str]) -> None:
-        """Raise InputError at the first key that is not among the known ones."""
-        known = list(known)
-        for key in self.unknown(known):
-            hint = f"{nearest(key, known)} The keys are {', '.join(known)}"
+        """Raise InputError at the first key that is not known; where examples are, also for another kind."""
+        examples = known if isinstance(known, Mapping) else dict.fromkeys(known)
+        for key in self.unknown(examples):
+            hint = nearest(key, examples)
+            hint += f" The keys are {', '.join(examples)}" if len(examples) < 25 or not hint else ""
             raise InputError(f"{self.source}: unknown key {self.name(key)!r}.{hint}")
+        for key, value in self.values.items():
+            if examples[key] is not None and kind_of(value) != kind_of(examples[key]):
+                raise self.error(key, f"must be {kind_of(examples[key])}; got {shown(value)}")
+
+
+def kind_of(value: Any) -> str:
+    """Return what a JSON value is, in words.
+
+    >>> kind_of(1), kind_of(True), kind_of({})
+    ('a number', 'true or false', 'an object {…}')
+    """
+    kinds = {bool: "true or false", str: "a string", list: "a list […]", dict: "an object {…}"}
+    return "a number" if is_number(value) else kinds.get(type(value), "null")
 
 
 def shown(value: Any) -> str:

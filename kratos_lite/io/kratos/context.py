@@ -22,6 +22,10 @@ MAX_STEPS = 1_000_000
 """Steps of a run; each process lists those in which it acts."""
 
 
+class Omission(str):
+    """A note on what Kratos would do, and kratos_lite does not: ``--strict`` makes it an error."""
+
+
 @dataclass(frozen=True)
 class Interval:
     """Span of time in s in which a process acts, with the tolerance of Kratos.
@@ -58,6 +62,7 @@ class RunContext:
     times: Sequence[float] = (0.0, 1.0)  # start time and the time of every step, s.
     moved: bool = True  # Kratos would move the nodes with the displacement.
     outside: bool = False  # files outside the folder may be named.
+    dofs: tuple[str, ...] = ("DISPLACEMENT",)  # what the names of variables that can be fixed begin with.
 
     def rounded(self, time: float) -> float:
         """Return a time in s, or that of a step which it is but for rounding."""

@@ -14,10 +14,14 @@ from kratos_lite.io.settings import Settings
 
 EIGEN = "eigen_value"
 """Kratos' solver_type of natural frequencies."""
-EIGEN_KEYS = (
-    "scheme_type", "eigensolver_settings", "eigensolver_diagonal_values", "compute_modal_decomposition",
-    "normalize_eigenvectors_with_mass_matrix",
-)  # fmt: skip
+EIGEN_KEYS: dict[str, Any] = {
+    "scheme_type": "",
+    "eigensolver_settings": {},
+    "eigensolver_diagonal_values": {},
+    "compute_modal_decomposition": False,
+    "normalize_eigenvectors_with_mass_matrix": False,
+}
+"""Its solver settings beside those of all, with a value of the kind of each."""
 COMMON = ("solver_type", "max_iteration", "echo_level", "number_of_eigenvalues")
 KEYS = {
     "spectra_sym_g_eigs_shift": (*COMMON, "normalize_eigenvectors", "shift"),

@@ -33,7 +33,7 @@ def add_motion(model: Model, settings: Settings, time: float | None = None) -> N
     if "ale" not in settings:
         return
     section = settings.section("ale")
-    section.check_keys(KEYS)
+    section.check_keys(list(KEYS))
     section.expect(len(section.values) == 1, "", "one of 'rotation' and 'translation' is needed")
     (kind,) = section.values
     inner = section.section(kind)

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from kratos_lite.io.kratos.context import Interval, RunContext, interval_of
+from kratos_lite.io.kratos.context import Interval, Omission, RunContext, interval_of
 from kratos_lite.io.kratos.expressions import evaluate
 from kratos_lite.io.kratos.variables import PRESSURES, TEMPERATURE, VECTORS, Variables
 from kratos_lite.io.names import nearest_variable
@@ -28,7 +28,10 @@ IDLE = ("ROTATION", "VELOCITY", "ACCELERATION", "ANGULAR_VELOCITY", "ANGULAR_ACC
 """Vector variables that files set although a static solution of solids does not use them."""
 KNOWN_VECTORS = (*VECTORS, *IDLE)
 KNOWN_SCALARS = (*(f"{v}_{a}" for v in KNOWN_VECTORS for a in "XYZ"), *PRESSURES, TEMPERATURE)
-COMMON = ("help", "mesh_id", "model_part_name", "variable_name", "interval", "local_axes")
+COMMON = {
+    "help": "", "mesh_id": 0, "model_part_name": "", "variable_name": "", "interval": [], "local_axes": {}
+}  # fmt: skip
+"""Parameters of all processes, with a value of the kind of each."""
 NORMALS = ("automatic_inwards_normal", "automatic_outwards_normal")
 
 
@@ -139,11 +142,16 @@ def actions_of(entry: Settings, module: str, context: RunContext) -> list[Action
     process, settings = PROCESSES[module], entry.section("Parameters", required=True)
     refuse_local_axes(settings)
     on_conditions = process.on_conditions
-    settings.check_keys([*COMMON, *process.keys, "entities" if on_conditions else "constrained"])
+    own: dict[str, Any] = {"entities": []} if on_conditions else {"constrained": None}
+    settings.check_keys(COMMON | dict.fromkeys(process.keys) | own)
     name, part = _variable(settings, process), context.part(settings)
     indices, interval = part.conditions if on_conditions else part.nodes, interval_of(settings)
     names = [f"{name}_{axis}" for axis in "XYZ"] if process.is_vector else [name]
-    components = zip(names, process.factors(settings), _fixed(settings, process), strict=False)
+    fixed = _fixed(settings, process)
+    is_dof = name.startswith(context.dofs)
+    text = f'{name} cannot be fixed; give "constrained": false, as Kratos wants it'
+    settings.expect(is_dof or not any(fixed), "constrained", text)
+    components = zip(names, process.factors(settings), fixed, strict=False)
     steps = [step for step, time in enumerate(context.times) if time in interval]
     later = [step for step in steps if step]
     actions = []
@@ -204,10 +212,11 @@ def notes_of(actions: Sequence[Action], context: RunContext) -> list[str]:
             # Before the first step nothing has moved yet.
             cure = '"move_mesh_flag": false' if action.on_conditions else "write X, Y, Z"
             time = context.times[action.steps[-1]]
-            notes.append(
+            text = (
                 f"{where}: Kratos evaluates x, y, z at time {time:g} s on the mesh as the steps before moved "
                 f"it, kratos_lite on the undeformed one; {cure} to mean the same"
             )
+            notes.append(Omission(text))
         if action.on_conditions and action.mentions("XYZ"):
             notes.append(f"{where}: X, Y, Z are 0 on conditions, as in Kratos; write x, y, z")
     return list(dict.fromkeys(notes))

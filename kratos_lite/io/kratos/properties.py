@@ -12,7 +12,7 @@ import numpy as np
 from kratos_lite.analysis.model import Model
 from kratos_lite.errors import InputError, KratosLiteError, MaterialError, ModelError, Problems, nearest
 from kratos_lite.io.formats.document import Document, Note, Properties
-from kratos_lite.io.kratos.context import RunContext
+from kratos_lite.io.kratos.context import Omission, RunContext
 from kratos_lite.io.names import PRESTRESS
 from kratos_lite.io.settings import Settings, is_number, shown
 from kratos_lite.materials import MATERIALS, Material
@@ -253,7 +253,7 @@ def _use_material(entry: Settings, properties: Properties, notes: list[str]) -> 
     variables = body.section("Variables")
     values = {key.rsplit(".", 1)[-1]: _variable(variables, key) for key in variables.values}
     if body.section("Tables").values:
-        notes.append(f"material of {part}: Tables are not used by {name}")
+        notes.append(Omission(f"material of {part}: Tables are not used by {name}"))
     for key in body.unknown(("name", "constitutive_law", "Variables", "Tables")):
         text = f"part {part}: {key!r} in a material is not supported; leave it out"
         body.expect(not body.values[key], key, text)

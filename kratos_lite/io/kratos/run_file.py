@@ -16,38 +16,22 @@ from kratos_lite.io.case import Case, Outputs
 from kratos_lite.io.formats import read_document
 from kratos_lite.io.formats.document import Document
 from kratos_lite.io.formats.part_files import part_files, read_part
-from kratos_lite.io.kratos.context import RunContext, module_of, times_of
+from kratos_lite.io.kratos.context import Omission, RunContext, module_of, times_of
 from kratos_lite.io.kratos.eigenvalues import EIGEN, EIGEN_KEYS, eigenvalue_comparisons, modes_of
 from kratos_lite.io.kratos.expected_values import COMPARISONS
 from kratos_lite.io.kratos.initial_state import MODULE, initial_state_of
+from kratos_lite.io.kratos.keys import IN_TIME, unused_keys
 from kratos_lite.io.kratos.laws import is_nonlinear, make_linear, notes_on_stress, quasi_static_of
 from kratos_lite.io.kratos.motion import add_motion
 from kratos_lite.io.kratos.outputs import OUTPUT_PROCESSES, OutputProcess
 from kratos_lite.io.kratos.point_elements import set_apart
 from kratos_lite.io.kratos.processes import PROCESSES, Action, actions_of, run
 from kratos_lite.io.kratos.properties import NO_EXPANSION, expanding, use_materials
-from kratos_lite.io.kratos.time_dependent import DYNAMIC, DYNAMIC_KEYS, ProcessesInTime, time_integration_of
+from kratos_lite.io.kratos.time_dependent import DYNAMIC, ProcessesInTime, time_integration_of
 from kratos_lite.io.kratos.to_model import model_from
 from kratos_lite.io.kratos.variables import TEMPERATURE
 from kratos_lite.io.settings import Settings, find_file, read_settings
 
-ROOT_KEYS = ("problem_data", "solver_settings", "processes", "output_processes", "ale")
-HARMLESS = frozenset(
-    "solver_type model_part_name domain_size echo_level buffer_size analysis_type model_import_settings "
-    "material_import_settings time_stepping rotation_dofs reform_dofs_at_each_step compute_reactions "
-    "use_old_stiffness_in_first_iteration solving_strategy_settings builder_and_solver_settings "
-    "clear_storage move_mesh_flag multi_point_constraints_used convergence_criterion max_iteration "
-    "displacement_relative_tolerance displacement_absolute_tolerance residual_relative_tolerance "
-    "residual_absolute_tolerance linear_solver_settings line_search block_builder "
-    "problem_domain_sub_model_part_list processes_sub_model_part_list "
-    "auxiliary_variables_list auxiliary_dofs_list auxiliary_reaction_list".split()
-)
-"""Solver settings that are used here, or that cannot change a static linear solution."""
-OTHER_PHYSICS = (
-    "displacement_control", "volumetric_strain_dofs", "strain_dofs", "pressure_dofs",
-    "use_orthogonal_subscales", "contact_settings", "mpc_contact_settings", "computing_sub_model_part_name",
-)  # fmt: skip
-"""Solver settings that, unless false or empty, ask for equations that kratos_lite does not have."""
 CHECK = "check_eigenvalues_process"
 NOT_RUN = ("save_restart_process", "timer_process", "print_info_in_file_process")
 
@@ -72,13 +56,16 @@ def read_kratos_project(
     times = times_of(settings.section("problem_data", required=True), solver)
     if eigen or (settings.section("ale").values and not dynamic):
         times = [times[0], times[-1]]  # one solution, at the end
-    notes = _check_solver(solver) + _check_root(settings)
+    small = linear or solver.text("analysis_type", "non_linear") == "linear"
+    notes = _check_solver(solver)
+    if unused := unused_keys(settings, IN_TIME if dynamic else EIGEN_KEYS if eigen else {}, small or eigen):
+        are = "key {} is" if len(unused) == 1 else "keys {} are"
+        notes.append(f"{are.format(', '.join(unused))} not used")
     modes, above = modes_of(solver, notes) if eigen else (0, None)
     document = set_apart(_read_mesh(solver, folder, allow_outside, notes, part))
     root, moved = solver.text("model_part_name", "Structure"), solver.flag("move_mesh_flag", True)
-    context = RunContext(document.mesh, root, folder, times, moved, allow_outside)
+    context = RunContext(document.mesh, root, folder, times, moved, allow_outside, _dofs(solver, dynamic))
     _use_materials(solver, context, document, notes)
-    small = linear or solver.text("analysis_type", "non_linear") == "linear"
     notes += make_linear(document) if small else []
     nonlinear = is_nonlinear(document)
     notes += notes_on_stress(document)
@@ -107,15 +94,11 @@ def read_kratos_project(
     return Case(model, time, outputs=outputs, expected=checks, files=settings.files)
 
 
-def _check_root(settings: Settings) -> list[str]:
-    for key in ("modelers", "stages", "orchestrator", "restart_load_file_label"):
-        text = f"{key!r} is not supported; name the mesh in model_import_settings"
-        settings.expect(not settings.values.get(key), key, text)
-    unknown = settings.unknown(ROOT_KEYS)
-    for key in unknown:
-        text = f"{key!r} belongs in the object 'processes'; Kratos ignores it here"
-        settings.expect(not key.endswith("_process_list"), key, text)
-    return [f"key {key!r} is not used" for key in unknown if not key.startswith("_")]
+def _dofs(solver: Settings, dynamic: bool) -> tuple[str, ...]:
+    """Return the variables that Kratos can fix."""
+    more = ["VELOCITY", "ACCELERATION"] if dynamic else []
+    more += ["ROTATION"] if solver.flag("rotation_dofs", False) else []
+    return ("DISPLACEMENT", TEMPERATURE, *more, *solver.texts("auxiliary_dofs_list"))
 
 
 def _check_solver(solver: Settings) -> list[str]:
@@ -127,14 +110,8 @@ def _check_solver(solver: Settings) -> list[str]:
     solver.expect(size == 3, "domain_size", f"must be 3; got {size}")
     text = f"must be 'linear' or 'non_linear'; got {analysis!r}"
     solver.expect(analysis in ("linear", "non_linear"), "analysis_type", text)
-    for key in OTHER_PHYSICS:
-        text = f"{key} is not supported; kratos_lite solves for displacements of all elements"
-        solver.expect(not solver.values.get(key), key, text)
-    own = DYNAMIC_KEYS if kind in DYNAMIC else EIGEN_KEYS if kind == EIGEN else ()
-    known = (*HARMLESS, *OTHER_PHYSICS, *own)
-    notes = [f"solver setting {key!r} is not used.{nearest(key, known)}" for key in solver.unknown(known)]
     chosen = solver.section("linear_solver_settings").text("solver_type", "")
-    return notes + ([f"linear solver {chosen}: kratos_lite chooses its own"] if chosen else [])
+    return [f"linear solver {chosen}: kratos_lite chooses its own"] if chosen else []
 
 
 def part_files_of(run_file: Path) -> dict[int, Path]:
@@ -165,7 +142,7 @@ def _read_mesh(solver: Settings, folder: Path, outside: bool, notes: list[str], 
 def _use_materials(solver: Settings, context: RunContext, document: Document, notes: list[str]) -> None:
     """Give the document the materials of the materials file, if there is one."""
     source = solver.section("material_import_settings")
-    if source.text("materials_filename", ""):
+    if source.values and source.text("materials_filename"):
         path, note = find_file(source, "materials_filename", context.folder, outside=context.outside)
         notes += [note] if note else []
         use_materials(read_settings(path), context, document, notes)
@@ -195,13 +172,14 @@ def _read_processes(
                 elif module in compare:
                     checks += compare[module](entry.section("Parameters", required=True), context)
                 elif module in (CHECK, *COMPARISONS):
-                    notes.append(f"{entry.path}: {module} is not evaluated: there are no such values")
+                    text = f"{module} is not evaluated: there are no such values"
+                    notes.append(Omission(f"{entry.path}: {text}"))
                 elif module in OUTPUT_PROCESSES:
                     output = OUTPUT_PROCESSES[module](entry.section("Parameters", required=True), context)
                     written.append(output)
-                    notes += [f"{entry.path}: {output.note}"] if output.note else []
+                    notes += [Omission(f"{entry.path}: {output.note}")] if output.note else []
                 elif module in NOT_RUN:
-                    notes.append(f"{entry.path}: {module} is not run")
+                    notes.append(Omission(f"{entry.path}: {module} is not run"))
                 else:
                     known = [*PROCESSES, *COMPARISONS, CHECK, MODULE, *OUTPUT_PROCESSES]
                     text = f"unknown process {module!r}.{nearest(module, known)} Known are {', '.join(known)}"

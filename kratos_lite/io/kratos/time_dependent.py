@@ -16,7 +16,7 @@ import numpy as np
 from kratos_lite.analysis.model import Model
 from kratos_lite.errors import InputError
 from kratos_lite.io.case import TimeIntegration
-from kratos_lite.io.kratos.context import RunContext
+from kratos_lite.io.kratos.context import Omission, RunContext
 from kratos_lite.io.kratos.processes import Action, notes_of, places_of, set_values
 from kratos_lite.io.kratos.variables import LOADING, TEMPERATURE, Variables
 from kratos_lite.io.settings import Settings
@@ -32,7 +32,6 @@ Motion = Callable[[float], "Array | float | None"]
 DYNAMIC = ("Dynamic", "dynamic")
 """Kratos' solver_type of what moves."""
 RAYLEIGH = ("rayleigh_alpha", "rayleigh_beta")
-DYNAMIC_KEYS = ("time_integration_method", "scheme_type", "damp_factor_m", "newmark_beta", *RAYLEIGH)
 GRAVITY = frozenset(f"VOLUME_ACCELERATION_{axis}" for axis in "XYZ")
 HEAT = frozenset({TEMPERATURE})
 SURFACE = frozenset(n for n in LOADING - GRAVITY - HEAT if not n.startswith("DISPLACEMENT"))
@@ -89,7 +88,7 @@ class ProcessesInTime:
             model.notes.append("as in Kratos, the acceleration at the start is 0: loads act after t = 0")
         if self.dynamic and self._moving:
             text = "supports that move have the velocity of their function"
-            model.notes.append(f"{text}; Kratos takes Newmark's formulas")
+            model.notes.append(Omission(f"{text}; Kratos takes Newmark's formulas"))
         model.notes += self.notes
 
     # ---- supports and start ----------------------------------------------------------------------------
@@ -125,7 +124,8 @@ class ProcessesInTime:
             f"VELOCITY{name[-2:]}": mask for name, mask in start.fixed.items() if name[:-2] == "DISPLACEMENT"
         }
         if any(start.nodal.scalar(name)[mask].any() for name, mask in fixed.items()):
-            self.notes.append("VELOCITY of fixed nodes is omitted; Kratos keeps it in the first step")
+            text = "VELOCITY of fixed nodes is omitted; Kratos keeps it in the first step"
+            self.notes.append(Omission(text))
         self.displacement, self.velocity = u if u.any() else None, v if v.any() else None
 
     def _hold(self, name: str, base: Variables) -> None:

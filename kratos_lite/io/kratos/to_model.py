@@ -11,6 +11,8 @@ from kratos_lite.elements import ELEMENTS
 from kratos_lite.elements.formulations import is_unnamed
 from kratos_lite.errors import InputError, Problems, naming, nearest
 from kratos_lite.io.formats.document import Constraint, Data, Document, Note
+from kratos_lite.io.formats.mdpa.mesh import NO_NODES
+from kratos_lite.io.kratos.context import Omission
 from kratos_lite.io.kratos.point_elements import set_apart
 from kratos_lite.io.kratos.properties import NO_EXPANSION, USED, apply_properties, expanding
 from kratos_lite.io.kratos.variables import LOADING, SPLIT, TEMPERATURE, VECTORS, Variables, components
@@ -39,6 +41,8 @@ def model_from(
     processes: Callable[[Variables], None] | None = None,
 ) -> Model:
     """Return the model that a document describes; `processes` may change the values, as a run file does."""
+    if not document.mesh.n_nodes:
+        raise InputError(f"{document.mesh.source}: {NO_NODES}")
     document = set_apart(document)
     _check_elements(document)
     _check_variables(document)
@@ -128,7 +132,8 @@ def _fill(values: Variables, document: Document, model: Model) -> None:
     for data in document.element_data:
         if text := OF_ELEMENTS.get(data.variable if turned else data.variable.replace("LOCAL_AXIS", "")):
             problems.add(f"{data.source or mesh.source}:{data.line}: ElementalData {data.variable} {text}")
-        _note(model, data, f"ElementalData {data.variable} is not used")
+        kind = str if data.variable.startswith("LOCAL_AXIS") else Omission
+        _note(model, data, f"ElementalData {data.variable} is not used", kind)
     problems.raise_if_any()
 
 
@@ -159,8 +164,8 @@ def _activate(model: Model, u0: Array) -> None:
         model.notes.append(f"{text}; --ignore-initial-displacement leaves it out")
 
 
-def _note(model: Model, data: Data, text: str) -> None:
-    model.notes.append(str(Note(data.line, text, data.source)))
+def _note(model: Model, data: Data, text: str, kind: type[str] = str) -> None:
+    model.notes.append(kind(Note(data.line, text, data.source)))
 
 
 def _fits(data: Data, model: Model, problems: Problems, source: str) -> bool:
@@ -198,7 +203,7 @@ def _constrain(model: Model, document: Document) -> None:
             known.append(constraint)
         else:
             text = f"constraint {constraint.id} is not on displacements; ignored"
-            model.notes.append(str(Note(constraint.line, text)))
+            model.notes.append(Omission(Note(constraint.line, text)))
     if not known:
         return
 

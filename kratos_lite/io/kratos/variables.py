@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from kratos_lite.analysis.fields import FIELDS
 from kratos_lite.analysis.model import Model
 from kratos_lite.io.formats.document import Properties
+from kratos_lite.io.kratos.context import Omission
 from kratos_lite.io.kratos.properties import reference_temperature
 from kratos_lite.mesh import Mesh, ids_of, with_rows
 from kratos_lite.model.loads.body import Gravity
@@ -170,7 +171,8 @@ class Variables:
             kinds = {block.name for block in self.mesh.conditions if len(block)}
             for name in sorted(kind for kind in kinds if kind.startswith("SurfaceLoadCondition")):
                 how = f"acts on the undeformed body, as that of SmallDisplacement{name} in Kratos"
-                notes.append(f"{name}: the pressure {how}; {name} adds a pressure stiffness there")
+                text = f"{name}: the pressure {how}; {name} adds a pressure stiffness there"
+                notes.append(Omission(text))
 
     def _note_uncarried(self, notes: list[str]) -> None:
         """Note load values on conditions of another kind, and on nodes without conditions that carry them."""

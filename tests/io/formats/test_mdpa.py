@@ -297,6 +297,41 @@ def test_unknown_variable_is_kept_with_a_hint(read):
     )
 
 
+TABLE = "Begin Table 0 TIME VELOCITY\n0.0 0.0\n1.0 2.0\nEnd Table\n"
+TWICE = "Begin {0} {1}\n1 0 1 2 2 3\n3 0 1 2 3 4\n4 0 4 4 4 4\nEnd {0}\n"
+NO_PROPERTIES = "Begin Properties 0\nEnd Properties\n"
+NOT_SOLVED = [
+    ("Elements", "element", "SurfaceElement3D4N"),
+    ("Elements", "element", "UPwSmallStrainInterfaceElement2D4N"),
+    ("Conditions", "condition", "MyCondition3D4N"),
+    ("Geometries", "geometry", "Quadrilateral3D4"),
+]
+
+
+@pytest.mark.parametrize(("kind", "word", "name"), NOT_SOLVED)
+def test_what_is_not_solved_may_name_a_node_twice_as_in_kratos(read, kind, word, name):
+    block = TWICE.format(kind, name).replace(" 0 ", " " if kind == "Geometries" else " 0 ")
+    (note,) = read(NODES + NO_PROPERTIES + block).notes
+    assert (note.line, note.text.partition(";")[0]) == (
+        10,
+        f"{word} 1 (and 1 more {word}s) of {name} names a node twice",
+    )
+
+
+def test_a_table_may_have_the_id_0_as_in_kratos(read):
+    document = read(NODES + TABLE + part("A", members("Tables", 0)))
+    assert document.tables[0].rows.tolist() == [[0, 0], [1, 2]]
+    assert document.mesh.parts["A"].tables == (0,)
+
+
+@pytest.mark.parametrize("command", ["check", "solve"])
+def test_a_file_without_nodes_is_described_and_not_solved(run, tmp_path, command):
+    path = tmp_path / "tables.mdpa"
+    path.write_text(TABLE + NO_PROPERTIES)
+    assert "nodes       0" in run("info", path).out
+    assert run(command, path).refuses("tables.mdpa", ": there are no nodes")
+
+
 # ---- data ----------------------------------------------------------------------------------
 
 

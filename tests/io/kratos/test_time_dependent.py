@@ -8,6 +8,7 @@ from run_files import process, run_file
 
 import kratos_lite as kl
 from kratos_lite.io.files import read_case
+from kratos_lite.io.kratos.keys import IN_TIME
 from kratos_lite.io.run import prepare
 from kratos_lite.model.loads import ScaledLoad
 
@@ -152,7 +153,9 @@ def test_a_support_that_changes_for_a_while_is_refused(write, value):
 def test_a_kratos_file_with_the_key_time_of_ours_keeps_its_own_steps(write, run):
     path = write(*CLAMP)
     content = {**json.loads(path.read_text()), "time": {"step": 1.0, "steps": 2}}
-    content["solver_settings"]["solver_type"] = "static"
+    settings = content["solver_settings"]
+    settings = {key: value for key, value in settings.items() if key not in IN_TIME}
+    content["solver_settings"] = settings | {"solver_type": "static"}
     path.write_text(json.dumps(content))
     assert read_case(path).time.steps == 20
     assert "key 'time' is not used" in run("solve", path).out

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import InputError
 from kratos_lite.io.formats.cells import MOST, already, repeated_nodes, wrong_nodes
 from kratos_lite.io.formats.document import Document
@@ -20,6 +21,7 @@ from kratos_lite.shapes.faces import FACE_SHAPES
 from kratos_lite.typing import Ints
 
 NODES = Layout("node", "irrr", "coordinates", needs="expected id x y z", alone=True)
+NO_NODES = "there are no nodes; a 'Begin Nodes' block with rows 'id x y z' is needed"
 CELLS = {"Elements": "element", "Conditions": "condition", "Geometries": "geometry"}
 PART_NAME = re.compile(r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*")
 """Names that may be part of a file name without harm."""
@@ -35,7 +37,7 @@ WORDS = {
 def read_mesh(source: Source, frames: dict[str, list[Frame]], properties: Sequence[int]) -> Mesh:
     """Return the mesh of the file, without its parts; elements must use the given properties."""
     before = source.problems.count
-    mesh = _read_nodes(source, frames["Nodes"])
+    mesh = _read_nodes(source, frames)
     if source.problems.count > before:
         # Every element at a broken node would be one more problem without a cause of its own.
         source.problems.raise_if_any()
@@ -46,14 +48,15 @@ def read_mesh(source: Source, frames: dict[str, list[Frame]], properties: Sequen
     return mesh.replace(blocks=blocks, conditions=conditions)
 
 
-def _read_nodes(source: Source, frames: list[Frame]) -> Mesh:
-    tables = [read_rows(source, frame.spans[0], NODES) for frame in frames]
+def _read_nodes(source: Source, frames: dict[str, list[Frame]]) -> Mesh:
+    tables = [read_rows(source, frame.spans[0], NODES) for frame in frames["Nodes"]]
     ids = np.concatenate([np.zeros(0, dtype=np.int64), *(t.ints[:, 0] for t in tables)])
     points = np.concatenate([np.zeros((0, 3)), *(t.reals for t in tables)])
     lines = np.concatenate([np.zeros(0, dtype=np.int32), *(t.lines for t in tables)])
     if not len(ids) and not source.problems:
-        text = "there are no nodes; a 'Begin Nodes' block with rows 'id x y z' is needed"
-        raise InputError(f"{source.name}: {text}")
+        cells = [span for kind in CELLS for frame in frames[kind] for span in frame.spans]
+        if not any(frames.values()) or any(next(source.words(span), None) for span in cells):
+            raise InputError(f"{source.name}: {NO_NODES}")
     keep = np.ones(len(ids), dtype=bool)
     for row, text, is_same in repeated_nodes(ids, points, lines):
         keep[row] = False
@@ -85,9 +88,16 @@ def _read_block(source: Source, frame: Frame, mesh: Mesh) -> Block:
     rows = read_rows(source, frame.spans[0], layout)
     ids, properties = rows.ints[:, 0], rows.ints[:, 1] if head == 2 else 0
     nodes = mesh.node_rows(rows.ints[:, head:])
-    for row, text in wrong_nodes(rows.ints[:, head:], nodes):
-        source.problem_in_line(f"{word} {ids[row]} ({name}){text}", int(rows.lines[row]))
     shape = {"element": element_shape, "condition": condition_shape}.get(word, lambda _: None)(name)
+    wrong = list(wrong_nodes(rows.ints[:, head:], nodes))
+    is_solved = name in ELEMENTS if word == "element" else shape is not None
+    if wrong and nodes.min() >= 0 and not is_solved:  # it may name a node twice, as in Kratos
+        more = f" (and {len(wrong) - 1} more {word}s)" if len(wrong) > 1 else ""
+        text = f"{word} {ids[wrong[0][0]]}{more} of {name} names a node twice; it is kept, but not used"
+        source.note_in_line(text, int(rows.lines[wrong[0][0]]))
+        wrong = []
+    for row, text in wrong:
+        source.problem_in_line(f"{word} {ids[row]} ({name}){text}", int(rows.lines[row]))
     return Block(name, np.maximum(nodes, 0), ids, properties, shape, rows.lines)
 
 
@@ -176,7 +186,7 @@ class PartReader:
 
     def _add(self, child: Frame, kind: str, full: str) -> None:
         """Add the members in a list of ids to a part and to all its ancestors."""
-        read = read_rows(self.source, child.spans[0], Layout("id", "p" if kind == "properties" else "i"))
+        read = read_rows(self.source, child.spans[0], Layout("id", "p" if kind in NUMBERS else "i"))
         ids = read.ints[:, 0]
         rows = rows_of_ids(self.ids[kind], ids, self.order[kind])
         exists = rows >= 0

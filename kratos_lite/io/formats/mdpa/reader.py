@@ -41,7 +41,7 @@ def read_mdpa(path: str | Path, *, strict: bool = True) -> Document:
 
 def _read(source: Source, frames: dict[str, list[Frame]]) -> Document:
     """Return the document; first what others refer to, whatever the order in the file."""
-    properties = _by_id(source, frames["Properties"], _properties, least=0)
+    properties = _by_id(source, frames["Properties"], _properties)
     tables = _by_id(source, frames["Table"], _table)
     mesh = read_mesh(source, frames, list(properties))
     # References to what is broken already would only be reported as missing.
@@ -58,18 +58,16 @@ def _read(source: Source, frames: dict[str, list[Frame]]) -> Document:
     return document
 
 
-def _by_id(
-    source: Source, frames: list[Frame], read: Callable[[Source, Frame, int], Any], least: int = 1
-) -> dict[int, Any]:
-    """Return what `read` makes of blocks, by the ids in their headers."""
+def _by_id(source: Source, frames: list[Frame], read: Callable[[Source, Frame, int], Any]) -> dict[int, Any]:
+    """Return what `read` makes of blocks, by the ids in their headers, which may be 0."""
     by_id: dict[int, Any] = {}
     for frame in frames:
         word, number = frame.arguments[0], -1
         try:
-            number = 0 if word == "0" and least == 0 else integer(word.encode())
+            number = 0 if word == "0" else integer(word.encode())
         except ValueError as error:
             source.problem(f"{frame.name}: {error}", frame.offset)
-        if number in by_id and number >= least:
+        if number in by_id and number >= 0:
             text = already(f"{frame.name} {number}", by_id[number].line, "; give each its own id")
             source.problem(text, frame.offset)
         by_id[number] = read(source, frame, number)
