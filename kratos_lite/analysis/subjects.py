@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from kratos_lite.analysis.fields import FIELDS, Field, Fields, known
-from kratos_lite.analysis.peak import peak
+from kratos_lite.analysis.peak import place_of_node
 from kratos_lite.analysis.state import ModelInTime, State
 from kratos_lite.errors import InputError, nearest
 from kratos_lite.mesh import Mesh
@@ -24,6 +24,7 @@ from kratos_lite.view.scene import Options, Subject, Values, factor_of
 
 DEFAULT = "von_mises"  # what colors a result
 PERIOD = 24  # frames of a period
+NORMALIZED = "(normalized)"  # unit of modes
 AMPLITUDE = 0.1  # largest displacement of a mode as it is drawn, of the size of the body
 KINDS = (
     "a mesh, a model, a result, several of them, a body with states, a transient with states, the report of "
@@ -160,6 +161,7 @@ def _values(result: Fields | None, mesh: Mesh, u: Array | None, given: dict[str,
         if u is not None and name in motions:
             shape = motion.turned(u, mesh.points)
             named = named_values(motions[name], lambda _: shape)
+            named = replace(named, unit=unit_name(named.unit, mesh.units))
         elif result is None:
             raise InputError(f"a mesh or a model has no field {name!r}; solve it, or give an array")
         else:
@@ -169,8 +171,9 @@ def _values(result: Fields | None, mesh: Mesh, u: Array | None, given: dict[str,
                 f"unit: the field {name!r} is shown in {named.unit or 'no unit'}, with a prefix; for another "
                 f"give an array in {short(unit)}, and its unit"
             )
-        if name == DEFAULT and result is not None and (top := peak(result)):
-            return replace(named, title=f"{named.title}, largest {top.place}")
+        if name == DEFAULT and result is not None:
+            if place := place_of_node(result, int(named.numbers.argmax())):
+                return replace(named, title=f"{named.title}, largest {place}")
         return named
     if values is None:
         return None
@@ -230,9 +233,11 @@ def _phase(
     for shape, title in zip(shapes, titles, strict=True):
         u, largest = (shape * turn).real, np.linalg.norm(shape, axis=1).max() or 1.0
         if given["values"] is None:
-            values: Values | None = Values(np.linalg.norm(u, axis=1) / largest)
+            values: Values | None = Values(np.linalg.norm(u, axis=1) / largest, unit=NORMALIZED)
         else:
             values = _values(None, mesh, u / largest, given)
+            if values is not None and isinstance(given["values"], str):
+                values = replace(values, unit=NORMALIZED)
         subjects.append(Subject(mesh, u, values, title))
     return subjects
 
@@ -278,8 +283,10 @@ def nodal_values(result: Fields, name: str, local: LocalAxes | None = None) -> V
     names = names_of_parts({key: field.along(local) for key, field in known(result.groups).items()})
     if name not in names:
         raise InputError(f"unknown field {name!r}; there are {', '.join(names)}.{nearest(name, names, 1)}")
-    values = named_values(names[name], lambda key: result.field(key, names[name][1].nodal_place, local))
-    return replace(values, unit=unit_name(values.unit, result.mesh.units))
+    field = names[name][1]
+    values = named_values(names[name], lambda key: result.field(key, field.nodal_place, local))
+    kind = "" if "averaged" not in field.where else "averaged" if field.sampled else "recovered"
+    return replace(values, unit=unit_name(values.unit, result.mesh.units), kind=kind)
 
 
 def named_values(shown: Part, values: Callable[[str], Array]) -> Values:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -127,9 +128,18 @@ def right_of(axes: Any) -> float:
     return float(reach) / DPI
 
 
+def entitle(axes: Any, title: str, lines: Sequence[str]) -> None:
+    """Write a title above axes, and small lines beneath it."""
+    axes.set_title(title, fontsize=11, pad=8 + 13 * len(lines))
+    if lines:
+        style = {"xycoords": "axes fraction", "textcoords": "offset points", "size": 9, "color": "0.25"}
+        axes.annotate("\n".join(lines), (0.5, 1), (0, 6), ha="center", va="bottom", **style)
+
+
 def title_widths(panels: list[Any]) -> list[float]:
-    """Return the widths of the titles of axes in inches."""
-    return [float(axes.title.get_window_extent().width) / DPI for axes in panels]
+    """Return the widths of the titles of axes, and of the lines beneath them, in inches."""
+    texts = [text for axes in panels for text in (axes.title, *axes.texts)]
+    return [float(text.get_window_extent().width) / DPI for text in texts]
 
 
 def text_in_inches(figure: Any, place: tuple[float, float], text: str) -> None:
@@ -222,7 +232,8 @@ def color_bar(axes: Any, colors: Any, unit: str, extend: str, *, upright: bool) 
     from matplotlib.ticker import EngFormatter, FuncFormatter, LogLocator
 
     low, high = colors.get_clim()
-    power = int(np.clip(3 * np.floor(np.log10(max(abs(low), abs(high))) / 3), -24, 24))
+    power = _power(max(abs(low), abs(high)))
+    power = 0 if power == -3 and unit not in PREFIXED else power
     shown = FuncFormatter(lambda value, _: f"{round(value / 10.0**power, 9) + 0.0:g}")
     way = "vertical" if upright else "horizontal"
     bar = axes.figure.colorbar(colors, cax=axes, orientation=way, format=shown, extend=extend)
@@ -237,15 +248,28 @@ def color_bar(axes: Any, colors: Any, unit: str, extend: str, *, upright: bool) 
     bar.outline.set_visible(False)
 
 
+def number_text(value: float, unit: str) -> str:
+    """Return a number to four digits with its unit, which has a prefix if it takes one."""
+    from matplotlib.ticker import EngFormatter
+
+    power = _power(value) if unit in PREFIXED else 0
+    return f"{value / 10.0**power:.4g} {EngFormatter.ENG_PREFIXES[power]}{unit}".rstrip()
+
+
+def _power(size: float) -> int:
+    """Return the power of ten of the prefix for numbers up to a size."""
+    return int(np.clip(3 * np.floor(np.log10(abs(size)) / 3), -24, 24)) if size else 0
+
+
 # ---- what is drawn ---------------------------------------------------------------------------------
 
 
-def polygons(axes: Any, corners: Array, colors: Array) -> Any:
+def polygons(axes: Any, corners: Array, colors: Array, widths: Any = 0.45) -> Any:
     """Draw flat polygons (m, k, 2) in their order, each edged in its own color (m, 4)."""
     from matplotlib.collections import PolyCollection
 
     flat: Any = corners
-    style: Any = {"facecolors": colors, "edgecolors": colors, "linewidths": 0.45, "zorder": 2}
+    style: Any = {"facecolors": colors, "edgecolors": colors, "linewidths": widths, "zorder": 2}
     return axes.add_collection(PolyCollection(flat, **style), autolim=False)
 
 

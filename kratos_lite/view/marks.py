@@ -43,14 +43,15 @@ def draw_marks(axes: Any, rows: Array, marks: Marks, inch: float, strength: floa
     anchors = np.concatenate([marks.rods[:, 1], marks.springs[:, 1]]) @ flat
     ends = [marks.rods[:, 0], marks.springs[:, 0], *marks.between.transpose(1, 0, 2), marks.pivots]
     joints = np.concatenate(ends) @ flat
-    drawn += _dots(axes, anchors, "s", 7, DARK, 1.0)
-    drawn += _dots(axes, joints, "o", 5, "w", strength)
-    drawn += _dots(axes, marks.masses @ flat, "o", 8, DARK, strength)
-    drawn += _dots(axes, np.unique(marks.spokes[:, 0], axis=0) @ flat, "x", 12, DARK, strength)
+    drawn += dots(axes, anchors, "s", 7, DARK, 1.0)
+    drawn += dots(axes, joints, "o", 5, "w", strength)
+    drawn += dots(axes, marks.masses @ flat, "o", 8, DARK, strength)
+    drawn += dots(axes, np.unique(marks.spokes[:, 0], axis=0) @ flat, "x", 12, DARK, strength)
     return drawn
 
 
-def _dots(axes: Any, places: Array, marker: str, size: float, face: str, strength: float) -> list[Any]:
+def dots(axes: Any, places: Array, marker: str, size: float, face: str, strength: float) -> list[Any]:
+    """Draw markers of a size in points at places (k, 2); return what was drawn."""
     style = {"ls": "", "marker": marker, "ms": size, "mfc": face, "mec": DARK, "mew": 1.2, "alpha": strength}
     return list(axes.plot(*places.T, **style, zorder=5, clip_on=False)) if len(places) else []
 
