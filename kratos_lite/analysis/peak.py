@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kratos_lite.analysis.fields import Fields
-from kratos_lite.mesh import Mesh
+from kratos_lite.mesh import Mesh, mask_of
 from kratos_lite.mesh.facets import reentrant_nodes
 from kratos_lite.typing import Array, Mask
 
@@ -27,13 +27,10 @@ class Peak:
 
 
 def peak(result: Fields) -> Peak | None:
-    """Return where the largest von Mises stress lies if it may have no limit there, else None."""
+    """Return where the largest von Mises stress of Gauss points lies if it may have no limit there."""
     mesh, element = result.mesh, result.totals()[2]
-    places = {
-        "at a clamped or concentrated support": clamped_nodes(mesh, result.reactions),
-        "at a re-entrant edge": reentrant_nodes(mesh),
-    }
-    place = next((name for name, nodes in places.items() if _touching(mesh, nodes)[element]), None)
+    places = _places(result)
+    place = _named(mesh, places, mask_of(element, mesh.n_elements))
     if place is None:
         return None
     near = np.logical_or.reduce([*places.values()])
@@ -46,6 +43,25 @@ def peak(result: Fields) -> Peak | None:
     alike = isinstance(points, np.ndarray)  # else elements have different numbers of Gauss points
     stresses = points.max(axis=1) if alike else np.array([np.max(some) for some in points])
     return Peak(place, float(stresses[away].max()))
+
+
+def place_of_node(result: Fields, node: int) -> str | None:
+    """Return at what a node lies, or an element beside it, if stresses may have no limit there."""
+    mesh = result.mesh
+    return _named(mesh, _places(result), _touching(mesh, mask_of(node, mesh.n_nodes)))
+
+
+def _places(result: Fields) -> dict[str, Mask]:
+    """Return the nodes (n,) at which stresses may have no limit, by what is there."""
+    return {
+        "at a clamped or concentrated support": clamped_nodes(result.mesh, result.reactions),
+        "at a re-entrant edge": reentrant_nodes(result.mesh),
+    }
+
+
+def _named(mesh: Mesh, places: dict[str, Mask], elements: Mask) -> str | None:
+    """Return the first of some places that elements touch."""
+    return next((name for name, nodes in places.items() if (_touching(mesh, nodes) & elements).any()), None)
 
 
 def clamped_nodes(mesh: Mesh, reactions: Array) -> Mask:

@@ -9,21 +9,21 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from kratos_lite.analysis.fields import FIELDS, Field, Fields, known
-from kratos_lite.analysis.peak import peak
+from kratos_lite.analysis.model_picture import legend_of, marks_of_model, materials_of
+from kratos_lite.analysis.peak import place_of_node
 from kratos_lite.analysis.state import ModelInTime, State
 from kratos_lite.errors import InputError, nearest
 from kratos_lite.mesh import Mesh
-from kratos_lite.model.attachments import MARKS
 from kratos_lite.model.local_axes import LocalAxes
 from kratos_lite.model.structure import Structure
 from kratos_lite.tabular import unit_name
 from kratos_lite.typing import Array, Numbers
 from kratos_lite.validation import finite, number, short
-from kratos_lite.view.marks import Marks
 from kratos_lite.view.scene import Options, Subject, Values, factor_of
 
 DEFAULT = "von_mises"  # what colors a result
 PERIOD = 24  # frames of a period
+NORMALIZED = "(normalized)"  # unit of modes
 AMPLITUDE = 0.1  # largest displacement of a mode as it is drawn, of the size of the body
 KINDS = (
     "a mesh, a model, a result, several of them, a body with states, a transient with states, the report of "
@@ -126,27 +126,11 @@ def _subject(thing: Any, given: dict[str, Any]) -> Subject:
     u = None if result is None else result.u
     if given["displacement"] is not None:
         u = finite(given["displacement"], "displacement", (mesh.n_nodes, 3))
-    marks = _marks(thing) if isinstance(thing, Structure) else None
-    return Subject(mesh, u, _values(result, mesh, u, given), marks=marks)
-
-
-def _marks(structure: Structure) -> Marks | None:
-    """Return the marks of springs, added masses and remote points; None if there are none."""
-    shown, mesh, none = structure.attachments, structure.mesh, np.zeros((0, 2, 3))
-    if not shown and not structure.remote_points:
-        return None
-    spokes = [none]
-    for point in structure.remote_points:
-        nodes = mesh.nodes(point.where)
-        some = mesh.points[nodes[np.linspace(0, len(nodes) - 1, MARKS).round().astype(int)]]
-        spokes.append(np.stack([np.broadcast_to(point.point, some.shape), some], axis=1))
-
-    def lines(mass: bool, inside: bool) -> Array:
-        some = (one.drawn(mesh) for one in shown if one.is_mass == mass and (one.to is not None) == inside)
-        return np.concatenate([none, *some])
-
-    springs = lines(mass=False, inside=False), none[:, 0], lines(mass=False, inside=True)
-    return Marks(none, *springs, lines(mass=True, inside=False)[:, 0], np.concatenate(spokes))
+    values = _values(result, mesh, u, given)
+    if not isinstance(thing, Structure):
+        return Subject(mesh, u, values)
+    values = materials_of(thing) if values is None else values
+    return Subject(mesh, u, values, marks=marks_of_model(thing), legend=legend_of(thing))
 
 
 def _values(result: Fields | None, mesh: Mesh, u: Array | None, given: dict[str, Any]) -> Values | None:
@@ -160,6 +144,7 @@ def _values(result: Fields | None, mesh: Mesh, u: Array | None, given: dict[str,
         if u is not None and name in motions:
             shape = motion.turned(u, mesh.points)
             named = named_values(motions[name], lambda _: shape)
+            named = replace(named, unit=unit_name(named.unit, mesh.units))
         elif result is None:
             raise InputError(f"a mesh or a model has no field {name!r}; solve it, or give an array")
         else:
@@ -169,8 +154,9 @@ def _values(result: Fields | None, mesh: Mesh, u: Array | None, given: dict[str,
                 f"unit: the field {name!r} is shown in {named.unit or 'no unit'}, with a prefix; for another "
                 f"give an array in {short(unit)}, and its unit"
             )
-        if name == DEFAULT and result is not None and (top := peak(result)):
-            return replace(named, title=f"{named.title}, largest {top.place}")
+        if name == DEFAULT and result is not None:
+            if place := place_of_node(result, int(named.numbers.argmax())):
+                return replace(named, title=f"{named.title}, largest {place}")
         return named
     if values is None:
         return None
@@ -230,9 +216,11 @@ def _phase(
     for shape, title in zip(shapes, titles, strict=True):
         u, largest = (shape * turn).real, np.linalg.norm(shape, axis=1).max() or 1.0
         if given["values"] is None:
-            values: Values | None = Values(np.linalg.norm(u, axis=1) / largest)
+            values: Values | None = Values(np.linalg.norm(u, axis=1) / largest, unit=NORMALIZED)
         else:
             values = _values(None, mesh, u / largest, given)
+            if values is not None and isinstance(given["values"], str):
+                values = replace(values, unit=NORMALIZED)
         subjects.append(Subject(mesh, u, values, title))
     return subjects
 
@@ -278,8 +266,10 @@ def nodal_values(result: Fields, name: str, local: LocalAxes | None = None) -> V
     names = names_of_parts({key: field.along(local) for key, field in known(result.groups).items()})
     if name not in names:
         raise InputError(f"unknown field {name!r}; there are {', '.join(names)}.{nearest(name, names, 1)}")
-    values = named_values(names[name], lambda key: result.field(key, names[name][1].nodal_place, local))
-    return replace(values, unit=unit_name(values.unit, result.mesh.units))
+    field = names[name][1]
+    values = named_values(names[name], lambda key: result.field(key, field.nodal_place, local))
+    kind = "" if "averaged" not in field.where else "averaged" if field.sampled else "recovered"
+    return replace(values, unit=unit_name(values.unit, result.mesh.units), kind=kind)
 
 
 def named_values(shown: Part, values: Callable[[str], Array]) -> Values:

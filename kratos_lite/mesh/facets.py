@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from kratos_lite.mesh.blocks import NO_ROWS, Block, mask_of
@@ -17,7 +19,8 @@ STRAIGHT = 1e-3
 
 def facets(mesh: Mesh) -> tuple[int, float]:
     """Return how many boundary faces seem to stand for a curved surface, and their turn in degrees."""
-    one, other, angle, *_ = _folds(mesh)
+    found = folds(mesh)
+    (one, other), angle = found.faces.T, found.angle
     blocks = [block for block in mesh.boundary if block.shape is not None]
     straight = np.concatenate([np.zeros(0, dtype=bool), *[_straight(mesh, block) for block in blocks]])
     small = straight[one] & straight[other] & (angle > ANGLES[0]) & (angle < ANGLES[1])
@@ -28,13 +31,23 @@ def facets(mesh: Mesh) -> tuple[int, float]:
 
 def reentrant_nodes(mesh: Mesh) -> Mask:
     """Return the nodes (n,) on edges of the surface where the body has more than 180° and `ANGLES`."""
-    _, _, angle, ahead, edge = _folds(mesh)
-    found = mask_of(edge[(angle > ANGLES[1]) & (ahead > -1e-6)], mesh.n_nodes)
-    return found
+    found = folds(mesh)
+    return mask_of(found.nodes[(found.angle > ANGLES[1]) & (found.ahead > -1e-6)], mesh.n_nodes)
 
 
-def _folds(mesh: Mesh) -> tuple[Ints, Ints, Array, Array, Ints]:
-    """Return the two boundary faces at each edge (k,), how they meet, and the nodes of the edge (k, 2)."""
+@dataclass(frozen=True, eq=False)
+class Folds:
+    """Edges (k,) of the surface, and the two boundary faces that meet at each."""
+
+    sides: Ints  # (k, 2) of these faces, by number through blocks, edges of a face, faces
+    faces: Ints  # (k, 2), by number through blocks
+    nodes: Ints  # (k, 2)
+    angle: Array  # by which the normal turns, in degrees
+    ahead: Array  # > 0 where the body has more than 180°
+
+
+def folds(mesh: Mesh) -> Folds:
+    """Return the edges of the surface."""
     edges, faces, ends, normals, centers = [], [NO_ROWS], [], [np.zeros((0, 3))], [np.zeros((0, 3))]
     for block in mesh.boundary:
         c, count = block.known_shape.corners, sum(map(len, normals))
@@ -44,14 +57,14 @@ def _folds(mesh: Mesh) -> tuple[Ints, Ints, Array, Array, Ints]:
         faces.append(np.tile(count + np.arange(len(block)), c))
         normals.append(_normals(mesh.points[block.nodes[:, :c]]))
         centers.append(mesh.points[block.nodes[:, :c]].mean(axis=1))
-    first, second = equal_sets(edges)
-    one, other = (np.concatenate(faces)[edge] for edge in (first, second))
-    n, X = np.concatenate(normals), np.concatenate(centers)
-    angle = np.degrees(np.arccos(np.clip((n[one] * n[other]).sum(axis=1), -1, 1)))
-    step = X[other] - X[one]
-    length = np.maximum(np.linalg.norm(step, axis=1), 1e-300)
-    ahead = (n[one] * step).sum(axis=1) / length
-    return one, other, angle, ahead, np.concatenate([np.zeros((0, 2), dtype=int), *ends])[first]
+    pairs = np.stack(equal_sets(edges), axis=1)
+    meet = np.concatenate(faces)[pairs]
+    n, X = np.concatenate(normals)[meet], np.concatenate(centers)[meet]
+    angle = np.degrees(np.arccos(np.clip((n[:, 0] * n[:, 1]).sum(axis=1), -1, 1)))
+    step = X[:, 1] - X[:, 0]
+    ahead = (n[:, 0] * step).sum(axis=1) / np.maximum(np.linalg.norm(step, axis=1), 1e-300)
+    nodes = np.concatenate([np.zeros((0, 2), dtype=int), *ends])[pairs[:, 0]]
+    return Folds(pairs, meet, nodes, angle, ahead)
 
 
 def _straight(mesh: Mesh, block: Block) -> Mask:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,8 @@ DPI = 150
 """Dots per inch."""
 LARGEST = 100
 """Width and height of a figure in inches."""
+PALETTE = ("#9eb8d6", "#e0b56a", "#8fbf9a", "#d59a9a", "#b8a3d1", "#c9c9c9", "#7fb8bf", "#c7c06b")
+"""Colors of materials, one after the other."""
 PREFIXED = ("m", "Pa", "N", "J", "J/m³", "m/s", "m/s²", "N m", "Hz")
 """Units that take prefixes, such as MPa; numbers in others stay with a power of ten."""
 
@@ -127,9 +130,18 @@ def right_of(axes: Any) -> float:
     return float(reach) / DPI
 
 
+def entitle(axes: Any, title: str, lines: Sequence[str]) -> None:
+    """Write a title above axes, and small lines beneath it."""
+    axes.set_title(title, fontsize=11, pad=8 + 13 * len(lines))
+    if lines:
+        style = {"xycoords": "axes fraction", "textcoords": "offset points", "size": 9, "color": "0.25"}
+        axes.annotate("\n".join(lines), (0.5, 1), (0, 6), ha="center", va="bottom", **style)
+
+
 def title_widths(panels: list[Any]) -> list[float]:
-    """Return the widths of the titles of axes in inches."""
-    return [float(axes.title.get_window_extent().width) / DPI for axes in panels]
+    """Return the widths of the titles of axes, and of the lines beneath them, in inches."""
+    texts = [text for axes in panels for text in (axes.title, *axes.texts)]
+    return [float(text.get_window_extent().width) / DPI for text in texts]
 
 
 def text_in_inches(figure: Any, place: tuple[float, float], text: str) -> None:
@@ -222,7 +234,8 @@ def color_bar(axes: Any, colors: Any, unit: str, extend: str, *, upright: bool) 
     from matplotlib.ticker import EngFormatter, FuncFormatter, LogLocator
 
     low, high = colors.get_clim()
-    power = int(np.clip(3 * np.floor(np.log10(max(abs(low), abs(high))) / 3), -24, 24))
+    power = _power(max(abs(low), abs(high)))
+    power = 0 if power == -3 and unit not in PREFIXED else power
     shown = FuncFormatter(lambda value, _: f"{round(value / 10.0**power, 9) + 0.0:g}")
     way = "vertical" if upright else "horizontal"
     bar = axes.figure.colorbar(colors, cax=axes, orientation=way, format=shown, extend=extend)
@@ -237,15 +250,53 @@ def color_bar(axes: Any, colors: Any, unit: str, extend: str, *, upright: bool) 
     bar.outline.set_visible(False)
 
 
+def number_text(value: float, unit: str) -> str:
+    """Return a number to four digits with its unit, which has a prefix if it takes one."""
+    from matplotlib.ticker import EngFormatter
+
+    power = _power(value) if unit in PREFIXED else 0
+    return f"{value / 10.0**power:.4g} {EngFormatter.ENG_PREFIXES[power]}{unit}".rstrip()
+
+
+def _power(size: float) -> int:
+    """Return the power of ten of the prefix for numbers up to a size."""
+    return int(np.clip(3 * np.floor(np.log10(abs(size)) / 3), -24, 24)) if size else 0
+
+
+def categories(count: int) -> Any:
+    """Return what gives 0 … count - 1 their colors."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import ListedColormap, Normalize
+
+    some = [PALETTE[i % len(PALETTE)] for i in range(count)]
+    return ScalarMappable(Normalize(-0.5, count - 0.5), ListedColormap(some))
+
+
+def legend(axes: Any, entries: Sequence[tuple[str, Any, str]]) -> None:
+    """Fill axes with a legend of markers, colors and texts that hangs down from their upper left corner."""
+    from matplotlib.lines import Line2D
+
+    lines = [Line2D([], [], ls="", marker=marker, color=color, label=text) for marker, color, text in entries]
+    style: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (0, 1), "borderaxespad": 0.0}
+    without_frame(axes).legend(handles=lines, frameon=False, fontsize=8, handletextpad=0.2, **style)
+
+
 # ---- what is drawn ---------------------------------------------------------------------------------
 
 
-def polygons(axes: Any, corners: Array, colors: Array) -> Any:
+def shaded(color: str, light: Array) -> Array:
+    """Return a color under light (m,), (m, 4)."""
+    from matplotlib.colors import to_rgb
+
+    return np.column_stack([light[:, None] * to_rgb(color), np.ones(len(light))])
+
+
+def polygons(axes: Any, corners: Array, colors: Array, widths: Any = 0.45, zorder: float = 2) -> Any:
     """Draw flat polygons (m, k, 2) in their order, each edged in its own color (m, 4)."""
     from matplotlib.collections import PolyCollection
 
     flat: Any = corners
-    style: Any = {"facecolors": colors, "edgecolors": colors, "linewidths": 0.45, "zorder": 2}
+    style: Any = {"facecolors": colors, "edgecolors": colors, "linewidths": widths, "zorder": zorder}
     return axes.add_collection(PolyCollection(flat, **style), autolim=False)
 
 

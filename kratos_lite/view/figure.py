@@ -9,6 +9,7 @@ import numpy as np
 
 from kratos_lite.typing import Array
 from kratos_lite.view import canvas
+from kratos_lite.view.extremes import draw_extremes, texts
 from kratos_lite.view.facets import MANY, colored, draw_facets, facets_of, outline
 from kratos_lite.view.marks import draw_marks
 from kratos_lite.view.rulers import draw_rulers, draw_triad
@@ -26,6 +27,7 @@ def figure_of(subjects: Sequence[Subject], options: Options) -> Any:
     figure, panels, inch = compose(scene, options)
     for axes, subject in zip(panels, subjects, strict=True):
         draw_body(axes, scene, subject, inch)
+        draw_extremes(axes, scene, subject)
     return figure
 
 
@@ -80,12 +82,13 @@ def _laid_out(
     for subject in scene.subjects:
         axes = canvas.without_frame(canvas.axes_in_inches(figure, (0, 0), size))
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-        axes.set_title(subject.title if title is None else title, fontsize=11, pad=8)
+        lines = texts(subject, options.size[0] / len(scene.subjects) ** 2) if title is None else []
+        canvas.entitle(axes, subject.title if title is None else title, lines)
         panels.append(axes)
     step = np.array([max(size[0], *canvas.title_widths(panels)) + GAP, size[1] + GAP])
     # The rulers are those of the first panel of the last line, where they are in nobody's way.
     first = (len(panels) - 1) // columns * columns
-    if scene.zoomed or scene.subjects[first].moving:
+    if scene.zoom is not None or scene.subjects[first].moving:
         draw_triad(panels[first], scene.rows, scene.window, inch, units=scene.subjects[first].mesh.units)
     else:
         subject = scene.subjects[first]
@@ -94,8 +97,9 @@ def _laid_out(
     for number, axes in enumerate(panels):
         line, column = divmod(number, columns)
         canvas.move(axes, (column * step[0], -line * step[1]))
-    if scene.colors is not None:
+    if scene.colors is not None and not any(s.values and s.values.names for s in scene.subjects):
         _place_bar(figure, scene)
+    _place_legend(figure, scene)
     _place_title(figure, options.title)
     canvas.fit(figure)
     return figure, panels
@@ -120,6 +124,16 @@ def _place_bar(figure: Any, scene: Scene) -> None:
     canvas.color_bar(bar, scene.colors, values[0].unit, extend, upright=upright)
 
 
+def _place_legend(figure: Any, scene: Scene) -> None:
+    """Draw what marks and colors stand for beneath what is there."""
+    named = next((s.values.names for s in scene.subjects if s.values and s.values.names), ())
+    entries = [("s", scene.colors.to_rgba(i), name) for i, name in enumerate(named)]
+    entries += dict.fromkeys(entry for subject in scene.subjects for entry in subject.legend)
+    if entries:
+        (x0, y0), _ = canvas.bounds(figure)
+        canvas.legend(canvas.axes_in_inches(figure, (x0, y0 - 0.25), (0.1, 0.1)), entries)
+
+
 def _place_title(figure: Any, title: str) -> None:
     """Write the title above what is there."""
     if title:
@@ -135,13 +149,16 @@ def draw_body(axes: Any, scene: Scene, subject: Subject, inch: float, most: int 
         ends = outline(subject.mesh)
         drawn.append(canvas.lines(axes, ends @ scene.rows[:2].T))
     values = None if subject.values is None else subject.values.numbers
-    window = scene.window if scene.zoomed else None
-    most *= 3 if scene.zoomed else 1  # many of them are not seen
-    facets = facets_of(subject.mesh, scene.place(subject), values, scene.rows, scene.plane, most, window)
+    window = scene.window if scene.zoom is not None else None
+    most *= 3 if scene.zoom is not None else 1  # many of them are not seen
+    part = scene.part(subject)
+    facets = facets_of(
+        subject.mesh, scene.place(subject), values, scene.rows, scene.plane, most, window, inch / 72, part
+    )
     colors = colored(facets, None if values is None else scene.colors)
     drawn.append(draw_facets(axes, scene.rows, facets, colors))
-    for artist in drawn:
-        artist.set_clip_on(scene.zoomed)
     if subject.marks is not None:
         drawn += draw_marks(axes, scene.rows, subject.marks, inch)
+    for artist in drawn:
+        artist.set_clip_on(scene.zoom is not None)
     return drawn

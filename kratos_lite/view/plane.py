@@ -121,9 +121,15 @@ def clip_facets(P: Array, d: Array) -> tuple[Array, Ints]:
     return np.concatenate([P[whole], parts]), np.concatenate([whole, mixed[owner]])
 
 
-def clip_lines(E: Array, d: Array) -> Array:
-    """Return the parts of segments (m, 2, 3) with d ≤ 0, d (m, 2) linear."""
-    return _parts(d, E, np.array([[0, 1]]), CLIPPED_LINES)[1]
+def clip_lines(E: Array, d: Array) -> tuple[Array, Ints]:
+    """Return the parts of segments (m, 2, 3) with d ≤ 0, d (m, 2) linear, and the segment of each part."""
+    owner, parts = _parts(d, E, np.array([[0, 1]]), CLIPPED_LINES)
+    return parts, owner
+
+
+def cut_facets(P: Array, d: Array) -> Array:
+    """Return the segments (k, 2, 3) of facets (m, 4, 3) where d (m, 4), linear, is 0."""
+    return _parts(d, P, np.array([[0, 1, 2], [0, 2, 3]]), CUT_TRIANGLES)[1]
 
 
 # ---- sections --------------------------------------------------------------------------------------

@@ -9,16 +9,19 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.errors import InputError
-from kratos_lite.mesh import Mesh
-from kratos_lite.typing import Array
+from kratos_lite.mesh import Mesh, mask_of
+from kratos_lite.typing import Array, Ints, Mask
 from kratos_lite.view import canvas
 from kratos_lite.view.camera import View, box_corners, rows_of, window_of
-from kratos_lite.view.marks import Marks
+from kratos_lite.view.marks import Entry, Marks
 from kratos_lite.view.plane import Plane, plane_of
 from kratos_lite.view.rulers import rounded
 
 DECADES = 4
 """Powers of ten that a logarithmic scale of colors shows."""
+FEW, OWNED, SAME = 0.5, 0.1, 1e-6
+"""Percent of the values, at each end, that colors leave out if they take more than a part of the range of
+all others; and that range, beside the whole, up to which these are one value."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +32,8 @@ class Values:
     title: str = ""  # what they are
     unit: str = ""  # at the color bar
     log: bool = False  # whether their powers of ten matter
+    kind: str = ""  # how they are known at nodes, such as "recovered"
+    names: Sequence[str] = ()  # of what the numbers 0, 1, … stand for, if for things such as materials
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,8 +44,18 @@ class Subject:
     u: Array | None = None  # (n, 3) m, displacement; None of what has none
     values: Values | None = None  # what colors it
     title: str = ""  # above the picture
-    marks: Marks | None = None  # what holds it
+    marks: Marks | None = None  # what holds and pushes it
+    legend: Sequence[Entry] = ()  # what the marks stand for
     moving: bool = False  # whether it moves through space, so that its first place is none to show
+
+    @property
+    def is_nodal(self) -> bool:
+        """Whether the values are of nodes, not of elements."""
+        return self.values is None or len(self.values.numbers) == self.mesh.n_nodes
+
+    def rows(self) -> Ints:
+        """Return the rows of the values that are of elements, or of nodes of elements."""
+        return np.flatnonzero(self.mesh.used_nodes()) if self.is_nodal else np.arange(self.mesh.n_elements)
 
 
 @dataclass(eq=False)
@@ -66,11 +81,16 @@ class Scene:
     window: tuple[Array, Array]  # lower left and upper right of what is shown, in m in the picture
     colors: Any  # scale of colors, or None
     plane: Plane | None  # that cuts the bodies, or None
-    zoomed: bool = False  # whether the window cuts them off
+    zoom: Any = None  # factor, part or box that the window shows; then it cuts them off
 
     def place(self, subject: Subject) -> Array:
         """Return where the nodes of a subject are drawn, (n, 3) m."""
         return subject.mesh.points if subject.u is None else subject.mesh.points + self.scale * subject.u
+
+    def part(self, subject: Subject) -> Mask | None:
+        """Return the nodes (n,) of the part that the window shows, if it shows one."""
+        mesh = subject.mesh
+        return mask_of(mesh.nodes(self.zoom), mesh.n_nodes) if isinstance(self.zoom, str) else None
 
 
 def scene_of(subjects: Sequence[Subject], options: Options) -> Scene:
@@ -89,7 +109,7 @@ def scene_of(subjects: Sequence[Subject], options: Options) -> Scene:
         window_of(points[:, :2]),
         colors_of(subjects, options.clim),
         plane,
-        options.zoom is not None,
+        options.zoom,
     )
     scene.window = window_of(np.concatenate([drawn_points(scene, subject) for subject in subjects]))
     if options.zoom is not None:
@@ -98,7 +118,7 @@ def scene_of(subjects: Sequence[Subject], options: Options) -> Scene:
             low, high = points.min(axis=0), points.max(axis=0)
             raise InputError(
                 "zoom leaves nothing to draw: seen from there, it lies beside the body, which spans "
-                f"{_place(low)} … {_place(high)} m"
+                f"{place_text(low)} … {place_text(high)} m"
             )
     if plane is not None:
         plane.check(points)
@@ -106,8 +126,10 @@ def scene_of(subjects: Sequence[Subject], options: Options) -> Scene:
 
 
 def drawn_points(scene: Scene, subject: Subject) -> Array:
-    """Return the nodes of a subject in the picture, (k, 2), deformed and not."""
-    points = [scene.place(subject)] if subject.moving else [subject.mesh.points, scene.place(subject)]
+    """Return the outer nodes of a subject in the picture, (k, 2), deformed and not."""
+    nodes = np.unique(np.concatenate([block.nodes.ravel() for block in subject.mesh.boundary]))
+    undeformed, deformed = subject.mesh.points[nodes], scene.place(subject)[nodes]
+    points = [deformed] if subject.moving else [undeformed, deformed]
     if subject.marks is not None:
         points.append(subject.marks.points())
     return np.concatenate(points) @ scene.rows[:2].T
@@ -125,13 +147,15 @@ def factor_of(subjects: Sequence[Subject], wanted: float | None) -> float:
 
 def colors_of(subjects: Sequence[Subject], clim: tuple[float, float] | None) -> Any:
     """Return the scale of colors of all subjects, or None."""
-    values = [subject.values for subject in subjects if subject.values is not None]
+    values = [(subject.values, subject.rows()) for subject in subjects if subject.values is not None]
     if not values:
         return None
-    log = all(v.log for v in values)
+    if any(v.names for v, _ in values):
+        return canvas.categories(max(len(v.names) for v, _ in values))
+    log = all(v.log for v, _ in values)
     if clim is None:
-        numbers = np.concatenate([v.numbers for v in values])
-        low, high = float(numbers.min()), float(numbers.max())
+        numbers = np.concatenate([v.numbers[rows] for v, rows in values])
+        low, high = (float(numbers.min()), float(numbers.max())) if log else _range(numbers)
         if log:
             low = max(low, high * 10.0**-DECADES)
             log = high > 0
@@ -141,7 +165,18 @@ def colors_of(subjects: Sequence[Subject], clim: tuple[float, float] | None) -> 
     return canvas.color_scale(low, high, log=log)
 
 
-def _place(point: Array) -> str:
+def _range(numbers: Array) -> tuple[float, float]:
+    """Return the least and the largest number, but for a few at an end where these take much of the range."""
+    low, first = np.percentile(numbers, (0, FEW), method="lower").tolist()
+    last, high = np.percentile(numbers, (100 - FEW, 100), method="higher").tolist()
+    if last - first <= SAME * (high - low):  # only few differ from all others
+        return low, high
+    owned = OWNED * (last - first)
+    return first if first - low > owned else low, last if high - last > owned else high
+
+
+def place_text(point: Array) -> str:
+    """Return coordinates in brackets."""
     return f"({', '.join(f'{x:.5g}' for x in point)})"
 
 

@@ -13,7 +13,7 @@ from kratos_lite.mesh import Mesh
 from kratos_lite.typing import Array
 from kratos_lite.view import canvas
 from kratos_lite.view.camera import View, rows_of, window_of
-from kratos_lite.view.facets import INK, MANY, colored, draw_facets, facets_of
+from kratos_lite.view.facets import MANY, colored, draw_facets, facets_of
 from kratos_lite.view.figure import fitted
 from kratos_lite.view.marks import Marks, draw_marks
 from kratos_lite.view.rulers import draw_triad
@@ -49,9 +49,8 @@ def trajectory_figure(path: Path, view: View | None, title: str, size: tuple[flo
     )
     strengths = np.linspace(1, FADED, len(path.positions))[::-1].tolist()
     for strength, x, marks in zip(strengths, path.positions, path.marks, strict=True):
-        facets = facets_of(path.mesh, x, None, rows, most=MANY // len(path.positions))
-        ink = (*INK[:3], INK[3] * strength)
-        draw_facets(axes, rows, facets, colored(facets, strength=strength), ink).set_clip_on(False)
+        facets = facets_of(path.mesh, x, None, rows, most=MANY // len(path.positions), point=inch / 72)
+        draw_facets(axes, rows, facets, colored(facets, strength=strength), strength).set_clip_on(False)
         draw_marks(axes, rows, marks, inch, strength)
     axes.plot(*(path.centers @ rows[:2].T).T, color=PATH, lw=1.2, zorder=3)
     axes.plot(*(path.centers[[0, -1]] @ rows[:2].T).T, ".", color=PATH, ms=6, zorder=3)

@@ -1,0 +1,59 @@
+"""Extremes: the largest and the smallest value, in words and at their places."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from kratos_lite.mesh import with_rows
+from kratos_lite.tabular import unit_name
+from kratos_lite.typing import Array
+from kratos_lite.view import canvas
+from kratos_lite.view.marks import dots
+from kratos_lite.view.scene import Scene, Subject, place_text
+
+SYMBOLS = (("▲", "^"), ("▼", "v"))
+"""Of the largest and the smallest, in texts and in the picture."""
+LETTER = 0.07
+"""Inches, width of a letter."""
+
+
+def extremes(subject: Subject) -> list[int]:
+    """Return the rows of the largest and the smallest value; none of what has one value alone."""
+    values = subject.values
+    if values is None or values.names or not len(rows := subject.rows()):
+        return []
+    numbers = values.numbers[rows]
+    return [int(rows[numbers.argmax()]), int(rows[numbers.argmin()])] if np.ptp(numbers) else []
+
+
+def texts(subject: Subject, width: float) -> list[str]:
+    """Return what is said of the extremes, with coordinates where a width in inches holds them."""
+    mesh, values, long, brief = subject.mesh, subject.values, list[str](), list[str]()
+    for row, (symbol, _) in zip(extremes(subject), SYMBOLS, strict=False):
+        assert values is not None
+        what, ids = ("node", mesh.node_ids) if subject.is_nodal else ("element", mesh.element_ids)
+        number = canvas.number_text(values.numbers[row], values.unit)
+        where = f"{place_text(_place(subject, mesh.points, row))} {unit_name('m', mesh.units)}"
+        long.append(f"{symbol} {number} {values.kind}".rstrip() + f" at {what} {ids[row]}, {where}")
+        brief.append(f"{symbol} {number}, {what} {ids[row]}")
+    return long if LETTER * max(map(len, long), default=0) < width else brief
+
+
+def draw_extremes(axes: Any, scene: Scene, subject: Subject) -> None:
+    """Mark the extremes that no cut has taken away."""
+    for row, (_, marker) in zip(extremes(subject), SYMBOLS, strict=False):
+        X = _place(subject, subject.mesh.points, row)[None]
+        if scene.plane is None or scene.plane.distance(X)[0] <= 0:
+            place = _place(subject, scene.place(subject), row)[None] @ scene.rows[:2].T
+            for drawn in dots(axes, place, marker, 8, "w", 1.0):
+                drawn.set_clip_on(scene.zoom is not None)
+
+
+def _place(subject: Subject, x: Array, row: int) -> Array:
+    """Return the place (3,) of a node, or of the middle of an element, among nodes at x (n, 3)."""
+    if subject.is_nodal:
+        return np.asarray(x[row])
+    blocks = with_rows(subject.mesh.blocks)
+    return next(x[b.nodes[row - at.start]].mean(axis=0) for b, at in blocks if at.start <= row < at.stop)
