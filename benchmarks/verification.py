@@ -1,4 +1,4 @@
-"""The page of verification, with what other programs find: ``python -m benchmarks.verification``.
+"""The pages of verification, with what other programs find: ``python -m benchmarks.verification``.
 
 Every problem at rest is given to Kratos, CalculiX and scikit-fem as the same nodes, elements, supports and
 nodal forces; the quantity of the table follows from their nodal displacements.
@@ -26,6 +26,7 @@ from kratos_lite.verification.scenes import Scene
 from kratos_lite.verification.table import verify
 
 PAGE = ROOT / "docs" / "about" / "verification.md"
+PARTS = PAGE.with_suffix("")
 RESULTS = ROOT / "benchmarks" / "results" / "verification.json"
 COMMAND = "python -m benchmarks.verification"
 PEERS = ("Kratos", "CalculiX", "scikit-fem")
@@ -158,6 +159,20 @@ def kept(rows: list[Row]) -> tuple[list[Row], dict[str, str]]:
     return rows, told["versions"]
 
 
+def write_pages(text: str) -> None:
+    """Write the table as pages: the overview and the sources, and one page for each family."""
+    intro, overview, *families, sources = text.split("\n## ")
+    names = {title: family for family, title in page.TITLES.items()}
+    pages = {names[part.partition("\n")[0]]: f"# {part}" for part in families}
+    PARTS.mkdir(exist_ok=True)
+    for name, part in pages.items():
+        (PARTS / f"{name}.md").write_text(part, encoding="utf-8")
+    links = "".join(f"- [{page.TITLES[name]}]({PARTS.name}/{name}.md)\n" for name in pages)
+    tree = "\n".join(f"{PARTS.name}/{name}" for name in pages)
+    overview += f"\n## Values\n\n{links}\n```{{toctree}}\n:hidden:\n\n{tree}\n```\n"
+    PAGE.write_text("\n## ".join((intro, overview, sources)), encoding="utf-8")
+
+
 def main() -> None:
     """Compute the table, let the other programs solve its problems, and write the page."""
     parser = argparse.ArgumentParser(prog=COMMAND, description=__doc__)
@@ -169,7 +184,7 @@ def main() -> None:
             rows, versions = beside(rows, options.python, Path(folder))
         keep(rows, versions)
     rows, versions = kept(rows)
-    PAGE.write_text(page.markdown(rows, versions, COMMAND), encoding="utf-8")
+    write_pages(page.markdown(rows, versions, COMMAND))
     print(page.summary(rows))
 
 

@@ -11,8 +11,12 @@ from pathlib import Path
 DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS.parent), str(DOCS / "extensions")]
 
+from jupyter_client import KernelManager  # noqa: E402
+
 import kratos_lite  # noqa: E402
 
+if hasattr(KernelManager, "transport_encryption"):  # without, each notebook warns of it
+    KernelManager.transport_encryption.default_value = "auto"
 os.environ["KRATOS_LITE_PROGRESS"] = "off"  # pages show what stays, not what passes
 
 project = "kratos_lite"
@@ -33,6 +37,7 @@ extensions = [
     "gallery",
     "known_words",
     "public_names",
+    "search_texts",
 ]
 exclude_patterns = ["_static", "extensions", "images"]
 nitpicky = True
@@ -81,6 +86,7 @@ mathjax_path = "tex-svg-full.js"
 _mathjax = next(file for file in files("sphinx-mathjax-offline") or [] if file.name == mathjax_path)
 html_static_path = ["_static", str(_mathjax.locate())]
 html_css_files = ["site.css"]
+html_search_scorer = "extensions/scorer.js"
 
 # ---- links to other sites: python -m sphinx -b linkcheck docs build/links --------------------------
 

@@ -111,12 +111,15 @@ def test_pages_load_without_errors_and_from_the_site_alone(browser, site, page):
 
 @pytest.mark.parametrize(
     ("words", "page"),
-    [("hourglass", "tutorials/"), ("formulation", "choose-an-element"), ("reaction_resultant", "results")],
+    [
+        *(("hourglass", "tutorials/"), ("formulation", "choose-an-element")),
+        *(("reaction_resultant", "results"), ("bolt+preload", "words"), ("RBE3", "words")),
+    ],
 )
 def test_the_search_finds_pages(browser, site, words, page):
     browser.get(f"{site}search.html?q={words}")
     wait(browser, "document.querySelectorAll('#search-results li a').length > 0")
-    wait(browser, "/found \\d+|\\d+ page/.test(document.querySelector('#search-results').innerText)")
+    wait(browser, "/found (\\d+|one) page/.test(document.querySelector('#search-results').innerText)")
     links = [
         link.get_attribute("href") for link in browser.find_elements("css selector", "#search-results li a")
     ]
@@ -124,11 +127,21 @@ def test_the_search_finds_pages(browser, site, words, page):
     sound(browser)
 
 
+def test_hits_have_their_text_without_a_server(browser, site):
+    browser.get((SITE / "search.html").as_uri() + "?q=hourglass")
+    wait(browser, "document.querySelector('#search-results p.context')?.innerText.includes('hourglass')")
+
+
 def test_a_phone_shows_pages_in_its_width(browser, site):
     size = {"width": 390, "height": 844, "deviceScaleFactor": 1, "mobile": True}
     browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
     try:
-        for page in ("index.html", "reference/models.html", "gallery/index.html"):
+        for page in (
+            "index.html",
+            "reference/models.html",
+            "gallery/index.html",
+            "about/verification/shells.html",
+        ):
             browser.get(site + page)
             assert wait(browser, "document.documentElement.scrollWidth") <= 400, page
     finally:

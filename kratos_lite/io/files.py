@@ -146,8 +146,6 @@ def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
     ------
     InputError
         The thing is not one of these, or the format cannot hold it.
-    KratosLiteError
-        three.js is missing, which a page needs.
     """
     from kratos_lite.analysis.model import Model
     from kratos_lite.analysis.point_values import PointValues

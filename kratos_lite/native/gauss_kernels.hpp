@@ -187,109 +187,113 @@ KL_INLINE Local<V> gather_strained(const Elements& w, int64_t e) {
     return at;
 }
 
-// out (m, g, 6): C ε + σ0.
+// (g, 6): C ε + σ0.
 template <int V>
-KL_INLINE void stress_body(const Elements& w) {
-    PointState<V> s;
-    for (int64_t e = w.first; e < w.last; e += V) {
-        const Local<V> at = gather_strained<V>(w, e);
-        for (int q = 0; q < w.g; ++q) {
-            evaluate<V>(w, at, q, s);
-            for (int c = 0; c < 6; ++c) at.rest[6 * q + c] = s.stress[c];
-        }
-        store<V>(w, at.rest, 6 * w.g, e, w.out);
+KL_INLINE void find_stress(const Elements& w, const Local<V>& at, int64_t e, PointState<V>& s) {
+    for (int q = 0; q < w.g; ++q) {
+        evaluate<V>(w, at, q, s);
+        for (int c = 0; c < 6; ++c) at.rest[6 * q + c] = s.stress[c];
     }
+    store<V>(w, at.rest, 6 * w.g, e, w.out);
 }
 
-// out (m, k, 3): Σ B^T (C ε + σ0) γ det J.
+// (k, 3): Σ B^T (C ε + σ0) γ det J.
 template <int V>
-KL_INLINE void internal_load_body(const Elements& w) {
+KL_INLINE void find_internal_load(const Elements& w, const Local<V>& at, int64_t e, PointState<V>& s) {
     typedef vec<double, V> Vec;
-    PointState<V> s;
     const bool projected = w.addition.kind == Addition::dilatation;  // its transpose projects the stress
-    for (int64_t e = w.first; e < w.last; e += V) {
-        const Local<V> at = gather_strained<V>(w, e);
-        for (int a = 0; a < 3 * w.k; ++a) at.rest[a] = Vec{};
-        Vec* trace = at.rest + 3 * w.k;
-        for (int q = 0; projected && q < w.g; ++q) {
-            evaluate<V>(w, at, q, s);
-            trace[q] = s.stress[0] + s.stress[1] + s.stress[2];
-        }
-        if (projected) project<V>(w, at.X, trace, trace + w.g);
-        for (int q = 0; q < w.g; ++q) {
-            evaluate<V>(w, at, q, s);
-            if (projected) deviate<V>(w.addition.share, trace[q], s.stress);
-            for (int c = 0; c < 6; ++c) s.stress[c] *= s.dV;
-            Vec T[3][3], R[3][3];
-            times_symmetric<V>(s.inverse, s.stress, T);
-            for (int i = 0; i < 3; ++i)
-                for (int j = 0; j < 3; ++j) R[i][j] = T[j][i];
-            add_forces<V>(w, q, R, at.rest);
-        }
-        store<V>(w, at.rest, 3 * w.k, e, w.out);
+    for (int a = 0; a < 3 * w.k; ++a) at.rest[a] = Vec{};
+    Vec* trace = at.rest + 3 * w.k;
+    for (int q = 0; projected && q < w.g; ++q) {
+        evaluate<V>(w, at, q, s);
+        trace[q] = s.stress[0] + s.stress[1] + s.stress[2];
     }
+    if (projected) project<V>(w, at.X, trace, trace + w.g);
+    for (int q = 0; q < w.g; ++q) {
+        evaluate<V>(w, at, q, s);
+        if (projected) deviate<V>(w.addition.share, trace[q], s.stress);
+        for (int c = 0; c < 6; ++c) s.stress[c] *= s.dV;
+        Vec T[3][3], R[3][3];
+        times_symmetric<V>(s.inverse, s.stress, T);
+        for (int i = 0; i < 3; ++i)
+            for (int j = 0; j < 3; ++j) R[i][j] = T[j][i];
+        add_forces<V>(w, q, R, at.rest);
+    }
+    store<V>(w, at.rest, 3 * w.k, e, w.out);
 }
 
-// out (m, 2): ½ Σ ε C ε γ det J and the largest square of the von Mises stress.
+// (2): ½ Σ ε C ε γ det J and the largest square of the von Mises stress.
 template <int V>
-KL_INLINE void totals_body(const Elements& w) {
+KL_INLINE void find_totals(const Elements& w, const Local<V>& at, int64_t e, PointState<V>& s) {
     typedef vec<double, V> Vec;
+    Vec found[2] = {};
+    for (int q = 0; q < w.g; ++q) {
+        evaluate<V>(w, at, q, s);
+        Vec energy = {};
+        for (int c = 0; c < 6; ++c) energy += s.strain[c] * s.elastic[c];
+        found[0] += 0.5 * energy * s.dV;
+        const Vec* t = s.stress;
+        const Vec xy = t[0] - t[1], yz = t[1] - t[2], zx = t[2] - t[0];
+        const Vec square = 0.5 * (xy * xy + yz * yz + zx * zx) + 3.0 * (t[3] * t[3] + t[4] * t[4] + t[5] * t[5]);
+        found[1] = square > found[1] ? square : found[1];
+    }
+    store<V>(w, found, 2, e, w.out);
+}
+
+// (k, 6): C ε + σ0 taken to the nodes; second (6): its mean over the volume.
+template <int V>
+KL_INLINE void find_averages(const Elements& w, const Local<V>& at, int64_t e, PointState<V>& s) {
+    typedef vec<double, V> Vec;
+    Vec *stress = at.rest, *nodal = stress + 6 * w.g, mean[6] = {}, volume = {};
+    for (int q = 0; q < w.g; ++q) {
+        evaluate<V>(w, at, q, s);
+        volume += s.dV;
+        for (int c = 0; c < 6; ++c) {
+            stress[6 * q + c] = s.stress[c];
+            mean[c] += s.stress[c] * s.dV;
+        }
+    }
+    for (int c = 0; c < 6; ++c) mean[c] /= volume;
+    for (int a = 0; a < w.k; ++a)
+        for (int c = 0; c < 6; ++c) {
+            Vec sum = {};
+            for (int q = 0; q < w.g; ++q) sum += w.to_nodes[static_cast<int64_t>(w.g) * a + q] * stress[6 * q + c];
+            nodal[6 * a + c] = sum;
+        }
+    store<V>(w, nodal, 6 * w.k, e, w.out);
+    store<V>(w, mean, 6, e, w.second + 6 * w.origin);
+}
+
+enum class Wanted { stress, internal_load, totals, averages };
+
+// out (m, …): what is wanted of the strains of each element. One body for all: most of the code finds the strains.
+template <int V>
+KL_INLINE void strained_body(const Elements& w, Wanted wanted) {
     PointState<V> s;
     for (int64_t e = w.first; e < w.last; e += V) {
         const Local<V> at = gather_strained<V>(w, e);
-        Vec found[2] = {};
-        for (int q = 0; q < w.g; ++q) {
-            evaluate<V>(w, at, q, s);
-            Vec energy = {};
-            for (int c = 0; c < 6; ++c) energy += s.strain[c] * s.elastic[c];
-            found[0] += 0.5 * energy * s.dV;
-            const Vec* t = s.stress;
-            const Vec xy = t[0] - t[1], yz = t[1] - t[2], zx = t[2] - t[0];
-            const Vec square =
-                0.5 * (xy * xy + yz * yz + zx * zx) + 3.0 * (t[3] * t[3] + t[4] * t[4] + t[5] * t[5]);
-            found[1] = square > found[1] ? square : found[1];
+        switch (wanted) {
+            case Wanted::stress: find_stress<V>(w, at, e, s); break;
+            case Wanted::internal_load: find_internal_load<V>(w, at, e, s); break;
+            case Wanted::totals: find_totals<V>(w, at, e, s); break;
+            case Wanted::averages: find_averages<V>(w, at, e, s); break;
         }
-        store<V>(w, found, 2, e, w.out);
     }
 }
 
-// out (m, k, 6): C ε + σ0 taken to the nodes; second (m, 6): its mean over the volume.
-template <int V>
-KL_INLINE void averages_body(const Elements& w) {
-    typedef vec<double, V> Vec;
-    PointState<V> s;
-    for (int64_t e = w.first; e < w.last; e += V) {
-        const Local<V> at = gather_strained<V>(w, e);
-        Vec *stress = at.rest, *nodal = stress + 6 * w.g, mean[6] = {}, volume = {};
-        for (int q = 0; q < w.g; ++q) {
-            evaluate<V>(w, at, q, s);
-            volume += s.dV;
-            for (int c = 0; c < 6; ++c) {
-                stress[6 * q + c] = s.stress[c];
-                mean[c] += s.stress[c] * s.dV;
-            }
-        }
-        for (int c = 0; c < 6; ++c) mean[c] /= volume;
-        for (int a = 0; a < w.k; ++a)
-            for (int c = 0; c < 6; ++c) {
-                Vec sum = {};
-                for (int q = 0; q < w.g; ++q)
-                    sum += w.to_nodes[static_cast<int64_t>(w.g) * a + q] * stress[6 * q + c];
-                nodal[6 * a + c] = sum;
-            }
-        store<V>(w, nodal, 6 * w.k, e, w.out);
-        store<V>(w, mean, 6, e, w.second + 6 * w.origin);
-    }
+inline void over_strains(const Elements& w, Wanted wanted) {
+    dispatch<double>([&](auto V) KL_INLINE_LAMBDA { strained_body<V>(w, wanted); });
 }
+
+inline void stress(const Elements& w) { over_strains(w, Wanted::stress); }
+inline void internal_load(const Elements& w) { over_strains(w, Wanted::internal_load); }
+inline void totals(const Elements& w) { over_strains(w, Wanted::totals); }
+inline void averages(const Elements& w) { over_strains(w, Wanted::averages); }
 
 KL_DISPATCH(clearly_positive, clearly_positive_body, const Elements&)
 KL_DISPATCH(interpolated, interpolated_body, const Elements&)
 KL_DISPATCH(volumes, volumes_body, const Elements&)
 KL_DISPATCH(row_sums, row_sums_body, const Elements&)
 KL_DISPATCH(body_force, body_force_body, const Elements&)
-KL_DISPATCH(stress, stress_body, const Elements&)
-KL_DISPATCH(internal_load, internal_load_body, const Elements&)
-KL_DISPATCH(totals, totals_body, const Elements&)
-KL_DISPATCH(averages, averages_body, const Elements&)
 
 }  // namespace kl

@@ -99,7 +99,6 @@ def test_nodes_between_materials_have_the_mean_of_both_sides():
 
 
 def test_files_pictures_and_pages_hold_every_listed_field(tmp_path):
-    pytest.importorskip("trimesh")
     result = bar("KinematicLinear3D20N").solve()
     for name in ("a.vtu", "a.csv", "a.html"):
         kl.write(tmp_path / name, result)

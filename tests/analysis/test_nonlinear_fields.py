@@ -140,7 +140,6 @@ def test_what_is_linear_has_no_plastic_strain():
 
 
 def test_files_tables_and_pictures_of_a_bar_that_yields(tmp_path, yielded):
-    pytest.importorskip("trimesh")
     for name in ("a.vtu", "a.csv", "a.html", "a.pvtu"):
         kl.write(tmp_path / name, yielded)
     kl.write(tmp_path / "points.csv", yielded.at(POINTS))

@@ -75,7 +75,6 @@ def test_the_summary_says_which_steps_were_cut():
 
 
 def test_series_of_steps(tmp_path, steps):
-    pytest.importorskip("trimesh")
     analysis, states = steps
     for ending in ("pvd", "csv", "npz", "html"):
         with kl.SeriesWriter(tmp_path / f"pull.{ending}", analysis) as series:

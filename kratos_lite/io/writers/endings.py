@@ -46,11 +46,6 @@ def check_ending(path: str | Path, wanted: str) -> None:
 
 
 def _check(path: str | Path, endings: tuple[str, ...], text: str) -> None:
-    """Raise InputError for another ending; KratosLiteError where a page lacks its library."""
-    ending = Path(path).suffix.lower()
-    if ending not in endings:
+    """Raise InputError for another ending."""
+    if Path(path).suffix.lower() not in endings:
         raise InputError(f"{path}: {text}")
-    if ending == ".html":
-        from kratos_lite.io.writers.page.library import library  # rarely needed
-
-        library()

@@ -47,8 +47,6 @@ def write_modes(
     ------
     InputError
         Another ending or mode, arrays of other shapes or not finite, or the file cannot be written.
-    KratosLiteError
-        three.js is missing, which a page needs.
 
     Examples
     --------

@@ -142,8 +142,6 @@ class SeriesWriter:
         The extension is not one of these, or a file cannot be written.
     ModelError
         The body has no mesh, or is a batch of bodies.
-    KratosLiteError
-        three.js is missing, which a page needs.
 
     Examples
     --------

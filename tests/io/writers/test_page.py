@@ -4,19 +4,17 @@ import base64
 import json
 import re
 import struct
-import sys
 import zlib
 
 import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.errors import InputError, KratosLiteError, SolveError
+from kratos_lite.errors import InputError, SolveError
 from kratos_lite.io.writers.page.lattices import TETRAHEDRA, lattice_of_cell, lattice_of_face
 from kratos_lite.shapes import LINEAR, SHAPES
 from kratos_lite.view.facets import sharp_edges
 
-pytest.importorskip("trimesh")
 CELLS = [
     *("Tetrahedron4", "Tetrahedron10", "Hexahedron8", "Hexahedron20", "Hexahedron27"),
     *("Wedge6", "Wedge15", "Pyramid5", "Pyramid13"),
@@ -220,22 +218,6 @@ def test_a_title_is_no_markup(result, tmp_path):
     kl.write(tmp_path / "a<b>&amp{data}.html", result)
     text = (tmp_path / "a<b>&amp{data}.html").read_text(encoding="utf-8")
     assert "<title>a&lt;b&gt;&amp;amp{data}</title>" in text
-
-
-def test_without_three_js_the_cure_is_named_and_nothing_written(result, tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "trimesh", None)
-    with pytest.raises(KratosLiteError, match=r"pip install kratos-lite\[page\]"):
-        kl.write(tmp_path / "a.html", result)
-    assert not list(tmp_path.iterdir())
-
-
-def test_a_trimesh_without_three_js_is_named(result, tmp_path, monkeypatch):
-    (tmp_path / "trimesh").mkdir()
-    (tmp_path / "trimesh" / "__init__.py").write_text("")
-    monkeypatch.delitem(sys.modules, "trimesh", raising=False)
-    monkeypatch.syspath_prepend(tmp_path)
-    with pytest.raises(KratosLiteError, match=r"viewer.zip: no three.js is found there"):
-        kl.write(tmp_path / "a.html", result)
 
 
 def test_modes_keep_their_shapes_and_have_names(tmp_path):

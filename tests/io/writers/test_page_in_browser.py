@@ -1,5 +1,6 @@
 """Pages in a browser: they open without an error or a request, and their controls change the picture."""
 
+import itertools
 import json
 import re
 import shutil
@@ -12,7 +13,6 @@ from kratos_lite.shapes import SHAPES
 
 webdriver = pytest.importorskip("selenium.webdriver")
 WebDriverWait = pytest.importorskip("selenium.webdriver.support.wait").WebDriverWait
-pytest.importorskip("trimesh")
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 DRIVER = shutil.which("chromedriver")
 pytestmark = pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="no chromium with its chromedriver")
@@ -245,6 +245,18 @@ def test_a_cut_shows_the_section_and_its_values(browser, element, tmp_path):
         length = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1).sum()
         # rectangles, each with all its sides; triangles of cells that are no bricks add diagonals
         assert length > 2 * 2 * (2 + 1) - 1e-3
+        for outline in ("trace", "outlineTrace"):  # of a section of 2 × 1
+            ends = browser.array(f"page.{outline}.geometry.attributes.position.array").reshape(-1, 2, 3)
+            assert abs(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() - 6.0) < 1e-4
+            assert abs(ends[..., 0] - x).max() < 1e-5
+
+
+def test_a_new_cut_shows_its_section(page):
+    for view, axis in itertools.product(([1, -1, 1], [-1, 1, -1], [1, 0, 0]), "xyz"):
+        page("page.stage.look(arguments[0])", view)
+        page.set("axis", axis)
+        toward = "page.stage.camera.position.clone().normalize().dot(new THREE.Vector3(...page.normal))"
+        assert page(f"return {toward}") > 0.2
 
 
 def meters(text):
@@ -259,7 +271,8 @@ def test_the_pointer_tells_node_element_and_value(page, result):
         page(f"document.querySelector('[data-view=\"{direction}\"]').click()")
         page.pixels()
         view = page.driver.find_element("id", "view")
-        webdriver.ActionChains(page.driver).move_to_element(view).move_by_offset(17, 11).perform()
+        middle = round(page("return (legend.offsetLeft + legend.offsetWidth) / 2"))
+        webdriver.ActionChains(page.driver).move_to_element(view).move_by_offset(middle + 17, 11).perform()
         text = page("return pointer.hidden ? '' : pointer.textContent")
         value, node, place, nodal, element = re.fullmatch(
             r"(\S+ .?m)\nnode (\d+) at \((.*)\) m: (\S+ .?m)\nelement (\d+)", text
@@ -281,7 +294,10 @@ def test_the_pointer_sees_the_section_behind_what_is_cut_away(page):
     page.set("depth", 0.4)
     page("document.querySelector('[data-view=\"1,0,0\"]').click()")
     page.pixels()
-    found = page("return page.find(...page.stage.ray(view.clientWidth / 2, view.clientHeight / 2))")
+    found = page("""
+        const middle = (view.clientWidth + legend.offsetLeft + legend.offsetWidth) / 2;
+        return page.find(...page.stage.ray(middle, view.clientHeight / 2));
+    """)
     assert abs(found["point"][0] - page("return page.offset")) < 1e-4
 
 
@@ -305,6 +321,8 @@ def test_modes_swing_to_both_sides(browser, model, tmp_path):
         assert browser("return document.getElementById('frame-name').textContent") == name
         seen.add(browser.pixels())
     assert len(seen) == 3
+    step = "document.querySelector('[data-step=\"1\"]').click(); return page.frame"
+    assert [browser(step) for _ in names] == [0, 1, 2]
     browser.click("play")
     wait = WebDriverWait(browser.driver, 30, 0.02)
     for sign in (1, -1):
@@ -341,6 +359,9 @@ def test_states_play_with_one_range_for_all(browser, model, tmp_path):
     browser.click("play")
     wait = WebDriverWait(browser.driver, 30, 0.02)
     wait.until(lambda _: browser("return page.frame") != 6)
+    back = "const shown = page.frame; document.querySelector('[data-step=\"-1\"]').click(); return shown"
+    shown = browser(back)
+    assert browser("return [page.playing, page.frame]") == [False, (shown - 1) % 7]
 
 
 def test_all_kinds_of_cells_together_are_shown_and_cut(browser, tmp_path):
@@ -388,8 +409,33 @@ def test_a_narrow_window_keeps_body_and_controls_apart(page):
         )
         assert view[1] <= aside[0] + 1
         assert view[2] == aside[2]
+        leftmost, right = page("""
+            const { camera } = page.stage, X = page.surface.positions, box = view.getBoundingClientRect();
+            let least = 1;
+            for (let i = 0; i < X.length; i += 3)
+              least = Math.min(least, new THREE.Vector3(X[i], X[i + 1], X[i + 2]).project(camera).x);
+            return [box.left + (least + 1) / 2 * box.width, legend.getBoundingClientRect().right];
+        """)
+        assert leftmost > right
     finally:
         page.driver.set_window_size(size["width"], size["height"])
+
+
+def test_a_dark_browser_has_a_dark_page(page):
+    seen = {}
+    for style in ("light", "dark"):
+        features = [{"name": "prefers-color-scheme", "value": style}]
+        page.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+        seen[style] = page("""
+            const pen = page.legend.over(page.stage.renderer.domElement).getContext("2d");
+            const ink = getComputedStyle(legend).color.match(/\\d+/g).map(Number);
+            return [Math.max(...pen.getImageData(2, 2, 1, 1).data.slice(0, 3)), Math.max(...ink)];
+        """)
+    page.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+    assert seen["light"][0] == 255
+    assert seen["light"][1] < 80
+    assert seen["dark"][0] < 60
+    assert seen["dark"][1] > 200
 
 
 def test_without_webgl_a_page_says_so(browser, written, tmp_path):

@@ -15,14 +15,14 @@ from kratos_lite.analysis.fields import FIELDS, PARTS, listed
 from kratos_lite.atomic import refuse_nan, write_whole
 from kratos_lite.errors import InputError, SolveError
 from kratos_lite.io.writers.page.content import Content, Frame
-from kratos_lite.io.writers.page.library import library
 from kratos_lite.typing import Array, Complexes
 
 if TYPE_CHECKING:
     from kratos_lite.analysis.result import Result
     from kratos_lite.mesh import Mesh
 
-OURS = Path(__file__).with_name("browser")
+BROWSER = Path(__file__).with_name("browser")
+"""Our style and scripts, and three.js with its license."""
 LARGEST = 1e38
 """Largest number in a page, which has single precision."""
 SCRIPTS = ("data.js", "fields.js", "body.js", "stage.js", "legend.js", "app.js")
@@ -30,7 +30,6 @@ SCRIPTS = ("data.js", "fields.js", "body.js", "stage.js", "legend.js", "app.js")
 
 def write_page(path: str | Path, content: Content) -> None:
     """Write a page, as a whole or not at all; InputError for a mesh without a surface."""
-    parts = {"library": library(), "title": html.escape(content.title)}
     if content.mesh.units != "SI":
         text = f"pages are in SI, and this mesh is in {content.mesh.units}"
         raise InputError(f"{path}: {text}; write .vtu or a picture")
@@ -41,12 +40,20 @@ def write_page(path: str | Path, content: Content) -> None:
         for field, values in zip(content.fields, frame.values, strict=True):
             refuse_nan(path, field.name, values)
             _refuse_large(path, field.name, values)
-    parts["data"] = content.packed()
-    parts["style"] = (OURS / "page.css").read_text(encoding="utf-8")
-    parts["script"] = "\n".join((OURS / name).read_text(encoding="utf-8") for name in SCRIPTS)
-    pieces = re.split(r"\{(\w+)\}", (OURS / "page.html").read_text(encoding="utf-8"))
+    parts = {
+        "title": html.escape(content.title),
+        "style": _text("page.css"),
+        "library": _text("three.js"),
+        "data": content.packed(),
+        "script": "\n".join(map(_text, SCRIPTS)),
+    }
+    pieces = re.split(r"\{(\w+)\}", _text("page.html"))
     pieces[1::2] = [parts[name] for name in pieces[1::2]]
     write_whole(path, "".join(pieces).encode())
+
+
+def _text(name: str) -> str:
+    return (BROWSER / name).read_text(encoding="utf-8")
 
 
 def _refuse_large(path: str | Path, name: str, values: Array) -> None:

@@ -1,6 +1,6 @@
 // The page: what the controls mean.
 
-const INK = 0x10141c;
+const INK = 0x10141c, GRAY = 0x8a8f98;
 const FRAMES_PER_SECOND = 20, SECONDS_PER_CYCLE = 3;
 
 class Page {
@@ -16,10 +16,14 @@ class Page {
     this.edges = stage.lines(INK, 0.45, true);
     this.edges.geometry.setAttribute("position", this.body.geometry.attributes.position);
     this.edges.geometry.setIndex(new THREE.BufferAttribute(this.surface.edges, 1));
-    this.outline = stage.lines(0x8a8f98, 1, true);
+    this.undeformed = new Float32Array(this.surface.positions.length);
+    spread(this.surface, data.points, 3, this.undeformed);
+    this.outline = stage.lines(GRAY, 1, true);
     stage.reshape(this.outline, data.points, Uint32Array.from(data.outline));
+    this.outlineTrace = stage.lines(GRAY, 1, false);
     this.cap = stage.triangles(false);
     this.capLines = stage.lines(INK, 0.45, false);
+    this.trace = stage.lines(INK, 1, false);
     this.mark = stage.mark(0xd2342a, 8);
     this.legend = new Legend();
     this.section = null;
@@ -44,8 +48,8 @@ class Page {
     });
     $("field").value = data.shown;
     $("frame").max = data.frames.length - 1;
-    $("of-frame").hidden = data.frames.length < 2;
-    $("of-frame").firstChild.data = data.kind === "modes" ? "Mode " : "State ";
+    for (const control of document.querySelectorAll(".of-frame")) control.hidden = data.frames.length < 2;
+    $("frame-kind").textContent = data.kind === "modes" ? "Mode" : "State";
     $("hollow").hidden = data.cells.length > 0;
     $("edges").checked = this.edges.visible = data.edged;
     this.on("field", "change", () => this.choose());
@@ -54,7 +58,10 @@ class Page {
     this.on("frame", "input", () => this.turnTo(Number($("frame").value)));
     this.on("scale", "input", () => this.update());
     this.on("play", "click", () => this.play());
-    for (const id of ["axis", "flip", "depth"]) this.on(id, "input", () => this.update());
+    for (const button of document.querySelectorAll("[data-step]"))
+      button.addEventListener("click", () => this.turnTo(this.frame + Number(button.dataset.step)));
+    this.on("axis", "input", () => this.faceSection());
+    for (const id of ["flip", "depth"]) this.on(id, "input", () => this.update());
     for (const [id, thing] of [["edges", "edges"], ["outline", "outline"]])
       this.on(id, "change", () => { this[thing].visible = $(id).checked; this.update(); });
     for (const button of document.querySelectorAll("[data-view]"))
@@ -102,9 +109,10 @@ class Page {
   }
 
   turnTo(frame) {
-    if (this.playing) this.play(false);
-    this.show(frame);
-    if (this.data.kind === "modes") this.fit();
+    const { frames, kind } = this.data;
+    if (this.playing && kind === "states") this.play(false);
+    this.show((frame + frames.length) % frames.length);
+    if (kind === "modes") this.fit();
   }
 
   fit() {
@@ -147,6 +155,15 @@ class Page {
     this.stage.draw();
   }
 
+  // Of a new cut keep the half behind the plane, so that its section is in view at once.
+  faceSection() {
+    const axis = "xyz".indexOf($("axis").value || " ");
+    const ahead = this.stage.camera.getWorldDirection(new THREE.Vector3()).toArray()[axis];
+    if (Math.abs(ahead) < 0.2) this.stage.look([1, -1, 1]);
+    $("flip").checked = this.stage.camera.position.toArray()[axis] < this.stage.controls.target.toArray()[axis];
+    this.update();
+  }
+
   cut() {
     this.section = null;
     const axis = "xyz".indexOf($("axis").value || " "), sign = $("flip").checked ? -1 : 1;
@@ -154,6 +171,10 @@ class Page {
     this.normal = [0, 1, 2].map((i) => (i === axis ? sign : 0));
     this.offset = axis < 0 ? 1e30 : sign * (2 * Number($("depth").value) - 1) * this.data.reach[axis];
     this.stage.plane.set(new THREE.Vector3(...this.normal).negate(), this.offset);
+    const { positions, corners } = this.surface;
+    for (const [lines, X] of [[this.trace, positions], [this.outlineTrace, this.undeformed]])
+      this.stage.reshape(lines, axis < 0 ? new Float32Array() : trace(X, corners, this.normal, this.offset));
+    this.outlineTrace.visible = this.outline.visible;
     const hasSection = axis >= 0 && this.data.cells.length > 0;
     this.cap.visible = hasSection;
     this.capLines.visible = hasSection && this.edges.visible;
@@ -172,7 +193,7 @@ class Page {
     const { camera } = this.stage;
     const ends = [..."xyz"].map((name, i) => {
       const axis = new THREE.Vector3().setComponent(i, 1).transformDirection(camera.matrixWorldInverse);
-      return [axis, name, ["#c33", "#293", "#24c"][i]];
+      return [axis, name, ["#d33", "#2a4", "#36f"][i]];
     }).sort(([one], [other]) => one.z - other.z);
     const drawn = ([{ x, y }, name, color]) =>
       `<line x2="${34 * x}" y2="${-34 * y}" stroke="${color}" stroke-width="3"/>`
@@ -185,7 +206,7 @@ class Page {
   play(on = !this.playing) {
     this.playing = on;
     $("play").setAttribute("aria-pressed", on);
-    $("play").textContent = on ? "■ stop" : "▶ animate";
+    $("play").textContent = on ? "■ stop" : "▶ play";
     if (!on) {
       [this.phase, this.quarter] = [1, 0];
       this.update();

@@ -136,6 +136,18 @@ function between(one, other) {
   return one.map((value, i) => value + share * (other[i] - value));
 }
 
+// Lines where a plane cuts the triangles of a surface.
+function trace(positions, corners, normal, offset) {
+  const lines = [], distance = (point) => dot(normal, positions, 3 * point) - offset;
+  for (let t = 0; t < corners.length; t += 3) {
+    const [a, b, c] = [corners[t], corners[t + 1], corners[t + 2]], [d, e, f] = [distance(a), distance(b), distance(c)];
+    for (const [i, j, from, to] of [[a, b, d, e], [b, c, e, f], [c, a, f, d]])
+      if (from <= 0 !== to <= 0) for (let axis = 0; axis < 3; axis++)
+        lines.push(positions[3 * i + axis] + from / (from - to) * (positions[3 * j + axis] - positions[3 * i + axis]));
+  }
+  return Float32Array.from(lines);
+}
+
 // First triangle that a ray hits, or null: Möller & Trumbore, Journal of Graphics Tools 2 (1997) 21-28.
 function hit(positions, corners, origin, direction, isHidden) {
   const [dx, dy, dz] = direction, [ox, oy, oz] = origin, n = corners ? corners.length : positions.length / 3;

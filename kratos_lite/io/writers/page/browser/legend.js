@@ -20,7 +20,6 @@ class Legend {
       return tick;
     }));
     [$("low").value, $("high").value] = [low, high].map(shown);
-    $("legend").hidden = false;
   }
 
   // Return a number that somebody typed, in the unit of the legend.
@@ -33,6 +32,8 @@ class Legend {
     const canvas = document.createElement("canvas"), pen = canvas.getContext("2d");
     const size = body.height / body.clientHeight, origin = body.getBoundingClientRect();
     [canvas.width, canvas.height] = [body.width, body.height];
+    pen.fillStyle = getComputedStyle(document.body).backgroundColor;
+    pen.fillRect(0, 0, canvas.width, canvas.height);
     pen.drawImage(body, 0, 0);
     pen.scale(size, size);
     pen.fillStyle = getComputedStyle($("view")).color;

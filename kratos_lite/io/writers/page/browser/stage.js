@@ -10,9 +10,8 @@ class Stage {
   constructor(target, radius) {
     this.target = target;
     this.radius = radius;
-    this.renderer = new THREE.WebGLRenderer({ antialias: true, preserveDrawingBuffer: true });
+    this.renderer = new THREE.WebGLRenderer({ alpha: true, antialias: true, preserveDrawingBuffer: true });
     this.renderer.setPixelRatio(window.devicePixelRatio);
-    this.renderer.setClearColor(0xffffff);
     this.renderer.localClippingEnabled = true;
     target.prepend(this.renderer.domElement);
     this.plane = new THREE.Plane();
@@ -34,13 +33,15 @@ class Stage {
     turn();
   }
 
+  // Nothing lies under the legend: the body is in the middle of what it leaves free.
   resize() {
     const { clientWidth: width, clientHeight: height } = this.target;
     if (!width || !height) return;
     this.renderer.setSize(width, height);
-    const top = 1.15 * this.radius / Math.min(1, width / height), right = top * width / height;
+    const legend = $("legend").offsetLeft + $("legend").offsetWidth;
+    const top = 1.05 * this.radius / Math.min(1, (width - legend) / height), right = top * width / height;
     Object.assign(this.camera, { left: -right, right, top, bottom: -top });
-    this.camera.updateProjectionMatrix();
+    this.camera.setViewOffset(width, height, -legend / 2, 0, width, height);
     this.controls.handleResize();
     this.draw();
   }
