@@ -14,7 +14,7 @@ from kratos_lite.assembly.element_groups import ElementGroup, group_of_element
 from kratos_lite.assembly.gauss_point_fields import at_gauss, in_order, totals
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Csr
 from kratos_lite.validation import choice, short
 
 if TYPE_CHECKING:
@@ -42,6 +42,7 @@ class ElementFields:
         self.u = u
         u.setflags(write=False)  # strains and stresses are made of it later
         self._strained = u if u0 is None else u - u0
+        self._springs: Csr | None = None  # (3n, 3n) N/m
 
     # ---- strains and stresses ----------------------------------------------------------------------
 

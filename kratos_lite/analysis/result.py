@@ -19,7 +19,7 @@ from kratos_lite.model.loads import Load
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.linear_solver import Solution
 from kratos_lite.tabular import Tabular, in_units
-from kratos_lite.typing import Array, ArrayLike, Csr, Numbers
+from kratos_lite.typing import Array, ArrayLike, Numbers
 from kratos_lite.validation import finite, flag, instance, whole_number
 
 if TYPE_CHECKING:
@@ -86,7 +86,6 @@ class Result(ElementFields, Tabular):
         self._analysis = analysis
         self._version = analysis.model.version if analysis else None
         self._acting: Sequence[Load] = ()  # loads of a static analysis
-        self._springs: Csr | None = None  # (3n, 3n) N/m
 
     @property
     def units(self) -> str:  # type: ignore[override]

@@ -44,9 +44,10 @@ def test_files_and_tables_of_statics_are_those_of_calculix(name, tmp_path):
     cut = [text[text.index("    2C") : text.index("    1PSTEP")] for text in (ours, frd)]
     assert cut[0] == cut[1]
     for (_, field, *_, values), (*_, expected) in zip(blocks(ours), theirs, strict=True):
-        if field != "ERROR":  # estimated otherwise
-            # all six digits, but for their last one where it is decided by the rounding of a solution
-            assert np.abs(values - expected).max() <= 1e-6 * 1.01 * np.abs(expected).max(), field
+        # all six digits, but for their last one where it is decided by the rounding of a solution; constants
+        # of errors have four to six
+        least = 2e-5 if field == "ERROR" else 1.01e-6
+        assert np.abs(values - expected).max() <= least * np.abs(expected).max(), field
     ids, elements = np.sort(mesh.nodes("x-")), np.arange(mesh.n_elements)
     lines = [line for v in ("U", "RF") for line in dat.prints(result, ids, v, "FIXED", totals="YES")]
     for variable in ("S", "E", "ENER", "COORD", "EVOL", "ELSE"):

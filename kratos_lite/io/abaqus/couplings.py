@@ -41,6 +41,9 @@ class Connections:
         self.ties = list[tuple[Ints, Ints, float | None]]()
         self.springs = list[tuple[Card, Ints, Array, float]]()  # dofs (m, k), directions (m, k), N/m
         self.turning = list[tuple[Ints, Card]]()  # rotations (3,) of rigid parts
+        self.passed = list[
+            tuple[Ints, Ints, Array]
+        ]()  # dofs (m,) and (k,) of reference nodes, which u = R u_k follow
         cards.twin = np.arange(mesh.n_nodes)
         self.axes: Axes  # of nodes
         self._coupling: tuple[int, Card] | None = None
@@ -206,6 +209,7 @@ class Connections:
         some = np.isin(np.tile(range(3), len(nodes)), axes)
         R = rigid_modes(self.mesh.points[nodes], self.mesh.points[ref])[some]
         self._follow(dofs_of(nodes)[some], np.tile(six, (len(R), 1)), R)
+        self.passed.append((dofs_of(nodes)[some], six, R))
         self.turning.append((six[3:], card))
 
     def _cut(self, card: Card) -> None:
@@ -226,6 +230,14 @@ class Connections:
         others = np.column_stack([dofs_of(rows), np.full(3 * len(rows), 3 * self._node(card, "NODE"))])
         along = np.tile(n / np.linalg.norm(n), len(rows))
         self._follow(dofs_of(copies), others, np.column_stack([np.ones(len(others)), along]))
+        self.passed.append((dofs_of(copies), others[:1, 1], along[:, None]))
+
+    def at_references(self, forces: Array) -> Array:
+        """Return forces (n, 3), at reference nodes of rigid parts and cuts those of what follows these."""
+        out = forces.flatten()
+        for dofs, ref, R in self.passed:
+            out[ref] += R.T @ forces.flat[dofs]
+        return out.reshape(-1, 3)
 
     # ---- a model -----------------------------------------------------------------------------------------
 

@@ -20,7 +20,7 @@ from kratos_lite.time_series import TimeSeries
 from kratos_lite.typing import Array
 
 NO_EFFECT = frozenset(
-    "HEADING PREPRINT RESTART NODEOUTPUT ELEMENTOUTPUT OUTPUT CONTROLS CONDUCTIVITY SPECIFICHEAT FILTER "
+    "HEADING PREPRINT RESTART CONTROLS CONDUCTIVITY SPECIFICHEAT FILTER "
     "TIMEPOINTS PHYSICALCONSTANTS SURFACEINTERACTION SURFACEBEHAVIOR FRICTION GAPCONDUCTANCE "
     "CONTACTDAMPING CONTACTFILE".split()
 )
@@ -57,6 +57,14 @@ PROCEDURES = {
     "STEADYSTATEDYNAMICS": ("SOLVER", "HARMONIC"),
 }
 """Kinds of steps, and their options."""
+_FILE, _PRINT = ("FREQUENCY", "FREQUENCYF", "GLOBAL"), ("FREQUENCY", "FREQUENCYF", "GLOBAL", "TOTALS")
+OUTPUTS = {
+    **dict.fromkeys(("NODEFILE", "ELFILE"), (*_FILE, "NSET", "OUTPUT", "LASTITERATIONS")),
+    **dict.fromkeys(("NODEOUTPUT", "ELEMENTOUTPUT"), (*_FILE, "NSET", "OUTPUT", "LASTITERATIONS")),
+    "OUTPUT": _FILE[:2], "NODEPRINT": (*_PRINT, "NSET"), "ELPRINT": (*_PRINT, "ELSET"),
+    **dict.fromkeys(("SECTIONPRINT", "FACEPRINT"), (*_FILE[:2], "SURFACE", "NAME")),
+}  # fmt: skip
+"""Cards that ask for results, and their options."""
 
 
 @dataclass
@@ -281,6 +289,15 @@ class Deck:
 
     def output(self, card: Card) -> None:
         """Read a card that asks for results."""
+        card.check_options(OUTPUTS[card.keyword])
+        if (
+            "NSET" in OUTPUTS[card.keyword]
+            and not card.keyword.endswith("PRINT")
+            and card.options.get("GLOBAL", "YES").upper() == "NO"
+        ):
+            card.wrong(
+                "GLOBAL=NO is not supported, files have global axes; *NODE PRINT and *EL PRINT have others"
+            )
         self._in_step(card).outputs.append(card)
 
     def end_step(self, card: Card) -> None:
@@ -334,6 +351,6 @@ CARDS: dict[str, Callable[[Deck, Card], None]] = {
     **dict.fromkeys("RIGIDBODY COUPLING KINEMATIC DISTRIBUTING".split(), Deck.connection),
     **dict.fromkeys("DISTRIBUTINGCOUPLING TIE SPRING MASS EQUATION".split(), Deck.connection),
     **dict.fromkeys(("CLOAD", "DLOAD", "DSLOAD", "TEMPERATURE"), Deck.load),
-    **dict.fromkeys(("NODEFILE", "ELFILE", "NODEPRINT", "ELPRINT", "SECTIONPRINT", "FACEPRINT"), Deck.output),
+    **dict.fromkeys(OUTPUTS, Deck.output),
 }  # fmt: skip
 """What reads each card."""

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kratos_lite.analysis.element_fields import ElementFields
 from kratos_lite.atomic import all_or_none, write_whole
-from kratos_lite.io.abaqus.cards import Card
+from kratos_lite.io.abaqus.cards import Card, Row
 from kratos_lite.io.abaqus.deck import Deck, Step
 from kratos_lite.io.abaqus.loads import with_faces
 from kratos_lite.io.abaqus.steps import cases_of
@@ -19,23 +20,27 @@ from kratos_lite.io.abaqus.supports import node_rows
 from kratos_lite.io.case import Case
 from kratos_lite.io.run import prepare, run
 from kratos_lite.io.writers import dat
-from kratos_lite.io.writers.calculix import at_nodes, averaged
+from kratos_lite.io.writers.calculix import at_nodes, displacements, forces
 from kratos_lite.io.writers.frd import FrdStep, steps_of_modes, write_frd
 from kratos_lite.io.writers.recorded import recorded
+from kratos_lite.materials.anisotropic3d import Anisotropic3D
 from kratos_lite.mesh import rows_of_ids
-from kratos_lite.typing import Ints
+from kratos_lite.model.local_axes import LocalAxes
+from kratos_lite.typing import Array, Ints
 
 if TYPE_CHECKING:
     from kratos_lite.analysis.harmonic import HarmonicResponse
+    from kratos_lite.analysis.model import Model
 
 FILED = {
     "U": "DISP", "V": "VELO", "NT": "NDTEMP", "S": "STRESS", "E": "TOSTRAIN", "ME": "MESTRAIN", "RF": "FORC",
     "PEEQ": "PE", "ENER": "ENER", "ERR": "ERROR",
 }  # fmt: skip
 """Fields of `.frd` files by the words of *NODE FILE and *EL FILE, in order."""
+FILES = ("NODEFILE", "ELFILE", "NODEOUTPUT", "ELEMENTOUTPUT")
 OF_SET = {"NODEPRINT": "NSET", "ELPRINT": "ELSET"}
 OF_FACES = ("SECTIONPRINT", "FACEPRINT")
-"""Cards that print tables, of sets and of surfaces."""
+"""Cards that ask for fields of the `.frd` file, and for tables of sets and of surfaces."""
 STATUS = (
     "SUMMARY OF JOB INFORMATION\n  STEP      INC     ATT  ITRS     TOT TIME     STEP TIME      INC TIME\n"
 )
@@ -48,12 +53,16 @@ class Job:
         self.deck, self.tell = Deck(path), tell
         self.frd, self.dat, self.sta = list[FrdStep](), list[str](), [STATUS]
         self.asked = list[Card]()  # cards of output; each kind holds until it is given anew
-        self.fields = list[str]()
+        self.every = 1  # after how many increments there is output
+        self.filed: dict[str, Ints | None] = {}  # fields of the `.frd` file, and their nodes if not all
+        self.names = set[str]()  # fields of files and tables
 
     def run(self) -> None:
         """Run all steps, and write the files, or none of them."""
+        for card in (card for step in self.deck.steps for card in step.outputs):
+            self._rows(card)  # what is not there is told before anything is solved
         for case, steps in cases_of(self.deck):
-            self._ask(steps[-1])
+            self._ask(steps[0])
             for line in self._run(case, steps):
                 self.tell(line)
         path = self.deck.path
@@ -67,51 +76,83 @@ class Job:
         new = {card.keyword for card in step.outputs}
         self.asked = [card for card in self.asked if card.keyword not in new] + step.outputs
         for card in step.outputs:
-            self._rows(card)
-            known = {*FILED, *dat.VARIABLES} if card.keyword.endswith("PRINT") else FILED
+            self.every = _every(card) or self.every  # the last one counts for all
+            known = FILED if card.keyword in FILES else {*FILED, *dat.VARIABLES}
             if other := [w for w in _words(card) if w not in known and card.keyword not in OF_FACES]:
                 self.tell(f"{card.place}: *{card.keyword}: not written: {', '.join(other)}")
-            if card.keyword.endswith("FILE") and card.options.get("GLOBAL", "YES").upper() == "NO":
-                self.tell(f"{card.place}: *{card.keyword}: GLOBAL=NO is ignored, all axes are global")
-            local = card.keyword == "ELPRINT" and card.options.get("GLOBAL", "NO").upper() == "NO"
-            if local and any(axes for _, _, axes, _ in self.deck.sections):
-                self.tell(f"{card.place}: *ELPRINT: tables have global axes, not those of *ORIENTATION")
         if np.ptp(self.deck.initial) and any("NT" in _words(card) for card in step.outputs):
             self.tell(f"{step.card.place}: *STEP: NT is the difference to the initial temperatures")
-        words = [word for card in self.asked if card.keyword.endswith("FILE") for word in _words(card)]
-        words += ["ERR"] if "S" in words else []  # as CalculiX does
-        self.fields = [name for word, name in FILED.items() if word in ("U", *words)]
+        rows = {w: self._rows(card) for card in self.asked if card.keyword in FILES for w in _words(card)}
+        if "S" in rows:  # as CalculiX does
+            rows.setdefault("ERR", rows["S"])
+        self.filed = {name: rows[word] for word, name in FILED.items() if word in rows}
+        printed = [w for card in self.asked if card.keyword in OF_SET for w in _words(card)]
+        self.names = {*self.filed, *(dat.VARIABLES[w][0] for w in printed if w in dat.VARIABLES)}
 
     def _run(self, case: Case, steps: list[Step]) -> Iterable[str]:
         """Run the case of some steps, keep what the files get, and return the lines of its summary."""
         if case.time is not None:
             return self._in_time(case, steps)
-        outcome, step = run(case), self.deck.steps.index(steps[0]) + 1
+        outcome, step = run(case), steps[0]
         if outcome.result is not None:
-            period = steps[0].period
-            self.frd.append(
-                FrdStep(at_nodes(outcome.result, self.fields), steps[0].start + period, step=step)
-            )
-            self._print(outcome.result, steps[0].start + period)
-            self._tell_status(steps[0], 1, period, period)
-        if outcome.modes is not None:
-            values, shapes = outcome.modes
-            if other := [name for name in self.fields if name not in ("DISP", "ERROR")]:
-                self.tell(f"step {step}: not written of modes: {', '.join(other)}")
-            self.frd += [replace(one, step=step) for one in steps_of_modes(values, shapes, case.buckling)]
-            self.dat += dat.buckling(values) if case.buckling else self._frequencies(case, values, shapes)
+            at = FrdStep({}, step.start + step.period, step=self._number(step))
+            self._keep(at, at.value, (outcome.result, at_nodes(outcome.result, self.names)))
+            self._tell_status(step, 1, step.period, step.period)
+        elif outcome.modes is not None:
+            self._modes(case, step, *outcome.modes)
         elif outcome.response is not None:
-            self._swing(outcome.response, step)
+            self._swing(case.model, step, outcome.response)
         return outcome.summary()
 
-    def _swing(self, response: HarmonicResponse, step: int) -> None:
-        """Keep displacements and stresses at each frequency, complex."""
-        for i, omega in enumerate(response.frequencies.tolist()):
-            fields: dict[str, Any] = {"DISP": response.displacement(i)}
-            if "STRESS" in self.fields:
-                parts: Any = [averaged(response.fields(i, phase), "stress") for phase in (0.0, -pi / 2)]
-                fields["STRESS"] = parts[0] + 1j * parts[1]
-            self.frd.append(FrdStep(fields, omega / (2 * pi), "time", step, 0))
+    def _keep(self, at: FrdStep, time: float, *parts: tuple[ElementFields, dict[str, Array]]) -> None:
+        """Keep a result with fields of its nodes, and tables at a time; of a complex one both parts."""
+        fields = dict[str, Any](parts[0][1])
+        for _, imaginary in parts[1:]:
+            fields |= {name: fields[name] + 1j * imaginary[name] for name in imaginary if name != "ENER"}
+        rows = {name: some for name, some in self.filed.items() if some is not None}
+        fields = {name: fields[name] for name in self.filed if name in fields}
+        self.frd.append(replace(at, fields=fields, rows=rows))
+        for result, known in parts:
+            if "FORC" in known:
+                known["FORC"] = self.deck.connections.at_references(known["FORC"])
+            self._print(result, known, time)
+
+    def _modes(self, case: Case, step: Step, values: Any, shapes: Any) -> None:
+        """Keep modes, and before those of buckling the state at rest."""
+        model, buckles, number = case.model, case.buckling, self._number(step)
+        time, part = step.start if buckles else step.start + 1.0, self._parts(model)
+        if buckles:
+            result = model.solve()
+            self._keep(FrdStep({}, 0.0, "buckling", number), time, (result, at_nodes(result, self.names)))
+            sizes = [(forces(part(u)[0]) * u).sum() ** -0.5 for u in shapes]
+            shapes = np.array(sizes)[:, None, None] * shapes  # φ K φ = 1
+        self.dat += dat.buckling(values) if buckles else self._frequencies(case, values, shapes)
+        for i, at in enumerate(steps_of_modes(values, shapes, buckles)):
+            if any(card.keyword in OF_SET for card in self.asked):
+                self.dat += dat.mode(i + 1)
+            self._keep(replace(at, step=number), time, part(shapes[i]))
+
+    def _swing(self, model: Model, step: Step, response: HarmonicResponse) -> None:
+        """Keep the response at each frequency, complex."""
+        part = self._parts(model)
+        for i, hertz in enumerate((response.frequencies / (2 * pi)).tolist()):
+            u, at = response.displacement(i), FrdStep({}, hertz, "time", self._number(step), 0)
+            self._keep(at, hertz, part(u.real), part(u.imag))
+
+    def _parts(self, model: Model) -> Callable[[Array], tuple[ElementFields, dict[str, Array]]]:
+        """Return what makes fields of displacements (n, 3) of a mode or a vibration, also those of nodes."""
+        groups = [
+            group if group.is_linear else replace(group, material=Anisotropic3D(group.material.C))
+            for group in model.element_groups()
+        ]
+
+        def part(u: Array) -> tuple[ElementFields, dict[str, Array]]:
+            fields = ElementFields(model.mesh, groups, np.ascontiguousarray(u))
+            fields._springs = model.supports.springs
+            moved = displacements(model, u) - displacements(model, 0 * u)  # what is prescribed rests
+            return fields, {"DISP": moved, **at_nodes(fields, self.names - {"DISP", "NDTEMP"})}
+
+        return part
 
     def _in_time(self, case: Case, steps: list[Step]) -> Iterable[str]:
         """Take the increments of steps in time, which count anew in each."""
@@ -120,50 +161,64 @@ class Job:
         before, number, last = 0, 0, 0.0
         for state in states:
             k = min(int(np.searchsorted(ends, state.time * (1 - 1e-9))), len(steps) - 1)
+            if k > before:
+                self._ask(steps[k])
             before, number = k, 1 if k > before else number + 1
             step, total = steps[k], steps[0].start + state.time
-            fields = {name: v for name, v in record.at_nodes(state).items() if name in self.fields}
-            at = self.deck.steps.index(step) + 1, number
-            self.frd.append(FrdStep(fields, total, record.kind, *at))
-            self._print(subject.result(state), total)
-            self._tell_status(step, number, total - step.start, state.time - last)
+            result = subject.result(state)
+            if number % self.every == 0 or state.time >= ends[k] * (1 - 1e-9):
+                at = FrdStep({}, total, record.kind, self._number(step), number)
+                self._keep(at, total, (result, record.at_nodes(state, self.names)))
+            count = sum(report.iterations for report in result.report.steps if report.time > last)
+            self._tell_status(step, number, total - step.start, state.time - last, count)
             last = state.time
         return [f"{len(steps)} steps to {last:g} s"]
 
-    def _tell_status(self, step: Step, increment: int, time: float, length: float) -> None:
-        """Note an increment at a time of its step."""
-        words = f"{self.deck.steps.index(step) + 1:6d}{increment:11d}{1:7d}{1:6d}"
-        self.sta.append(f"{words}{step.start + time:14.6E}{time:14.6E}{length:14.6E}\n")
+    def _number(self, step: Step) -> int:
+        """Return the number of a step, from 1."""
+        return self.deck.steps.index(step) + 1
 
-    def _print(self, result: Any, time: float) -> None:
-        """Print tables of a result."""
-        mesh, axes = result.mesh, self.deck.axes
+    def _tell_status(self, step: Step, increment: int, time: float, length: float, count: int = 1) -> None:
+        """Note an increment at a time of its step, and the number of its iterations."""
+        words = f"{self._number(step):6d}{increment:11d}{1:6d}{max(count, 1):6d}"
+        times = (dat.fortran(value, 6) for value in (step.start + time, time, length))
+        self.sta.append(words + "".join(f"{number:>14}" for number in times) + "\n")
+
+    def _print(self, result: ElementFields, known: dict[str, Array], time: float) -> None:
+        """Print tables of a result and the fields of its nodes."""
         for card in (card for card in self.asked if card.keyword in OF_SET):
-            where, totals = (
-                card.option(OF_SET[card.keyword]).upper(),
-                card.options.get("TOTALS", "NO").upper(),
-            )
-            rows, frames = self._rows(card), None
-            if card.keyword == "NODEPRINT" and card.options.get("GLOBAL", "NO").upper() == "NO":
-                frames = axes.of_node[rows] >= 0, axes.directions(mesh, rows)
+            where = card.options.get(OF_SET[card.keyword], "").upper()
+            totals, is_local = (card.options.get(word, "NO").upper() for word in ("TOTALS", "GLOBAL"))
+            local, rows = self._local(card) if is_local == "NO" else (), self._rows(card)
             for word in _words(card):
-                if word in dat.VARIABLES:
-                    self.dat += dat.prints(result, rows, word, where, time, totals, frames)
-        for card in (card for card in self.asked if card.keyword in OF_FACES):
-            name = card.option("SURFACE")
+                if word in dat.VARIABLES and rows is not None:
+                    self.dat += dat.prints(result, rows, word, where, time, totals, local, known)
+        for card in (card for card in self.asked if card.keyword in OF_FACES and _every(card) != 0):
+            name, mesh = card.option("SURFACE"), result.mesh
             faces = self.deck.loads.surface(name, card)
             blocks = with_faces(mesh.replace(conditions=()), faces, "SurfaceCondition")[0].conditions
             self.dat += dat.section_print(result, blocks, name.upper(), time)
 
-    def _rows(self, card: Card) -> Ints:
-        """Return the nodes or elements that a card prints, in the order of their set."""
+    def _local(self, card: Card) -> list[tuple[str, LocalAxes, Ints]]:
+        """Return the axes of nodes or elements that a card prints, with their marks."""
+        deck, parts = self.deck, self.deck.mesh.parts
+        if card.keyword == "NODEPRINT":
+            return [
+                (" L", axes, np.flatnonzero(deck.axes.of_node == i)) for i, axes in enumerate(deck.axes.each)
+            ]
+        return [(f" {n:20}", deck.orientations[n], parts[e].elements) for e, _, n, _ in deck.sections if n]
+
+    def _rows(self, card: Card) -> Ints | None:
+        """Return the nodes or elements of a card, in the order of their set, or None for all of them."""
         mesh, cards = self.deck.mesh, self.deck.cards
         if card.keyword in OF_FACES:
             self.deck.loads.surface(card.option("SURFACE"), card)
-        if card.keyword == "NODEPRINT":
+        if not _words(card):
+            return None
+        if card.keyword == "NODEPRINT" or "NSET" in card.options:
             return node_rows(card.option("NSET").upper(), card, cards, mesh)
         if card.keyword != "ELPRINT":
-            return np.zeros(0, dtype=np.int64)
+            return None
         rows = rows_of_ids(mesh.element_ids, cards.elements_of(card.option("ELSET").upper(), card))
         return np.asarray(rows[rows >= 0])
 
@@ -171,9 +226,15 @@ class Job:
         """Return the tables of frequencies."""
         matrices = case.model.matrices()
         free = np.flatnonzero(~case.model.supports.fixed.ravel())
-        return dat.frequencies(omega, shapes, matrices.M, case.model.mesh.points, free)
+        return [*dat.frequencies(omega, shapes, matrices.M, case.model.mesh.points, free), ""]
+
+
+def _every(card: Card) -> int | None:
+    """Return after how many increments a card asks for results, if it says so; 0 for never."""
+    word = card.options.get("FREQUENCY")
+    return None if word is None else Row(card.place, (word,)).integer(0)
 
 
 def _words(card: Card) -> list[str]:
-    """Return the words on the data lines of a card."""
-    return [word.upper() for row in card.rows() for word in row.fields if word]
+    """Return the words on the data lines of a card, none if it asks for nothing."""
+    return [] if _every(card) == 0 else [word.upper() for row in card.rows() for word in row.fields if word]

@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import pi
 from typing import Any
 
 import numpy as np
 
 from kratos_lite import voigt
-from kratos_lite.analysis.result import Result
+from kratos_lite.analysis.element_fields import ElementFields
 from kratos_lite.elements.surface import area_vectors
-from kratos_lite.io.writers.calculix import AT_NODES, at_gauss, at_nodes, order
+from kratos_lite.io.writers.calculix import at_gauss, at_nodes, order
+from kratos_lite.io.writers.frd import FIELDS
 from kratos_lite.mesh import Block
+from kratos_lite.model.local_axes import LocalAxes
 from kratos_lite.quadrature import rule_for
 from kratos_lite.shapes.base import at_points
-from kratos_lite.typing import Array, Ints, Mask
+from kratos_lite.typing import Array, Ints
 from kratos_lite.validation import choice
 
 TENSOR = "(elem, integ.pnt.,{0}xx,{0}yy,{0}zz,{0}xy,{0}xz,{0}yz) "
 VARIABLES = {
     "U": ("DISP", "displacements (vx,vy,vz) ", ""),
+    "V": ("VELO", "velocities (vx,vy,vz) ", ""),
     "RF": ("FORC", "forces (fx,fy,fz) ", "total force (fx,fy,fz) "),
     "NT": ("NDTEMP", "temperatures ", ""),
     "S": ("stress", "stresses " + TENSOR.format("s"), ""),
@@ -38,43 +41,56 @@ HEAD = ["MODE NO.   " + "".join(PARTS).rstrip()]
 
 
 def prints(
-    result: Result,
+    result: ElementFields,
     rows: Ints,
     variable: str,
     where: str,
     time: float = 1.0,
     totals: str = "NO",
-    frames: tuple[Mask, Array] | None = None,
+    local: Sequence[tuple[str, LocalAxes, Ints]] = (),
+    known: Mapping[str, Array] | None = None,
 ) -> list[str]:
     """Return the table of a variable of nodes or elements in order, of the set `where`.
 
-    `totals` is NO, YES or ONLY; vectors of some of the nodes are along the axes (n, 3, 3) of `frames`.
+    `totals` is NO, YES or ONLY.  Some nodes or elements have vectors and tensors along `local` axes, and a
+    mark; `known` are the fields of nodes, which are made if not given.
     """
     field, title, total = VARIABLES[choice(variable, "a printed variable", VARIABLES)]
-    ids = result.mesh.node_ids[rows] if field in AT_NODES else result.mesh.element_ids[rows]
-    if field in AT_NODES:
-        found = at_nodes(result, [field]).values()
-        tables = [(ids[:, None], values[rows].reshape(len(rows), -1)) for values in found]
+    mesh, at_node = result.mesh, field in FIELDS
+    every = mesh.node_ids if at_node else mesh.element_ids
+    if at_node:
+        values = (at_nodes(result, [field]) if known is None else known).get(field)
+        tables = [] if values is None else [(every[rows], values[rows], mesh.points[rows])]
     else:
         tables = _of_elements(result, rows, field, bool(total))
     if not tables:
         return []
-    numbers, table = map(np.vstack, zip(*tables, strict=True))
-    if field not in AT_NODES:
-        some = _in_turn(numbers, ids)
-        numbers, table = numbers[some], table[some]
-    of, lines, shown = f"for set {where} and time{_fortran(time):>15}", list[str](), table
+    numbers, table, places = (
+        np.vstack([part.reshape(len(part), -1) for part in parts]) for parts in zip(*tables, strict=True)
+    )
+    if not at_node:
+        some = _in_turn(numbers, every[rows])
+        numbers, table, places = numbers[some], table[some], places[some]
+    of, lines, shown = f"for set {where} and time{fortran(time):>15}", list[str](), table.copy()
     marks = np.full(len(table), "", dtype=object)
-    if frames is not None and field in AT_NODES and table.shape[1] == 3:
-        marks[frames[0]], shown = " L", np.einsum("nij,nj->ni", frames[1], table)
+    for mark, axes, turned in local if table.shape[1] == (3 if at_node else 6) else ():
+        at = np.isin(numbers[:, 0], every[turned])
+        marks[at], shown[at] = mark, _along(axes, table[at], places[at])
     if totals != "ONLY" or not total:
         form = "%10d" + "%4d" * (numbers.shape[1] - 1) + "%14.6E" * table.shape[1]
-        values = np.hstack([numbers, shown]).tolist()
+        printed = np.hstack([numbers, shown]).tolist()
         lines += ["", f" {title}{of}", ""]
-        lines += [form % tuple(row) + mark for row, mark in zip(values, marks, strict=True)]
+        lines += [form % tuple(row) + mark for row, mark in zip(printed, marks, strict=True)]
     if totals != "NO" and total:
         lines += ["", f" {total}{of}", "", "      " + "".join(f"{sum_:14.6E}" for sum_ in table.sum(axis=0))]
     return lines
+
+
+def _along(axes: LocalAxes, values: Array, places: Array) -> Array:
+    """Return vectors (k, 3), or tensors (k, 6) as CalculiX orders them, along local axes at places (k, 3)."""
+    if values.shape[1] == 3:
+        return axes.vectors(values, places)
+    return axes.stresses(values[:, voigt.ABAQUS], places)[:, voigt.ABAQUS]
 
 
 def _in_turn(numbers: Ints, ids: Ints) -> Ints:
@@ -84,21 +100,25 @@ def _in_turn(numbers: Ints, ids: Ints) -> Ints:
     return order[np.concatenate([np.arange(0), *map(np.arange, first, last)])]
 
 
-def _of_elements(result: Result, rows: Ints, field: str, whole: bool) -> list[tuple[Ints, Array]]:
-    """Return ids and values of elements of each group; or also numbers of Gauss points, and values there."""
+def _of_elements(
+    result: ElementFields, rows: Ints, field: str, whole: bool
+) -> list[tuple[Ints, Array, Array]]:
+    """Return ids, or also numbers of Gauss points, values and places of elements of each group."""
     tables = []
-    for group, values in zip(result.groups, at_gauss(result, field), strict=False):
-        chosen, places = np.isin(group.rows, rows), order(group.rule)
-        ids, there = result.mesh.element_ids[group.rows[chosen]], values[chosen][:, places]
-        there = there.sum(axis=1, keepdims=True) if whole else there
+    values = zip(result.groups, at_gauss(result, field), at_gauss(result, "place"), strict=False)
+    for group, *parts in values:
+        chosen, turn = np.isin(group.rows, rows), order(group.rule)
+        there, places = (part[chosen][:, turn] for part in parts)
+        if whole:
+            there, places = there.sum(axis=1, keepdims=True), places[:, :1]
         there = there[..., voigt.ABAQUS] if there.shape[-1] == 6 else there
-        numbers = np.tile(np.arange(1, there.shape[1] + 1), len(ids))
-        named = np.column_stack([ids.repeat(there.shape[1]), numbers])[:, : 1 if whole else 2]
-        tables.append((named, there.reshape(len(numbers), there.shape[2])))
+        (m, g, c), ids = there.shape, result.mesh.element_ids[group.rows[chosen]]
+        named = np.column_stack([ids.repeat(g), np.tile(np.arange(1, g + 1), m)])[:, : 1 if whole else 2]
+        tables.append((named, there.reshape(m * g, c), places.reshape(m * g, 3)))
     return tables
 
 
-def section_print(result: Result, faces: Sequence[Block], where: str, time: float = 1.0) -> list[str]:
+def section_print(result: ElementFields, faces: Sequence[Block], where: str, time: float = 1.0) -> list[str]:
     """Return *SECTION PRINT of faces, outward: force, moment and area of the stress that nodes show."""
     stress, X, parts = at_nodes(result, ["STRESS"])["STRESS"], result.mesh.points, np.zeros(13)
     full = any(len(group.rule) == 27 for group in result.groups)
@@ -122,7 +142,7 @@ def section_print(result: Result, faces: Sequence[Block], where: str, time: floa
         "moment about the center of gravity(mx,my,mz)": moment,
         "area, normal force (+ = tension), shear force (size), torque and bending moment (size)": forces,
     }
-    lines = ["", "", "", f" statistics for surface set {where} and time{_fortran(time):>15}"]
+    lines = ["", "", "", f" statistics for surface set {where} and time{fortran(time):>15}"]
     for title, values in tables.items():
         lines += ["", f"   {title}", "", "  " + "".join(f"{value:14.6E}" for value in values)]
     return lines
@@ -156,20 +176,25 @@ def buckling(factors: Array) -> list[str]:
     return _titled("B U C K L I N G   F A C T O R   O U T P U T", head, factors[:, None])
 
 
+def mode(number: int) -> list[str]:
+    """Return the head of the tables of a mode."""
+    return ["", f"{'E I G E N V A L U E    N U M B E R':>54}{number:6d}", ""]
+
+
 def _titled(title: str, head: list[str], table: Any, last: str | None = None) -> list[str]:
     """Return a table with numbered rows, or another name of the last one."""
     names = [f"{i:7d}" for i in range(1, len(table) + 1)]
     names[-1] = names[-1] if last is None else f"{last:7}"
-    rows = [name + "".join(f"{_fortran(v):>16}" for v in row) for name, row in zip(names, table, strict=True)]
+    rows = [name + "".join(f"{fortran(v):>16}" for v in row) for name, row in zip(names, table, strict=True)]
     return ["", f"     {title}", "", *head, "", *rows]
 
 
-def _fortran(value: float) -> str:
-    """Return a number as E14.7 of Fortran.
+def fortran(value: float, digits: int = 7) -> str:
+    """Return a number with some digits in the format E of Fortran.
 
-    >>> _fortran(-12.5)
+    >>> fortran(-12.5)
     '-0.1250000E+02'
     """
-    digits, power = f"{abs(value):.6E}".split("E")
+    mantissa, power = f"{abs(value):.{digits - 1}E}".split("E")
     exponent = int(power) + 1 if value else 0
-    return f"{'-' if value < 0 else ''}0.{digits.replace('.', '')}E{exponent:+03d}"
+    return f"{'-' if value < 0 else ''}0.{mantissa.replace('.', '')}E{exponent:+03d}"

@@ -6,7 +6,7 @@ Source of the format: Wittig, CalculiX USER'S MANUAL - CalculiX GraphiX, "Result
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import floor, log10, pi
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from kratos_lite.atomic import refuse_nan, replacing
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.mesh.blocks import mask_of
-from kratos_lite.typing import Array, Numbers
+from kratos_lite.typing import Array, Ints, Numbers
 from kratos_lite.validation import choice
 
 KINDS = {"static": 0, "time": 1, "frequency": 2, "buckling": 4}
@@ -51,6 +51,7 @@ class FrdStep:
     increment: int = 1
     mode: int = 0  # number of a mode that vibrates
     number: int = 0  # of the set of fields in the file; one more than the last if not given
+    rows: Mapping[str, Ints] = field(default_factory=dict)  # nodes of fields that not all nodes have
 
 
 def write_frd(
@@ -59,13 +60,14 @@ def write_frd(
     """Write a mesh and its fields, as a whole or not at all; `materials` are names by property id."""
     cells = [_cells(path, block) for block in mesh.blocks]
     used = mask_of(np.concatenate([nodes.ravel() for _, nodes in cells]), mesh.n_nodes)
-    ids, names = mesh.node_ids[used], materials or {}
+    every, names = np.flatnonzero(used), materials or {}
     properties = np.unique(np.concatenate([block.properties for block in mesh.blocks]))
     text = "    1C\n" + "".join(f"    1U{line:<66}\n" for line in HEAD)
     for i, key in enumerate(properties.tolist(), 1):
         text += f"    1UMAT{i:5d}{names.get(key, f'MATERIAL{key}'):<58}\n"
     with replacing(path) as temporary, open(temporary, "wb") as file:
-        file.write(f"{text}    2C{len(ids):30d}{1:38d}\n".encode() + _rows(ids, mesh.points[used]))
+        file.write(f"{text}    2C{len(every):30d}{1:38d}\n".encode())
+        file.write(_rows(mesh.node_ids[every], mesh.points[every]))
         file.write(f"    3C{mesh.n_elements:30d}{1:38d}\n".encode())
         for block, (number, nodes) in zip(mesh.blocks, cells, strict=True):
             material = np.searchsorted(properties, block.properties) + 1
@@ -76,8 +78,10 @@ def write_frd(
             last = step.number or last + 1
             for name, suffix, values in _parts(path, step.fields):
                 count += 1
-                file.write((_head(step, count, last, len(ids)) + _described(name, suffix)).encode())
-                file.write(_rows(ids, values[used].reshape(len(ids), -1)))
+                rows = step.rows.get(name, every)
+                rows = rows[used[rows]]
+                file.write((_head(step, count, last, len(rows)) + _described(name, suffix)).encode())
+                file.write(_rows(mesh.node_ids[rows], values[rows].reshape(len(rows), -1)))
         file.write(b" 9999\n")
 
 
@@ -180,6 +184,6 @@ def _described(name: str, suffix: str) -> str:
     rows = [(symbol + part, *at) for symbol in symbols.split() for part, *at in parts]
     if kind == 12:
         rows = [(symbol, i, 0) for i, (symbol, *_) in enumerate(rows, 1)]
-    text = f" -4  {name + suffix:<8}{len(rows) + (kind == 2):5d}    1\n"
+    text = f" -4  {name[: 8 - len(suffix)] + suffix:<8}{len(rows) + (kind == 2):5d}    1\n"
     text += "".join(f" -5  {symbol:<8}    1{kind:5d}{a:5d}{b:5d}\n" for symbol, a, b in rows)
     return text + (" -5  ALL         1    2    0    0    1ALL\n" if kind == 2 else "")

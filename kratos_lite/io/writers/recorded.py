@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -64,8 +64,8 @@ class RecordedBody:
             values = {"displacement": moved, "velocity": self.body.velocity(X)}
             return {FIELDS[name].kratos: value for name, value in values.items()}, {}
 
-    def at_nodes(self, state: State) -> dict[str, Array]:
-        """Return displacements and velocities of the nodes by CalculiX's names."""
+    def at_nodes(self, state: State, names: Iterable[str] = ()) -> dict[str, Array]:
+        """Return displacements and velocities of the nodes by CalculiX's names, whatever is asked for."""
         return dict(zip(("DISP", "VELO"), self.fields(state)[0].values(), strict=True))
 
     def row(self, state: State) -> Array:
@@ -115,15 +115,16 @@ class RecordedModel:
         points, cells = fields(self.transient.result(state))
         return points | {field.kratos: field.at(state) for field in listed("state").values()}, cells
 
-    def at_nodes(self, state: Any) -> dict[str, Array]:
-        """Return the fields of the nodes by CalculiX's names, velocities among them where there are any."""
-        from kratos_lite.io.writers.calculix import at_nodes, displacements  # rarely needed
+    def at_nodes(self, state: Any, names: Iterable[str] | None = None) -> dict[str, Array]:
+        """Return fields of nodes by CalculiX's names, all if not given, and displacements and velocities."""
+        from kratos_lite.io.writers.calculix import ALL, at_nodes, displacements  # rarely needed
 
         result = self.transient.result(state)
-        fields = {"DISP": state.u, **({"VELO": state.v} if self.kind == "time" else {}), **at_nodes(result)}
+        fields = {"DISP": state.u, **({"VELO": state.v} if self.kind == "time" else {})}
+        fields |= at_nodes(result, ALL if names is None else names)
         fields["DISP"] = displacements(self.transient.model, state.u, state.time)
         if self.kind == "time" and not result.is_linear:
-            del fields["FORC"]  # internal forces are those of supports and loads at rest alone
+            fields.pop("FORC", None)  # internal forces are those of supports and loads at rest alone
         return fields
 
     def row(self, state: Any) -> Array:

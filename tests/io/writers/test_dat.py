@@ -57,7 +57,7 @@ def test_nothing_is_printed_of_what_a_result_has_not(name):
 
 def test_unknown_variables_are_refused():
     with pytest.raises(kl.InputError, match="a printed variable"):
-        prints(bar().solve(), np.arange(2), "V", "ALL")
+        prints(bar().solve(), np.arange(2), "SPIN", "ALL")
     assert set(LINES) < set(VARIABLES)
 
 
