@@ -58,7 +58,9 @@ class Tangents:
         """
         iterates = self.plan.iterates
         if self._constant and not changes:
-            return [self._rest.solve(each, 0.1 * tolerance, None, jump, jump).x for each in forces]
+            left = 1.0 if jump.any() else max(residuals[-1], tolerance)
+            enough = 0.1 * tolerance / left  # so that one correction is the solution
+            return [self._rest.solve(each, enough, None, jump, jump).x for each in forces]
         if iterates and len(residuals) == 1:
             self._near = self._rest
         if iterates and changes and self._near is None:
