@@ -158,9 +158,9 @@ class Page {
   // Of a new cut keep the half behind the plane, so that its section is in view at once.
   faceSection() {
     const axis = "xyz".indexOf($("axis").value || " ");
-    const ahead = this.stage.camera.getWorldDirection(new THREE.Vector3()).toArray()[axis];
-    if (Math.abs(ahead) < 0.2) this.stage.look([1, -1, 1]);
-    $("flip").checked = this.stage.camera.position.toArray()[axis] < this.stage.controls.target.toArray()[axis];
+    const ahead = () => this.stage.camera.getWorldDirection(new THREE.Vector3()).toArray()[axis];
+    if (Math.abs(ahead()) < 0.2) this.stage.look([1, -1, 1]);
+    $("flip").checked = ahead() > 0;
     this.update();
   }
 
