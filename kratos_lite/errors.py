@@ -82,6 +82,21 @@ def naming(source: str) -> Iterator[None]:
         raise type(error)(f"{source}: {error}") from None
 
 
+@contextmanager
+def within_numbers(source: str) -> Iterator[None]:
+    """Let an overflow or NaN in what is done with a file be an error in words."""
+    import numpy as np
+
+    try:
+        with np.errstate(over="raise", invalid="raise", divide="raise"):
+            yield
+    except (FloatingPointError, OverflowError):
+        raise SolveError(
+            f"{source}: numbers exceed what a computer holds (1.8e308); "
+            "look for coordinates, constants, supports or loads in wrong units"
+        ) from None
+
+
 def _plain(word: str) -> str:
     """Return a word without what is often mistaken: capitals, and what joins its parts."""
     return word.lower().replace("-", "_").replace(" ", "_")

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from kratos_lite import __version__
-from kratos_lite.errors import KratosLiteError
+from kratos_lite.errors import KratosLiteError, within_numbers
 
 ERROR = 201
 """Exit code of ccx after an error."""
@@ -28,7 +28,9 @@ def main(words: Sequence[str] | None = None) -> int:
 
     print(f"{USAGE.partition(':')[0]}\n")
     try:
-        Job(Path(job.removesuffix(".inp") + ".inp"), print).run()
+        path = Path(job.removesuffix(".inp") + ".inp")
+        with within_numbers(str(path)):
+            Job(path, print).run()
     except (KratosLiteError, OSError) as error:
         print(f"\n*ERROR: {error}")
         return ERROR

@@ -12,7 +12,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING
 
 from kratos_lite.cli.options import only, read_values
-from kratos_lite.errors import InputError, ModelError, SolveError
+from kratos_lite.errors import InputError, ModelError, within_numbers
 from kratos_lite.tabular import in_units
 
 if TYPE_CHECKING:
@@ -29,19 +29,11 @@ ROOT = Path(__file__).resolve().parents[2]
 @contextmanager
 def _within_numbers(options: Namespace) -> Iterator[None]:
     """Find the input and do something with it; an overflow or NaN becomes a readable error."""
-    import numpy as np
-
     from kratos_lite.io.formats import input_file
 
     options.input = str(input_file(options.input))
-    try:
-        with np.errstate(over="raise", invalid="raise", divide="raise"):
-            yield
-    except (FloatingPointError, OverflowError):
-        raise SolveError(
-            f"{options.input}: numbers exceed what a computer holds (1.8e308); "
-            "look for coordinates, constants, supports or loads in wrong units"
-        ) from None
+    with within_numbers(options.input):
+        yield
 
 
 def solve(options: Namespace) -> int:

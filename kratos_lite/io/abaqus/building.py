@@ -55,7 +55,8 @@ class Building:
             assigned[rows] = True
         if not assigned.all():
             missing = mesh.element_ids[~assigned][0]
-            raise InputError(f"{deck.path}: element {missing} is in no *SOLID SECTION")
+            place = next(cells.place for cells in deck.cards.cells if missing in cells.ids)
+            raise InputError(f"{place}: element {missing} is in no *SOLID SECTION")
         self._stress(model)
         model.recognize_units()
         model.notes += deck.notes
@@ -74,6 +75,10 @@ class Building:
                     some = rows[held.amplitudes[rows, axis] == name]
                     values = held.values[some, axis]
                     letter = "xyz"[axis] if frame is None else frame.letters[axis]
+                    if frame is not None and (alone := some[~self.mesh.used_nodes()[some]]).size:
+                        node = self.mesh.node_ids[alone[0]]
+                        text = "*BOUNDARY along axes of *TRANSFORM is supported at nodes of elements"
+                        raise ModelError(f"{text}; node {node} is a reference node; give its axes x y z")
                     if not name:
                         model.fix(some, letter, values[:, None], local=frame)
                         continue

@@ -12,6 +12,7 @@ import numpy as np
 
 from kratos_lite.analysis.element_fields import ElementFields
 from kratos_lite.atomic import all_or_none, write_whole
+from kratos_lite.errors import naming
 from kratos_lite.io.abaqus.cards import Card, Row
 from kratos_lite.io.abaqus.deck import Deck, Step
 from kratos_lite.io.abaqus.loads import with_faces
@@ -63,8 +64,9 @@ class Job:
             self._rows(card)  # what is not there is told before anything is solved
         for case, steps in cases_of(self.deck):
             self._ask(steps[0])
-            for line in self._run(case, steps):
-                self.tell(line)
+            with naming(f"{steps[0].card.place}: *STEP"):  # what is known of no other line
+                for line in self._run(case, steps):
+                    self.tell(line)
         path = self.deck.path
         with all_or_none():
             write_frd(path.with_suffix(".frd"), case.model.mesh, self.frd)

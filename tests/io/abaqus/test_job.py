@@ -202,6 +202,30 @@ def test_steps_increments_and_times_are_those_of_ccx(text: str, tmp_path: Path) 
         assert [line[:23] + line[29:] for line in told] == [line[:23] + line[29:] for line in others]
 
 
+PULL = "*STEP\n*STATIC\n*CLOAD\nTOP,1,1.\n*EL FILE\nS,ENER\n*END STEP\n"
+LINES = CUBE.count("\n")
+ALONE = f"{RIGID}*TRANSFORM,NSET=REF\n1.,1.,0.,-1.,1.,0.\n*BOUNDARY\nREF,1,1,.01\n"
+TROUBLE = {
+    "in no section": (CUBE.replace("*MATERIAL", "*ELSET,ELSET=NO\n*MATERIAL").replace("=EALL, M", "=NO, M"),
+                      "job.inp:13: element 1 is in no *SOLID SECTION"),
+    "free": (CUBE.replace("Bottom,1,3", "Bottom,1,2"), f"job.inp:{LINES + 1}: *STEP: the supports leave"),
+    "contradiction": (CUBE + "*EQUATION\n2\n5,1,1.,6,1,-1.\n*BOUNDARY\n5,1,1,.1\n6,1,1,.2\n",
+                      f"job.inp:{LINES + 7}: *STEP: what is prescribed contradicts itself"),
+    "axes of a reference node": (CUBE + ALONE, "node 11 is a reference node"),
+    "overflow": (CUBE.replace("1000, .25", "1e-290, .25"), "numbers exceed what a computer holds"),
+}  # fmt: skip
+"""Models that are wrong, and the words of their errors."""
+
+
+@pytest.mark.parametrize("name", TROUBLE)
+def test_errors_of_models_name_a_line_and_leave_the_other_stream_alone(name, tmp_path, capfd) -> None:
+    (tmp_path / "job.inp").write_text(TROUBLE[name][0] + PULL)
+    assert main(["-i", str(tmp_path / "job")]) == 201
+    told, said = capfd.readouterr()
+    assert TROUBLE[name][1] in told
+    assert not said
+
+
 def test_an_error_is_one_line_with_the_exit_code_of_ccx_and_leaves_no_file(tmp_path: Path, capsys) -> None:
     (tmp_path / "job.inp").write_text(CUBE + "*STEP\n*STATIC\n*CLOAD\n99,1,1.\n*END STEP\n")
     assert main(["-i", str(tmp_path / "job")]) == 201
