@@ -6,7 +6,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from zipfile import BadZipFile, ZipFile
 
-from kratos_lite.errors import KratosLiteError
+from kratos_lite.errors import KratosLiteError, installing
 
 THREE = "/**\n * @license\n * Copyright 2010", "THREE.TrackballControls=TrackballControls;})();"
 """How three.js with its trackball begins and ends in the template of trimesh."""
@@ -16,7 +16,7 @@ def library() -> str:
     """Return three.js and its trackball, which trimesh embeds in pages of its own."""
     spec = find_spec("trimesh")
     if spec is None or spec.origin is None:
-        raise KratosLiteError("pages for the browser need three.js: pip install kratos-lite[page]")
+        raise KratosLiteError(f"pages for the browser need three.js: {installing('page')}")
     template = Path(spec.origin).parent / "resources" / "templates" / "viewer.zip"
     try:
         with ZipFile(template) as file:
