@@ -36,6 +36,15 @@ class SolveError(KratosLiteError):
     """The equations could not be solved to the accuracy asked for."""
 
 
+def installing(extra: str) -> str:
+    """Return the command that installs an extra: before a release from a clone of the source.
+
+    >>> installing("page")
+    'pip install -e ".[page]" in a clone of kratos_lite'
+    """
+    return f'pip install -e ".[{extra}]" in a clone of kratos_lite'
+
+
 class Problems:
     """Collect problems and raise them together."""
 

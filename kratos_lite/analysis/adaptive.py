@@ -12,6 +12,7 @@ Sources: Dörfler, SIAM J. Numer. Anal. 33 (1996) 1106-1124; Zienkiewicz & Zhu, 
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from time import perf_counter
 from typing import TypeAlias
@@ -78,13 +79,14 @@ def solve_to(
     level: Level | None = None
     step: RefinedMesh | None = None
     history: list[RefinementStep] = []
+    seconds, clock = Counter[str](), perf_counter()
     missed, keep, start = "", None, None
     rough = max(tolerance, min(ROUGH, ROUGH_FRACTION * aim))
     warnings = [] if geometry else curved(model.mesh)
     while True:
         begin = perf_counter()
         analysis = StaticAnalysis(model, solver, tolerance, progress)
-        result = _solved(analysis, start, rough)
+        result = _solved(analysis, start, rough, seconds)
         before, known = level, (model, result, step, level)
         level = Level(*known) if quantity is None else QuantityLevel(*known, quantity)
         history.append(level.refinement_step(perf_counter() - begin))
@@ -102,6 +104,7 @@ def solve_to(
         analysis.release()
     if result.report.iterations and rough > tolerance:
         result = analysis.solve(start=result.u)
+        seconds.update(result.report.seconds)
     analysis.release()
     if missed:
         warnings += [
@@ -110,6 +113,7 @@ def solve_to(
     if top := peak(result):
         warnings.append(in_units(f"the largest von Mises stress lies{top}", result.units))
     report, (first, last) = result.report, (history[0].kinds, history[-1].kinds)
+    report.seconds = {**seconds, "refine": perf_counter() - clock - seconds.total()}
     report.history, report.error, report.error_asked = history, level.reported, aim
     report.error_of = "the energy norm" if quantity is None else str(quantity)
     report.warnings += warnings
@@ -117,11 +121,15 @@ def solve_to(
     return result
 
 
-def _solved(analysis: StaticAnalysis, start: Array | None, rough: float) -> Result:
-    """Return a solution to a rough tolerance, or to the full one if equilibrium needs it."""
+def _solved(analysis: StaticAnalysis, start: Array | None, rough: float, seconds: Counter[str]) -> Result:
+    """Return a solution to a rough tolerance, or to the full one if equilibrium needs it; count seconds."""
     result = analysis.solve(start=start, tolerance=rough)
-    good = (result.report.force_error or 0.0) <= FAIR
-    return result if good else analysis.solve(start=result.u)
+    seconds.update(result.report.seconds)
+    if (result.report.force_error or 0.0) <= FAIR:
+        return result
+    result = analysis.solve(start=result.u)
+    seconds.update(result.report.seconds)
+    return result
 
 
 def check_quantity(quantity: Quantity | None) -> None:

@@ -8,6 +8,7 @@ import io
 import os
 import signal
 import sys
+from argparse import Namespace
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 
@@ -70,13 +71,35 @@ def _verdict(error: BaseException) -> tuple[int, str]:
 def _run(words: Sequence[str]) -> int:
     """Run one command; return its exit code."""
     parser = build_parser()
+    parser.refuse_first(words)
     options, rest = parser.parse_known_args(words)
     options.rest = rest
     if rest and options.command not in ("bench", "ccx"):
         parser.refuse(options.command, rest)
-    code = int(getattr(commands, options.command)(options))
+    code = _run_each(options)
     if sys.stdout:
         sys.stdout.flush()  # a full disk shows here rather than after the end of the program
+    return code
+
+
+def _run_each(options: Namespace) -> int:
+    """Run a command, on each of its files if it takes several; return the largest exit code."""
+    from kratos_lite.errors import KratosLiteError
+
+    command, inputs = getattr(commands, options.command), getattr(options, "input", None)
+    if not isinstance(inputs, list):
+        return int(command(options))
+    code = 0
+    for path in inputs:
+        one = Namespace(**{**vars(options), "input": path})
+        if len(inputs) == 1:
+            return int(command(one))
+        print(f"== {path}", flush=True)
+        try:
+            code = max(code, int(command(one)))
+        except KratosLiteError as error:
+            print(_verdict(error)[1], file=sys.stderr, flush=True)
+            code = max(code, EXIT_BAD_INPUT)
     return code
 
 

@@ -58,7 +58,9 @@ def case_of(options: Namespace, part: int | None = None) -> Case:
 
 def _apply(case: Case, options: Namespace, mark: str) -> None:
     """Change a case as the options say; the names of its outputs get a mark."""
-    for name, value in given(options, "solver", "tolerance", "error", "backend", "petsc").items():
+    for name, value in given(
+        options, "solver", "tolerance", "error", "most_unknowns", "backend", "petsc"
+    ).items():
         setattr(case, name, value)
     if case.is_of_model:
         _add_to_model(case.model, options)

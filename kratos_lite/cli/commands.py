@@ -6,13 +6,13 @@ import os
 import sys
 from argparse import Namespace
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
 from kratos_lite.cli.options import only, read_values
-from kratos_lite.errors import InputError, ModelError, within_numbers
+from kratos_lite.errors import InputError, KratosLiteError, ModelError, SolveError, within_numbers
 from kratos_lite.tabular import in_units
 
 if TYPE_CHECKING:
@@ -147,9 +147,13 @@ def info(options: Namespace) -> int:
 
             print(describe_case(read_case(options.input)))
         else:
-            from kratos_lite.io.describe import describe
+            from kratos_lite.io.describe import amounts, describe
+            from kratos_lite.io.kratos.to_model import model_from
 
-            print(describe(read_document(options.input, strict=not options.lenient)))
+            document = read_document(options.input, strict=not options.lenient)
+            print(describe(document))
+            with suppress(KratosLiteError):
+                _print([f"{name:<12}{text}" for name, text in amounts(model_from(document))])
         return 0
 
 

@@ -143,6 +143,7 @@ GROUPS = {
         *_all(
             Option("--solver", "auto|dense|direct|amg", "auto chooses by size"),
             Option("--error", "FRACTION", ERROR),
+            Option("--most-unknowns", "N", "of the finest mesh that --error may make", needs=("error",)),
             Option("--tolerance", "NUMBER", "relative residual of the iterative solver (1e-10)"),
             only="models statics",
         ),

@@ -31,6 +31,8 @@ COMMANDS = {
     },
 }
 """Commands, and what stands behind each without a name."""
+FILES = {"bash": "_shtab_compgen_files", "zsh": "_files", "tcsh": "f"}
+"""What shtab takes for the names of files, where it completes words in a shell."""
 DEBUG = Option("--debug", None, "show the traceback of an error")
 LENIENT = Option("--lenient", None, "accept .mdpa rows that are broken over lines")
 OF_VERIFY = (
@@ -65,6 +67,13 @@ class Parser(argparse.ArgumentParser):
         choice = re.search(r"invalid choice: '([^']*)' \(choose from (.*)\)", message)
         known = re.findall(r"[\w-]+", choice[2]) if choice else []
         return f".{nearest(choice[1], known)}".removesuffix(".") if choice else ""
+
+    def refuse_first(self, words: Sequence[str]) -> None:
+        """Refuse an option before any command that is none of ours: it may be misspelt."""
+        first = words[0] if words else ""
+        if first.startswith("-") and first not in self._option_string_actions:
+            near = nearest(first, self._option_string_actions)
+            self.error(f"{first}: there is no such option.{near}")
 
     def refuse(self, command: str, rest: Sequence[str]) -> NoReturn:
         """Say which words a command does not know, what they are near to, and end."""
@@ -115,7 +124,8 @@ def build_parser() -> Parser:
         # "-1,0,0" and "-z:30" are values, not options
         command._negative_number_matcher = re.compile(r"-([\d.]|[xyz]:)")
         for word, meaning in words.items():
-            command.add_argument(word, help=meaning, nargs="*" if word == "names" else None)
+            many = "*" if word == "names" else "+" if name in ("info", "check") else None
+            command.add_argument(word, help=meaning, nargs=many).complete = FILES  # type: ignore[attr-defined]
         _add(command, (*(OF_VERIFY if name == "verify" else [LENIENT]), DEBUG))
     # All its words, also --help, are for the program that it runs.
     subparsers.add_parser("bench", help="run the benchmarks of a source checkout", add_help=False)
@@ -132,7 +142,9 @@ def _add(group: Any, options: Iterable[Option]) -> None:
             settings["choices"] = option.form.split("|")
         else:
             settings["metavar"] = option.form
-        group.add_argument(*option.names.split(), help=option.help, **settings)
+        added = group.add_argument(*option.names.split(), help=option.help, **settings)
+        if "OUT" in (option.form or "") or "STATE" in (option.form or ""):
+            added.complete = FILES
 
 
 def with_values(words: Sequence[str]) -> list[str]:

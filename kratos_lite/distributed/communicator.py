@@ -19,11 +19,11 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from kratos_lite.errors import InputError, KratosLiteError
+from kratos_lite.errors import InputError, KratosLiteError, installing
 
 T = TypeVar("T")
 LOG = logging.getLogger(__name__)
-INSTALL = "python3-mpi4py of Debian or `pip install kratos-lite[mpi]`"
+INSTALL = f"python3-mpi4py of Debian or `{installing('mpi')}`"
 LIMIT = 60.0
 """Seconds within which all ranks must have begun: one that has ended would be waited for without end."""
 PAUSE = 1e-3

@@ -225,7 +225,7 @@ class Case:
     preload : whether the stress of the loads stiffens or softens in natural frequencies.
     harmonic : options of `Model.harmonic` for the response to loads that swing, or None; its frequencies may
         also be a function of the model.
-    solver, tolerance, error, backend, petsc : of a model at rest, as for `Model.solve`.
+    solver, tolerance, error, most_unknowns, backend, petsc : of a model at rest, as for `Model.solve`.
     outputs : files to write.
     expected : comparisons of the end of a model with expected values, each of which returns a line, or a
         `Comparison` after some steps; of modes, each takes their frequencies.
@@ -243,6 +243,7 @@ class Case:
     solver: str = "auto"
     tolerance: float = 1e-10
     error: float | None = None
+    most_unknowns: int | None = None
     backend: str | None = None
     petsc: str | None = None
     outputs: Outputs = field(default_factory=Outputs)

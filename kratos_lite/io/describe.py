@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 
+from kratos_lite.analysis.nodal_loads import external_loads
+from kratos_lite.assembly.gauss_point_fields import volumes
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.elements.formulations import element_of, is_unnamed
+from kratos_lite.errors import KratosLiteError
 from kratos_lite.io.formats.document import Data, Document
 from kratos_lite.io.formats.mdpa.values import Table
 from kratos_lite.mesh import Block
+from kratos_lite.model.structure import Structure
 
 
 def describe(document: Document) -> str:
@@ -49,6 +54,21 @@ def describe(document: Document) -> str:
     lines += _parts(document)
     lines += [f"{'note':<12}{note}" for note in document.notes]
     return "\n".join(lines)
+
+
+def amounts(model: Structure) -> list[tuple[str, str]]:
+    """Return loads in words and their sum, volume and mass, as far as a model says them."""
+    names = {id(load): f"{name}: " for name, load in model.named_loads.items()}
+    rows = [("load", f"{names.get(id(load), '')}{load}") for load in model.loads]
+    with suppress(KratosLiteError):
+        groups = model.element_groups()
+        parts = [float(volumes(model.mesh.points, group).sum()) for group in groups]
+        rows.append(("volume", f"{sum(parts):.6g} m³"))
+        mass = sum(group.material.density * part for group, part in zip(groups, parts, strict=True))
+        rows.append(("mass", f"{mass:.6g} kg"))
+        force = external_loads(model, groups, model.loads).sum(axis=0)
+        rows.append(("total load", f"({', '.join(_short(float(f)) for f in force)}) N"))
+    return rows
 
 
 def _at(line: int) -> str:

@@ -11,7 +11,7 @@ from kratos_lite.io.case import Case, TimeIntegration
 from kratos_lite.io.outputs import check_outputs
 from kratos_lite.io.runners.outcome import Outcome
 from kratos_lite.model.structure import Structure
-from kratos_lite.tabular import aligned
+from kratos_lite.tabular import aligned, in_units
 from kratos_lite.typing import Progress
 from kratos_lite.view.progress import watched
 
@@ -146,4 +146,8 @@ def describe_case(case: Case) -> str:
     if not case.is_of_model:
         return f"{'file':<22}{name}\n{runner_of(case).describe(case)}"
     time = [("time", str(case.time))] if case.time else []
-    return aligned([("file", name), *case.model.table(), *time])
+    from kratos_lite.io.describe import amounts
+
+    told = [row for row in case.model.table() if row[0] != "load"]
+    rows = [("file", name), *told, *amounts(case.model), *time]
+    return in_units(aligned(rows), case.model.units)

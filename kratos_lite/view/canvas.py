@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.atomic import replacing
-from kratos_lite.errors import InputError, KratosLiteError
+from kratos_lite.errors import InputError, KratosLiteError, installing
 from kratos_lite.registry import remembered
 from kratos_lite.typing import Array
 from kratos_lite.validation import finite, path_of, short
@@ -30,7 +30,7 @@ def _canvas() -> Any:
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
     except ImportError as error:
-        raise KratosLiteError("pictures need matplotlib: pip install kratos-lite[view]") from error
+        raise KratosLiteError(f"pictures need matplotlib: {installing('view')}") from error
     return FigureCanvasAgg
 
 

@@ -72,6 +72,8 @@ def test_the_history_is_in_the_report_and_the_model_stays():
     assert history[-1].error == result.report.error <= 0.15
     rows = result.table()
     assert sum(label == "refinement" for label, _ in rows) == len(history)
+    spent = sum(step.seconds for step in history)
+    assert 0 < spent <= sum(result.report.seconds.values())  # of all meshes
     assert [value for label, value in rows if label == "estimated error"] == [
         f"{history[-1].error:.2%} of the energy norm, from {len(history)} meshes"
     ]

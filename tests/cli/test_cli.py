@@ -219,7 +219,8 @@ def test_a_script_says_the_same_as_options(run, box):
     assert told.out.startswith("file         run.py\nnodes        27\n")
     assert "material     Isotropic3D(E=210000000000.0, nu=0.3, density=7850.0, alpha=0.0)" in told.out
     assert "fixed        27 components" in told.out
-    assert "load         Gravity" in told.out
+    assert "load         gravity force (0, 0, -9.81)" in told.out
+    assert "volume       1 m³\nmass         7850 kg\ntotal load   (0, 0, -77008.5) N\n" in told.out
     assert run("check", "run.py").out.startswith("run.py: 27 nodes, 8 elements, no errors")
     assert run("convert", "run.py", "run.mdpa").code == 0
     assert run("solve", "run.mdpa", "--json", "again.json").code == 0
@@ -755,6 +756,27 @@ def test_a_reader_that_goes_away_is_no_error(folder):
         told = running.stderr.read()
         running.wait(timeout=FOREVER)
     assert (running.returncode, told) == (0, b"")
+
+
+@pytest.mark.parametrize("command", ["info", "check"])
+def test_several_files_stand_under_headings_and_the_worst_code_counts(run, box, command):
+    script("by_file.json", gravity=-9.81)
+    done = run(command, "run.py", "none.mdpa", "run.py")
+    assert done.code == 2
+    assert [line for line in done.out.splitlines() if line.startswith("==")] == [
+        "== run.py",
+        "== none.mdpa",
+        "== run.py",
+    ]
+    assert done.err == "error: none.mdpa: there is no such file\n"
+    assert run(command, "run.py", "run.py").code == 0
+
+
+def test_most_unknowns_stop_a_requested_error(run, box):
+    options = ("box.vtu", *HELD, "--gravity", "0,0,-9.81")
+    few = run("solve", *options, "--error", "0.01%", "--most-unknowns", "60")
+    assert (few.code, "was not reached" in few.out) == (3, True)
+    assert "--most-unknowns belongs to --error" in run("solve", *options, "--most-unknowns", "60").err
 
 
 # ---- files that are wrong on purpose -------------------------------------------------------------------

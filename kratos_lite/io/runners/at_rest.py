@@ -19,7 +19,7 @@ def check(case: Case) -> list[str]:
 
 def run(case: Case, progress: Progress | None = None) -> Outcome:
     """Solve the model."""
-    result = case.model.solve(
-        case.solver, case.tolerance, progress, error=case.error, backend=case.backend, petsc=case.petsc
-    )
+    names = ("error", "most_unknowns", "backend", "petsc")
+    options = {name: getattr(case, name) for name in names}
+    result = case.model.solve(case.solver, case.tolerance, progress, **options)
     return Outcome(case, [], result)

@@ -54,6 +54,13 @@ class Load(ABC):
         values = {name: value for name, value in vars(self).items() if not name.startswith("_")}
         return f"{type(self).__name__}({', '.join(f'{k}={_shown(v)}' for k, v in values.items())})"
 
+    def __str__(self) -> str:
+        kind = re.sub("(?<=[a-z])(?=[A-Z])", " ", type(self).__name__).lower()
+        values = {k: v for k, v in vars(self).items() if not k.startswith("_") and v is not None}
+        where = values.pop("where", None)
+        said = [_shown(v) if k == kind else f"{k} {_shown(v)}" for k, v in values.items() if v is not False]
+        return f"{kind} {', '.join(said)}" + ("" if where is None else f" on {_shown(where)}")
+
     @abstractmethod
     def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
         """Return the nodal forces of the load.

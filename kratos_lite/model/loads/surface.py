@@ -323,6 +323,8 @@ class ConditionLoads(Load):
         loaded = self.force.any(axis=1) | (self.pressure != 0)
         return f"forces and pressures of {int(loaded.sum())} conditions"
 
+    __str__ = __repr__
+
     def follow(self, mesh: Mesh, x: Array) -> Iterator[tuple[Rows, Array, Array]]:
         """Yield what deformed faces and lines change; a force per area keeps its direction."""
         yield from self._deformed(mesh, x, self.following)
