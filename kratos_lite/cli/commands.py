@@ -12,7 +12,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING
 
 from kratos_lite.cli.options import only, read_values
-from kratos_lite.errors import InputError, KratosLiteError, ModelError, SolveError, within_numbers
+from kratos_lite.errors import InputError, KratosLiteError, ModelError, within_numbers
 from kratos_lite.tabular import in_units
 
 if TYPE_CHECKING:
