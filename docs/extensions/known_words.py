@@ -19,6 +19,7 @@ from kratos_lite.io.kratos import (
     run_file,
     time_dependent,
 )
+from kratos_lite.io.kratos.outputs import OUTPUT_PROCESSES
 from kratos_lite.io.kratos.variables import LOADING
 from kratos_lite.materials import MATERIALS
 
@@ -61,6 +62,7 @@ def _processes() -> list[str]:
         (f"`{name}`", _code(expected_values.FILE_KEYS if "json" in name else expected_values.NODE_KEYS))
         for name in expected_values.COMPARISONS
     ]
+    rows += [(f"`{name}`", _code(process.words())) for name, process in OUTPUT_PROCESSES.items()]
     return _table(*rows, head="| process | keys of its `Parameters` |")
 
 

@@ -210,7 +210,7 @@ def known(groups: Sequence[ElementGroup]) -> dict[str, Field]:
     if all(group.is_linear and group.heating is None for group in groups):
         return FIELDS
     energy = replace(FIELDS["strain_energy_density"], where=EVERYWHERE, sampled=True)
-    laws = [group.material for group in groups if group.states is not None]
+    laws = [group.material for group in groups]
     sizes = [(law, name, size) for law in laws for name, size in law.internal_variables.items()]
     found = FIELDS | {"strain_energy_density": energy}
     for law, name, size in sizes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from kratos_lite.analysis.integrators import ModelIntegrator
     from kratos_lite.analysis.model import Model
     from kratos_lite.analysis.result import Result
+    from kratos_lite.analysis.state import State
     from kratos_lite.bodies import Body
 
 
@@ -119,6 +121,7 @@ class Outputs:
     state : the last state, from which another run goes on.
     mode : how .vtu files store their numbers: ``binary`` if not given, ``compressed`` or ``ascii``.
     sections : planes and parts, as for `Result.section`, that summary and json of a model at its end have.
+    in_steps : files of a model in the steps that a run file of Kratos asks for.
     """
 
     results: list[str] = field(default_factory=list)
@@ -127,6 +130,7 @@ class Outputs:
     state: str | None = None
     mode: str | None = None
     sections: list[Any] = field(default_factory=list)
+    in_steps: list[StepOutput] = field(default_factory=list)
 
     def paths(self) -> list[str]:
         """Return all files.
@@ -134,31 +138,61 @@ class Outputs:
         Returns
         -------
         list of str
-            Results, json, picture, state.
+            Results, json, picture, state; without those of `in_steps`.
         """
         single = (self.json, self.picture, self.state)
         return [*self.results, *(path for path in single if path is not None)]
 
 
+class AfterSteps:
+    """What is done after some steps, or at the end of a model without steps."""
+
+    times: Sequence[float]  # s, of these steps
+    end: float  # s, of a model without steps
+
+    def is_due(self, time: float) -> bool:
+        """Return whether it is done after a step to a time."""
+        slack = 1e-9 * abs(time)
+        k = bisect_left(self.times, time - slack)
+        return k < len(self.times) and self.times[k] <= time + slack
+
+
+class StepOutput(AfterSteps, ABC):
+    """Files with the results of some steps, as output processes of Kratos write them."""
+
+    @abstractmethod
+    def paths(self) -> list[str]:
+        """Return all files."""
+
+    @abstractmethod
+    def check(self, case: Case) -> None:
+        """Raise InputError for values that the results of a case do not have."""
+
+    @abstractmethod
+    def add(self, result: Result, time: float, state: State | None = None) -> None:
+        """Take the result of a step to a time in s; a state of a motion has its velocities too."""
+
+    def close(self) -> None:
+        """Write what all steps together make."""
+
+    @abstractmethod
+    def summary(self) -> list[str]:
+        """Return the files that are written, in few lines."""
+
+
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class Comparison(AfterSteps):
     """A comparison with expected values after some steps, or at the end of a model."""
 
     what: str
-    times: Sequence[float]  # s, of the steps after which it is
-    end: float  # s, of a model without steps
+    times: Sequence[float]
+    end: float
     # by how much a result at a time exceeds the tolerance at worst, and the numbers; ValueError says why not
     compare: Callable[[Result, float], tuple[float, str]]
 
     def __call__(self, result: Result) -> str:
         """Return the line of a result at the end."""
         return self.line([self.found(result, self.end)])
-
-    def is_due(self, time: float) -> bool:
-        """Return whether it is made after a step to a time."""
-        slack = 1e-9 * abs(time)
-        k = bisect_left(self.times, time - slack)
-        return k < len(self.times) and self.times[k] <= time + slack
 
     def found(self, result: Result, time: float) -> tuple[float, str]:
         """Return by how much a result exceeds the tolerance, and the words for it."""

@@ -24,6 +24,10 @@ def check_outputs(case: Case) -> None:
     outputs, restart = case.outputs, case.time.restart if case.time else None
     read = [*case.files, *([Path(restart)] if restart else [])]
     check_targets(read, outputs.paths(), new_folders=case.time is not None)
+    in_steps = [path for each in outputs.in_steps for path in each.paths()]
+    check_targets([*read, *map(Path, outputs.paths())], in_steps, new_folders=True)
+    for each in outputs.in_steps:
+        each.check(case)
     _check_results(case)
     of_many = bool(case.time or case.modes)
     if outputs.mode and not any(not of_many or ending(path) == ".pvd" for path in outputs.results):
@@ -68,6 +72,10 @@ def write_at_end(outputs: Outputs, result: Result, *, in_time: bool) -> None:
             write_json(outputs.json, result, outputs.sections)
         if in_time:
             return
+        for output in outputs.in_steps:
+            if output.is_due(output.end):
+                output.add(result, output.end)
+            output.close()
         for path in outputs.results:
             write_result(path, result, outputs.mode)
         if outputs.picture is not None:

@@ -155,7 +155,7 @@ def read_settings(path: str | Path) -> Settings:
 
 
 def inside(folder: Path, name: str, allow_outside: bool = False) -> Path:
-    """Return the path of a file named in a run file; raise ValueError if it leaves the folder.
+    """Return the path of a file named in a run file; raise InputError if it leaves the folder.
 
     >>> inside(Path("case"), "mesh/beam.mdpa").as_posix()
     'case/mesh/beam.mdpa'
@@ -163,11 +163,11 @@ def inside(folder: Path, name: str, allow_outside: bool = False) -> Path:
     relative = Path(name.replace("\\", "/"))
     leaves = relative.is_absolute() or ".." in relative.parts or (len(name) > 1 and name[1] == ":")
     if leaves and not allow_outside:
-        raise ValueError(
+        raise InputError(
             f"path {name!r} leaves the folder of the run file; give a path inside it, without '..'"
         )
     if any(len(part.encode()) > LONGEST for part in relative.parts):
-        raise ValueError(f"a name in the path {shown(name)} is longer than {LONGEST} bytes; shorten it")
+        raise InputError(f"a name in the path {shown(name)} is longer than {LONGEST} bytes; shorten it")
     return folder / relative
 
 
@@ -180,10 +180,7 @@ def find_file(
     name = settings.text(key) + ending
     if isdir(name) or isdir(folder / name):  # where the methods of Path refuse names that are too long
         raise settings.error(key, f"{name} is a folder; name a file in it")
-    try:
-        path = inside(folder, name, outside)
-    except ValueError as error:
-        raise settings.error(key, str(error)) from None
+    path = settings.placed(key, inside, folder, name, outside)
     beside = folder / path.name
     if path.is_file():
         settings.files.append(path)

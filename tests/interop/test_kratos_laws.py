@@ -9,7 +9,7 @@ from run_files import CLAMP, box_mdpa, materials, process, run_file, run_kratos,
 
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.io.files import read_case
-from kratos_lite.io.kratos.expected_values import ORDER_OF_POINTS
+from kratos_lite.io.kratos.outputs.values import ORDER_OF_POINTS
 from kratos_lite.io.run import prepare, run
 
 for wheel in ("Multiphysics", "StructuralMechanicsApplication", "ConstitutiveLawsApplication"):

@@ -6,6 +6,7 @@ import re
 from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -58,16 +59,38 @@ class RunContext:
     moved: bool = True  # Kratos would move the nodes with the displacement.
     outside: bool = False  # files outside the folder may be named.
 
-    def part(self, settings: Settings, key: str = "model_part_name") -> Part:
-        """Return the part that a key names; the root's name may stand before it, or alone for all."""
-        mesh, name = self.mesh, settings.text(key)
-        if name == self.root:
-            return Part(np.arange(mesh.n_nodes), np.arange(mesh.n_elements), np.arange(mesh.n_conditions))
-        short = name.removeprefix(self.root + ".")
-        if short not in mesh.parts:
-            text = f"there is no part {name!r}.{nearest(short, mesh.parts)} The parts are {self.root} (all), "
-            raise settings.error(key, text + ", ".join(mesh.parts))
-        return mesh.parts[short]
+    def part(self, settings: Settings) -> Part:
+        """Return the part that parameters name."""
+        return part_of(self.mesh, self.part_name(settings))
+
+    def part_name(self, settings: Settings) -> str:
+        """Return the name that a part has in meshes, "" of all; the root's name may stand before it."""
+        key, name = "model_part_name", settings.text("model_part_name")
+        short = "" if name == self.root else name.removeprefix(self.root + ".")
+        if within := settings.text("sub_model_part_name", ""):
+            key, short = "sub_model_part_name", f"{short}.{within}".removeprefix(".")
+        if short and short not in (known := self.mesh.parts):
+            text = f"there is no part {settings.text(key)!r}.{nearest(short, known)} The parts are "
+            raise settings.error(key, text + ", ".join([f"{self.root} (all)", *known]))
+        return short
+
+
+def part_of(mesh: Mesh, name: str) -> Part:
+    """Return a part by its name in a mesh, or all without one."""
+    if name:
+        return mesh.parts[name]
+    return Part(np.arange(mesh.n_nodes), np.arange(mesh.n_elements), np.arange(mesh.n_conditions))
+
+
+def steps_by_frequency(times: Sequence[float], frequency: float) -> list[int]:
+    """Return the steps of which a process acts once for each `time_frequency` in s, as Kratos counts."""
+    counter, steps = 0.0, list[int]()
+    for step, (before, time) in enumerate(pairwise(times), 1):
+        counter += time - before
+        if counter > frequency:
+            counter = 0.0
+            steps.append(step)
+    return steps
 
 
 def times_of(problem: Settings, solver: Settings) -> list[float]:

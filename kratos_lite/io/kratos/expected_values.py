@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
 
-from kratos_lite.analysis.fields import known, listed
+from kratos_lite.analysis.fields import listed
 from kratos_lite.analysis.result import Result
 from kratos_lite.errors import InputError
 from kratos_lite.io.case import Comparison
-from kratos_lite.io.kratos.context import RunContext, interval_of
+from kratos_lite.io.kratos.context import RunContext, interval_of, steps_by_frequency
 from kratos_lite.io.kratos.expressions import evaluate
+from kratos_lite.io.kratos.outputs.values import names_of_nodes, values_of_elements
 from kratos_lite.io.kratos.processes import refuse_local_axes
 from kratos_lite.io.settings import Settings, find_file, is_number, read_settings, shown
 from kratos_lite.mesh import Part
@@ -37,14 +37,6 @@ FILE_KEYS = (
 
 Expected: TypeAlias = Callable[[Result, float], "tuple[Array, Array]"]
 """From a result and its time: expected values and allowed differences."""
-ORDER_OF_POINTS = {
-    6: [1, 0, 2, 4, 3, 5],
-    4: [0],
-    8: [0, 4, 6, 2, 1, 5, 7, 3],
-    10: [2, 1, 0, 3],
-    **dict.fromkeys((20, 27), np.arange(27).reshape(3, 3, 3).transpose().ravel().tolist()),
-}
-"""Gauss points of elements by their nodes, in the order of Kratos; measured against Kratos 10.4.4."""
 
 
 def _at_nodes(
@@ -124,6 +116,7 @@ class Reference:
     part: Part
     absolute: float
     relative: float
+    by_place: bool  # nodes are named by their places
 
     def place(self, time: float) -> float:
         """Return where a time lies among those of the file."""
@@ -146,36 +139,27 @@ class Reference:
 
     def at_nodes(self, component: str, result: Result, time: float) -> tuple[Array, Array]:
         """Return expected values of a component on nodes and allowed differences."""
-        now, ids = self.place(time), result.mesh.node_ids[self.part.nodes]
-        wanted = [self.at(self.data.section(f"NODE_{i}", required=True), component, now) for i in ids]
+        now, names = self.place(time), names_of_nodes(result.mesh, self.part.nodes, self.by_place)
+        wanted = [self.at(self.data.section(name, required=True), component, now) for name in names]
         return np.array(wanted), self.allowed(np.array(wanted))
 
     def at_gauss(self, variable: str, result: Result, time: float) -> tuple[float, str]:
         """Compare a variable at Gauss points."""
-        fields, ids = known(result.groups), result.mesh.element_ids
-        field = next((key for key, each in fields.items() if each.kratos == variable), None)
-        if field is None or "gauss" not in fields[field].where:
-            raise ValueError(f"kratos_lite has no {variable} at Gauss points here")
+        ids, found = result.mesh.element_ids, list[tuple[Array, Array, str]]()
+        of_elements = list(values_of_elements(result, variable, self.part.elements))
         now = self.place(time)
-        every, found = result.field(field, "gauss"), list[tuple[Array, Array, str]]()
-        chosen = set(self.part.elements.tolist())
-        for group in result.groups:
-            count, own = group.nodes.shape[1], group.rule is group.element.rule
-            order = ORDER_OF_POINTS.get(count, []) if own else []
-            for row in filter(chosen.__contains__, group.rows.tolist()):
-                if not order:
-                    raise ValueError(f"Gauss points of elements with {count} nodes are not those of Kratos")
-                points = self.data.section(f"ELEMENT_{ids[row]}", required=True).section(variable)
-                for i, k in enumerate(order):
-                    value, wanted = np.ravel(every[row][k]), np.ravel(self.at(points, str(i), now))
-                    if len(value) != len(wanted):
-                        raise ValueError(f"{variable} has {len(value)} components, {len(wanted)} in the file")
-                    found.append((value, wanted, f"element {ids[row]}, point {i}"))
+        for row, values in of_elements:
+            points = self.data.section(f"ELEMENT_{ids[row]}", required=True).section(variable)
+            for i, numbers in enumerate(values):
+                value, wanted = np.ravel(numbers), np.ravel(self.at(points, str(i), now))
+                if len(value) != len(wanted):
+                    raise ValueError(f"{variable} has {len(value)} components, {len(wanted)} in the file")
+                found.append((value, wanted, f"element {ids[row]}, point {i}"))
         if not found:
             raise ValueError("its part has no elements")
-        values, wanted_all, names = zip(*found, strict=True)
+        every, wanted_all, names = zip(*found, strict=True)
         expected = np.array(wanted_all)
-        return _worst(np.array(values), expected, self.allowed(expected), lambda i: names[i[0]])
+        return _worst(np.array(every), expected, self.allowed(expected), lambda i: names[i[0]])
 
 
 def file_comparisons(settings: Settings, context: RunContext) -> Iterator[Callable[[Result], str]]:
@@ -190,17 +174,11 @@ def file_comparisons(settings: Settings, context: RunContext) -> Iterator[Callab
     except InputError as error:
         yield _idle(what, str(error))
         return
-    key = "sub_model_part_name" if settings.text("sub_model_part_name", "") else "model_part_name"
-    context.part(settings)
-    part, data = context.part(settings, key), read_settings(path)
+    part, data = context.part(settings), read_settings(path)
     absolute, relative = settings.number("tolerance", 1e-3), settings.number("relative_tolerance", 1e-6)
-    reference, frequency = Reference(data, part, absolute, relative), settings.number("time_frequency", 0.1)
-    counter, times = 0.0, list[float]()
-    for before, time in pairwise(context.times):  # as Kratos counts
-        counter += time - before
-        if counter > frequency:
-            counter = 0.0
-            times.append(time)
+    reference = Reference(data, part, absolute, relative, settings.flag("use_node_coordinates", False))
+    steps = steps_by_frequency(context.times, settings.number("time_frequency", 0.1))
+    times = [context.times[step] for step in steps]
     compares = {
         component: _at_nodes(component, part.nodes, partial(reference.at_nodes, component))
         for variable in settings.texts("check_variables")

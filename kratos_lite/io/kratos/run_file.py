@@ -12,7 +12,7 @@ from pathlib import Path
 from kratos_lite.analysis.model import Model
 from kratos_lite.analysis.result import Result
 from kratos_lite.errors import Problems, nearest
-from kratos_lite.io.case import Case
+from kratos_lite.io.case import Case, Outputs
 from kratos_lite.io.formats import read_document
 from kratos_lite.io.formats.document import Document
 from kratos_lite.io.formats.part_files import part_files, read_part
@@ -21,6 +21,7 @@ from kratos_lite.io.kratos.expected_values import COMPARISONS
 from kratos_lite.io.kratos.initial_state import MODULE, initial_state_of
 from kratos_lite.io.kratos.laws import is_nonlinear, make_linear, notes_on_stress, quasi_static_of
 from kratos_lite.io.kratos.motion import add_motion
+from kratos_lite.io.kratos.outputs import OUTPUT_PROCESSES, OutputProcess
 from kratos_lite.io.kratos.point_elements import set_apart
 from kratos_lite.io.kratos.processes import PROCESSES, Action, actions_of, run
 from kratos_lite.io.kratos.properties import NO_EXPANSION, expanding, use_materials
@@ -46,7 +47,7 @@ OTHER_PHYSICS = (
     "use_orthogonal_subscales", "contact_settings", "mpc_contact_settings", "computing_sub_model_part_name",
 )  # fmt: skip
 """Solver settings that, unless false or empty, ask for equations that kratos_lite does not have."""
-OUTPUTS = ("save_restart_process", "timer_process", "print_info_in_file_process")
+NOT_RUN = ("save_restart_process", "timer_process", "print_info_in_file_process")
 
 
 def read_kratos_project(
@@ -83,7 +84,8 @@ def read_kratos_project(
     if not dynamic and not in_steps:
         text = "supports, loads and motion are taken at the end of the run"
         notes.append(f"{text}: those at t = {times[-1]:g} s")
-    actions, checks, states = _read_processes(settings, context, notes)
+    actions, checks, states, written = _read_processes(settings, context, notes)
+    outputs = Outputs(in_steps=list(written))
     for action in actions:
         if action.component == TEMPERATURE:
             action.settings.expect(expanding(document, True), "variable_name", NO_EXPANSION)
@@ -96,10 +98,10 @@ def read_kratos_project(
     add_motion(model, settings, None if in_time else times[-1])
     model.notes += notes
     if in_time is None:
-        return Case(model, expected=checks, files=settings.files)
+        return Case(model, outputs=outputs, expected=checks, files=settings.files)
     in_time.finish(model)
     time = time_integration_of(settings, in_time) if dynamic else steps
-    return Case(model, time, expected=checks, files=settings.files)
+    return Case(model, time, outputs=outputs, expected=checks, files=settings.files)
 
 
 def _check_root(settings: Settings) -> list[str]:
@@ -168,11 +170,12 @@ def _use_materials(solver: Settings, context: RunContext, document: Document, no
 
 def _read_processes(
     settings: Settings, context: RunContext, notes: list[str]
-) -> tuple[list[Action], list[Callable[[Result], str]], list[Callable[[Model], None]]]:
-    """Return what processes do, check and begin with; all that are unknown are reported together."""
+) -> tuple[list[Action], list[Callable[[Result], str]], list[Callable[[Model], None]], list[OutputProcess]]:
+    """Return what processes do, check, begin with and write; all that are unknown are reported together."""
     actions: list[Action] = []
     checks: list[Callable[[Result], str]] = []
     states: list[Callable[[Model], None]] = []
+    written: list[OutputProcess] = []
     problems = Problems()
     for section in (settings.section("processes"), settings.section("output_processes")):
         # Kratos keeps the lists in alphabetical order; later processes replace earlier values.
@@ -185,12 +188,15 @@ def _read_processes(
                     states.append(initial_state_of(entry.section("Parameters", required=True), context))
                 elif module in COMPARISONS:
                     checks += COMPARISONS[module](entry.section("Parameters", required=True), context)
-                elif module.endswith("_output_process") or module in OUTPUTS:
-                    text = f"{module} is not run; ask kratos_lite for files with --output"
-                    notes.append(f"{entry.path}: {text}")
+                elif module in OUTPUT_PROCESSES:
+                    output = OUTPUT_PROCESSES[module](entry.section("Parameters", required=True), context)
+                    written.append(output)
+                    notes += [f"{entry.path}: {output.note}"] if output.note else []
+                elif module in NOT_RUN:
+                    notes.append(f"{entry.path}: {module} is not run")
                 else:
-                    known = [*PROCESSES, *COMPARISONS, MODULE]
+                    known = [*PROCESSES, *COMPARISONS, MODULE, *OUTPUT_PROCESSES]
                     text = f"unknown process {module!r}.{nearest(module, known)} Known are {', '.join(known)}"
                     problems.add(str(entry.error("", text)))
     problems.raise_if_any()
-    return actions, checks, states
+    return actions, checks, states, written

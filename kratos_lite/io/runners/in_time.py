@@ -55,16 +55,30 @@ def follow(
             stack.enter_context(SeriesWriter(path, subject, mode=outputs.mode or "binary"))
             for path in outputs.results
         ]
+        for output in outputs.in_steps:
+            stack.callback(output.close)
         stack.enter_context(np.errstate(over="ignore", invalid="ignore"))
         for recorder in (*series, monitor):
             recorder.add(start)
         for last[0] in states:
             for recorder in (*series, monitor):
                 recorder.add(last[0])
-            for i, each in enumerate(case.expected):
-                if isinstance(each, Comparison) and each.is_due(last[0].time):
-                    found.setdefault(i, []).append(each.found(subject.result(), last[0].time))
+            _at_step(case, subject, last[0], found)
     return found
+
+
+def _at_step(case: Case, subject: Any, state: Any, found: dict[int, list[tuple[float, str]]]) -> None:
+    """Write the outputs that are due after a step, and add what comparisons find."""
+    outputs = [each for each in case.outputs.in_steps if each.is_due(state.time)]
+    expected = enumerate(case.expected)
+    due = {i: each for i, each in expected if isinstance(each, Comparison) and each.is_due(state.time)}
+    if not (outputs or due):
+        return
+    result = subject.result()
+    for output in outputs:
+        output.add(result, state.time, state)
+    for i, comparison in due.items():
+        found.setdefault(i, []).append(comparison.found(result, state.time))
 
 
 def _save(last: list[Any], path: str) -> None:

@@ -87,4 +87,7 @@ class Outcome:
         """
         if self.result is not None:
             write_at_end(self.case.outputs, self.result, in_time=self.case.time is not None)
-        return self.case.outputs.paths()
+        return [
+            *self.case.outputs.paths(),
+            *(line for each in self.case.outputs.in_steps for line in each.summary()),
+        ]
