@@ -45,12 +45,8 @@ class VtkOutput(OutputProcess):
         values = {RENAMED.get(key, key): value for key, value in settings.values.items()}
         super().__init__(Settings(values, settings.source, settings.path), context)
         settings = self.settings
-        for key, known in (
-            ("file_format", ("binary", "ascii")),
-            ("entity_type", ("automatic", "element", "condition")),
-        ):
-            word = settings.text(key, known[0])
-            settings.expect(word in known, key, f"must be {' or '.join(known)}; got {word!r}")
+        self.is_text = self.word("file_format", "binary", "ascii") == "ascii"
+        self.cells = self.word("entity_type", "automatic", "element", "condition")
         digits = settings.integer("output_precision", 7)
         settings.expect(0 <= digits <= 17, "output_precision", f"must be 0 … 17 digits; got {digits}")
         self.digits = digits
@@ -58,22 +54,17 @@ class VtkOutput(OutputProcess):
         if settings.flag("output_sub_model_parts", False):
             inner = (name for name in context.mesh.parts if name.rpartition(".")[0] == self.part_name)
             self.parts |= {name: f"{self.parts[self.part_name]}_{name.rpartition('.')[2]}" for name in inner}
-        whens = [str(step) if self.by_step else f"{context.times[step]:.{digits}f}" for step in self.steps]
-        named = [
-            (step, when, *part)
-            for step, when in zip(self.steps, whens, strict=True)
-            for part in self.parts.items()
-        ]
-        self.files = {(step, name): self.file(label, when) for step, when, name, label in named}
+        self.files = {
+            (step, name): self.file(label, str(step) if self.by_step else f"{context.times[step]:.{digits}f}")
+            for step in self.steps
+            for name, label in self.parts.items()
+        }
 
     def due(self) -> list[int]:
         """Return the steps after which it writes."""
         settings, steps = self.settings, list[int]()
-        kind, interval = settings.text("output_control_type", "step"), settings.number("output_interval", 1.0)
-        settings.expect(
-            kind in ("step", "time"), "output_control_type", f"must be step or time; got {kind!r}"
-        )
-        self.by_step = kind == "step"
+        interval = settings.number("output_interval", 1.0)
+        self.by_step = self.word("output_control_type", "step", "time") == "step"
         interval = int(interval) if self.by_step else interval
         following = max(interval, 0)
         for step, time in enumerate(self.context.times):
@@ -107,8 +98,7 @@ class VtkOutput(OutputProcess):
         elemental = {name: means(result, name) for name in settings.texts(self.gauss[-1])}
         for name in self.parts:
             part, path = self.part(result.mesh, name), self.files[step, name]
-            kind = settings.text("entity_type", "automatic")
-            faces = kind == "condition" or (kind == "automatic" and not len(part.elements))
+            faces = self.cells == "condition" or (self.cells == "automatic" and not len(part.elements))
             grid, nodes = cells_of(result.mesh, part, faces=faces)
             rows = rows_of_ids(result.mesh.element_ids, grid.element_ids)
             on_nodes: dict[str, Numbers] = {key: values[nodes] for key, values in nodal.items()}
@@ -131,8 +121,7 @@ class VtkOutput(OutputProcess):
 
     def write(self, path: str, grid: Mesh, points: dict[str, Numbers], cells: dict[str, Numbers]) -> None:
         """Write a file."""
-        is_text = self.settings.text("file_format", "binary") == "ascii"
-        write_legacy_vtk(path, grid, points, cells, self.digits if is_text else None)
+        write_legacy_vtk(path, grid, points, cells, self.digits if self.is_text else None)
 
 
 class GidOutput(VtkOutput):

@@ -23,7 +23,6 @@ from kratos_lite.validation import finite
 
 FILE_KEYS = ("file_name", "output_path", "folder_name", "write_buffer_size", "file_extension")
 FORMAT = re.compile(r"[<>=^]?[-+ ]?#?0?\d{0,2}(\.\d{1,2})?[eEfFgG]?")
-KNOWN = {"entity_type": ("element", "node"), "search_configuration": ("initial",)}
 HEAD = (
     '# Results for "{}" with Id # {} for search config "initial" at position: '
     "x0: {:.12g}; y0: {:.12g}; z0: {:.12g}"
@@ -34,14 +33,10 @@ class PointOutput(OutputProcess):
     """The file of a point, with the values of a node or interpolated in the element that holds it."""
 
     keys = (
-        *KNOWN,
-        "interval",
-        "historical_value",
-        "search_tolerance",
-        "print_format",
-        "output_file_settings",
-    )
-    place: tuple[str, ...] = ("position",)
+        "entity_type", "search_configuration", "interval", "historical_value", "search_tolerance",
+        "print_format", "output_file_settings",
+    )  # fmt: skip
+    place: tuple[str, ...] = ("position",)  # keys of where the points are
 
     @classmethod
     def words(cls) -> list[str]:
@@ -51,9 +46,8 @@ class PointOutput(OutputProcess):
     def __init__(self, settings: Settings, context: RunContext) -> None:
         super().__init__(settings, context)
         self.require_historical()
-        for key, known in KNOWN.items():
-            word = settings.text(key, known[0])
-            settings.expect(word in known, key, f"must be {' or '.join(known)}; got {word!r}")
+        self.word("search_configuration", "initial")
+        self.kind = self.word("entity_type", "element", "node")
         settings.expect(settings.texts("output_variables"), "output_variables", "must name a variable")
         self.format = settings.text("print_format", "")
         text = f"must be a format of numbers such as '.6e'; got {self.format!r}"
@@ -75,10 +69,8 @@ class PointOutput(OutputProcess):
         """Return the file of each point."""
         settings.check_keys(FILE_KEYS)
         ending = "." + settings.text("file_extension", "dat").removeprefix(".")
-        folder, name = (
-            settings.text("output_path", settings.text("folder_name", "")),
-            settings.text("file_name"),
-        )
+        name, folder = settings.text("file_name"), settings.text("folder_name", "")
+        folder = settings.text("output_path", folder)
         settings.expect(Path(name).name, "file_name", "must be the name of a file")
         names = [name]
         if self.place != PointOutput.place:
@@ -95,24 +87,24 @@ class PointOutput(OutputProcess):
         super().check(case)
         self.settings.placed(self.place[0], self.find, case.model.mesh)
 
-    def find(self, mesh: Mesh) -> tuple[str, Ints, Callable[[Array], Array]]:
-        """Return the kind and ids of what holds the points, and what takes nodal values there."""
-        part, kind = self.part(mesh), self.settings.text("entity_type", "element")
-        if kind == "element":
+    def find(self, mesh: Mesh) -> tuple[Ints, Callable[[Array], Array]]:
+        """Return the ids of what holds the points, and what takes nodal values there."""
+        part = self.part(mesh)
+        if self.kind == "element":
             cells, nodes = cells_of(mesh, part)
             located = cells.locate(self.points, required=True)
-            return kind, cells.element_ids[located.rows], lambda values: located.interpolate(values[nodes])
+            return cells.element_ids[located.rows], lambda values: located.interpolate(values[nodes])
         far = self.settings.number("search_tolerance", 1e-6)
         distances = [np.linalg.norm(mesh.points[part.nodes] - x, axis=1) for x in self.points]
         for x, distance in zip(self.points.tolist(), distances, strict=True):
             if not distance.min(initial=np.inf) <= far:
                 raise InputError(f"no node of the part is at {x} m; take entity_type 'element'")
         rows = part.nodes[[distance.argmin() for distance in distances]]
-        return kind, mesh.node_ids[rows], lambda values: np.asarray(values[rows])
+        return mesh.node_ids[rows], lambda values: np.asarray(values[rows])
 
     def add(self, result: Result, time: float, state: State | None = None) -> None:
         """Take the values of a step."""
-        kind, ids, at_points = self.find(result.mesh)
+        ids, at_points = self.find(result.mesh)
         variables = self.settings.texts("output_variables")
         placed = [split(name, at_points(at_nodes(name, result, state))) for name in variables]
         rows = np.column_stack([values for columns in placed for values in columns.values()])
@@ -121,7 +113,7 @@ class PointOutput(OutputProcess):
         for lines, i, x, row in zip(
             self.lines, ids.tolist(), self.points.tolist(), rows.tolist(), strict=True
         ):
-            lines.extend([] if lines else [HEAD.format(kind, i, *x), f"# time {names}"])
+            lines.extend([] if lines else [HEAD.format(self.kind, i, *x), f"# time {names}"])
             lines.append(" ".join([str(time), *(format(value, self.format) for value in row)]))
 
     def close(self) -> None:
@@ -152,7 +144,7 @@ class LineOutput(PointOutput):
     def places(self) -> Array:
         """Return the points (p, 3) in m."""
         settings, count = self.settings, self.settings.integer("sampling_points", 3)
-        settings.expect(count > 0, "sampling_points", f"must be > 0; got {count}")
+        settings.expect(0 < count <= 10_000, "sampling_points", f"must be 1 … 10000; got {count}")
         a, b = (np.array(settings.vector(key)) for key in self.place[:2])
         t = np.linspace(0.0, 1.0, count) if count > 1 else np.array([0.5])
         return np.asarray(a + t[:, None] * (b - a))

@@ -47,19 +47,18 @@ class OutputProcess(StepOutput):
 
     def check(self, case: Case) -> None:
         """Raise InputError for a variable that the results do not have, with the nearest name."""
+        known = {True: nodal_variables(case), False: [*gauss_variables(case.model.element_groups())]}
         for key in (*self.nodal, *self.gauss):
-            names, nodal = self.settings.texts(key), key in self.nodal
-            known = (
-                []
-                if not names
-                else nodal_variables(case)
-                if nodal
-                else list(gauss_variables(case.model.element_groups()))
-            )
-            for name in names:
-                place = "nodes" if nodal else "Gauss points"
-                text = f"kratos_lite has no {name} at {place} here.{nearest(name, known)} There are "
-                self.settings.expect(name in known, key, text + ", ".join(known))
+            have, place = known[key in self.nodal], "nodes" if key in self.nodal else "Gauss points"
+            for name in self.settings.texts(key):
+                text = f"kratos_lite has no {name} at {place} here.{nearest(name, have)} There are "
+                self.settings.expect(name in have, key, text + ", ".join(have))
+
+    def word(self, key: str, *known: str) -> str:
+        """Return one of some words, the first if none is given."""
+        word = self.settings.text(key, known[0])
+        self.settings.expect(word in known, key, f"must be {' or '.join(known)}; got {word!r}")
+        return word
 
     def require_historical(self) -> None:
         """Raise InputError for values of nodes that Kratos keeps without history."""
