@@ -13,9 +13,7 @@ import numpy as np
 from kratos_lite.atomic import all_or_none, write_whole
 from kratos_lite.io.abaqus.cards import Card
 from kratos_lite.io.abaqus.deck import Deck, Step
-from kratos_lite.io.abaqus.loads import with_faces
 from kratos_lite.io.abaqus.steps import cases_of
-from kratos_lite.io.abaqus.supports import node_rows
 from kratos_lite.io.case import Case
 from kratos_lite.io.run import prepare, run
 from kratos_lite.io.writers import dat
@@ -151,20 +149,19 @@ class Job:
                     self.dat += dat.prints(result, rows, word, where, time, totals, frames)
         for card in (card for card in self.asked if card.keyword in OF_FACES):
             name = card.option("SURFACE")
-            faces = self.deck.loads.surface(name, card)
-            blocks = with_faces(mesh.replace(conditions=()), faces, "SurfaceCondition")[0].conditions
+            blocks = self.deck.geometry.surface_blocks(name, card)
             self.dat += dat.section_print(result, blocks, name.upper(), time)
 
     def _rows(self, card: Card) -> Ints:
         """Return the nodes or elements that a card prints, in the order of their set."""
-        mesh, cards = self.deck.mesh, self.deck.cards
+        mesh, geometry = self.deck.mesh, self.deck.geometry
         if card.keyword in OF_FACES:
-            self.deck.loads.surface(card.option("SURFACE"), card)
+            self.deck.geometry.surface_faces(card.option("SURFACE"), card)
         if card.keyword == "NODEPRINT":
-            return node_rows(card.option("NSET").upper(), card, cards, mesh)
+            return geometry.nodes(card.option("NSET"), card)
         if card.keyword != "ELPRINT":
             return np.zeros(0, dtype=np.int64)
-        rows = rows_of_ids(mesh.element_ids, cards.elements_of(card.option("ELSET").upper(), card))
+        rows = rows_of_ids(mesh.element_ids, geometry.elements_of(card.option("ELSET").upper(), card))
         return np.asarray(rows[rows >= 0])
 
     def _frequencies(self, case: Case, omega: Any, shapes: Any) -> list[str]:
