@@ -375,34 +375,31 @@ class Supports:
 
     # ---- reference nodes ---------------------------------------------------------------------------------
 
-    def followed(self) -> tuple[Any, Array]:
-        """Return P (3n, 3n) and c: all displacements are P u + c of nodes that are used or held."""
-        from scipy.sparse import csr_array, diags_array
+    def followed(self, values: Array) -> tuple[Any, Array]:
+        """Return P (3n, 3n) and c: all displacements are P u + c with reference nodes held at values."""
+        from scipy.sparse import diags_array
 
-        known, n = self._updated()._followers, self.fixed.size
-        stays, c = np.ones(n), np.zeros(n)
-        stays[known.dependents], c[known.dependents] = 0.0, known.constants
-        entries = known.weights, (known.dependents[known.owner], known.independents)
-        return csr_array(diags_array(stays)) + csr_array(entries, shape=(n, n)), c
+        known, held = self._updated()._followers, self.fixed & ~self.mesh.used_nodes()[:, None]
+        P = known.following(held.size)
+        c = P @ np.where(held, values, 0.0).ravel()
+        c[known.dependents] += known.constants
+        return P @ diags_array(1.0 * ~held.ravel()), c
 
     def displacements(self, u: Array, time: float = 0.0) -> Array:
         """Return displacements (n, 3) at a time with those of reference nodes."""
-        used = self.mesh.used_nodes()
-        if used.all():
+        if self.mesh.used_nodes().all():
             return u
-        values, (P, c) = self.values.copy(), self.followed()
+        values = self.values.copy()
         for function, mask in self.motions:
             values[mask] = function(time)
-        held = np.where(self.fixed & ~used[:, None], values, u)
-        return np.asarray(P @ held.ravel() + c).reshape(-1, 3)
+        P, c = self.followed(values)
+        return np.asarray(P @ u.ravel() + c).reshape(-1, 3)
 
     def carried(self, forces: Array) -> Array:
         """Return forces (n, 3) with those on reference nodes passed on to what they follow."""
-        used = self.mesh.used_nodes()
-        if used.all():
+        if self.mesh.used_nodes().all():
             return forces
-        held = self.fixed & ~used[:, None]
-        return np.where(held, 0.0, (self.followed()[0].T @ forces.ravel()).reshape(-1, 3))
+        return np.asarray(self.followed(self.values)[0].T @ forces.ravel()).reshape(-1, 3)
 
     # ---- for the equations ------------------------------------------------------------------------------
 
@@ -430,13 +427,9 @@ class Supports:
         ties = self._updated()._of_parts
         if not len(ties):
             return reactions
-        out, none = reactions.copy(), np.zeros_like(self.fixed)
+        none = np.zeros_like(self.fixed)
         ties = eliminate(independent(ties, self.fixed)[0], none, np.zeros_like(self.values))
-        np.add.at(
-            out.reshape(-1), ties.independents, ties.weights * reactions.flat[ties.dependents][ties.owner]
-        )
-        out.flat[ties.dependents] = 0.0
-        return out
+        return np.asarray(ties.following(none.size).T @ reactions.ravel()).reshape(-1, 3)
 
     def on_independents(self, forces: Array) -> Array:
         """Return nodal forces (n, 3) with those on hanging nodes passed on to their independents."""

@@ -39,7 +39,7 @@ def eliminate(constraints: Constraints, fixed: Mask, values: Array) -> Constrain
         return constraints
     from scipy.sparse import diags_array
 
-    W, is_fixed = _weights(constraints, fixed.size), fixed.ravel()
+    W, is_fixed = constraints.matrix(fixed.size), fixed.ravel()
     constants = constraints.constants + W @ np.where(is_fixed, values.ravel(), 0.0)
     W, constants = _followed(W, constants, constraints.dependents)
     W = W @ diags_array(1.0 * ~is_fixed)
@@ -61,13 +61,6 @@ def _followed(W: Any, constants: Array, dependents: Ints) -> tuple[Any, Array]:
     while P.nnz:
         constants, W, P = constants + P @ constants, W + P @ W, P @ P
     return W, constants
-
-
-def _weights(constraints: Constraints, size: int) -> Any:
-    from scipy.sparse import csr_array
-
-    entries = constraints.weights, constraints.independents, constraints.start
-    return csr_array(entries, shape=(len(constraints), size))
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,6 +142,8 @@ def without(constraints: Constraints, gone: Mask, order: Ints) -> tuple[Constrai
     kept = abs(A).max(axis=1).toarray().ravel() > NOTHING
     stated = local.dependents[rest.rows[kept]]
     pivot, weight, _ = _pivots(A[kept], np.ones(len(dofs), dtype=bool), stated, 0.0 * stated, 0.0 * stated)
+    if not weight.all():
+        raise ModelError("equations of nodes that no element uses contradict each other; remove one of them")
     return constraints.take(~some) + _constraints(pivot, _for(pivot, weight, A[kept]), dofs), solved
 
 
@@ -166,7 +161,7 @@ def _wrong(constraints: Constraints, fixed: Mask) -> Mask:
     if times[constraints.independents].any():
         from scipy.sparse.csgraph import connected_components
 
-        P = _weights(constraints, len(fixed))[:, dependents]
+        P = constraints.matrix(len(fixed))[:, dependents]
         P.sum_duplicates()
         label = connected_components(P, connection="strong")[1]
         wrong |= (np.bincount(label)[label] > 1) | (P.diagonal() != 0)

@@ -76,6 +76,13 @@ def test_equations_without_some_degrees_of_freedom_mean_the_same(seed):
     assert np.abs(B[:, :-1][:, gone]).max(initial=0.0) == 0
 
 
+def test_equations_of_a_node_of_no_element_that_contradict_are_refused():
+    twice = Constraints.of(np.array([0, 0]), np.array([[1], [1]]), np.ones(2), np.array([0.0, 1.0]))
+    gone = np.array([True, True, False])
+    with pytest.raises(ModelError, match="contradict each other"):
+        without(twice, gone, np.zeros(3, dtype=int))
+
+
 @pytest.mark.parametrize("step", [1, 7, -1])
 def test_a_ring_of_thousands_with_a_side_chain(step):
     """u[i] = u[i + step] + 1e-3 once around, where the last takes all of it back; another hangs on it."""

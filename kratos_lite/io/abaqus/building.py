@@ -12,10 +12,10 @@ from kratos_lite.analysis.model import Model
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.io.abaqus.deck import Deck, Step
 from kratos_lite.io.abaqus.loads import Acting
-from kratos_lite.io.abaqus.materials import material_of
+from kratos_lite.io.abaqus.materials import Definition, material_of
 from kratos_lite.io.abaqus.mesh import ELEMENT_TYPES, FINITE, with_faces
 from kratos_lite.io.abaqus.supports import Nodal
-from kratos_lite.mesh import NO_ROWS, Mesh, distinct, rows_of_ids, with_rows
+from kratos_lite.mesh import NO_ROWS, Mesh, distinct, rows_of_ids, select, with_rows
 from kratos_lite.model.loads.base import Load
 from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.loads.nodal import NodalForces
@@ -23,7 +23,7 @@ from kratos_lite.model.loads.surface import ConditionLoads
 from kratos_lite.model.loads.temperature import Temperature
 from kratos_lite.quadrature import Rule, by_order
 from kratos_lite.time_series import TimeSeries
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Ints
 
 
 class Building:
@@ -35,8 +35,8 @@ class Building:
         faces = np.argwhere(pressed).reshape(-1, 2)
         self.mesh, self.faces = with_faces(deck.mesh, faces, "SmallDisplacementSurfaceLoadCondition")
 
-    def model(self, large: bool = False) -> Model:
-        """Return the model without its loads and supports."""
+    def model(self, large: bool = False, now: Array | None = None) -> Model:
+        """Return the model without its loads and supports, at temperatures (n,) or those of the beginning."""
         deck = self.deck
         mesh = self._finite() if large else self.mesh
         model = Model(mesh)
@@ -51,7 +51,8 @@ class Building:
                 card.wrong(f"there is no *ORIENTATION {axes}")
             deck.geometry.elements_of(elset, card)
             rows = mesh.parts[elset].elements if elset in mesh.parts else NO_ROWS
-            material = material_of(deck.materials[name], deck.orientations.get(axes), finite=large)
+            definition = self._at(deck.materials[name], rows, now)
+            material = material_of(definition, deck.orientations.get(axes), finite=large)
             model.assign(material, rows)
             assigned[rows] = True
         if not assigned.all():
@@ -61,6 +62,16 @@ class Building:
         model.recognize_units()
         model.notes += deck.notes
         return model
+
+    def _at(self, definition: Definition, rows: Ints, now: Array | None) -> Definition:
+        """Return a material at the temperatures of elements."""
+        start = self.deck.initial
+        if now is None and not start.any():
+            return definition
+        nodes = np.concatenate([NO_ROWS, *(b.nodes.ravel() for b in select(self.mesh.blocks, rows))])
+        both = ((start if T is None else T)[self.deck.geometry.twin[nodes]] for T in (now, start))
+        one, other = (float(T[0]) if len(T) and np.ptp(T) == 0 else None for T in both)
+        return replace(definition, now=one, start=other)
 
     def hold(self, model: Model, held: Nodal, moves: dict[str, TimeSeries] | None = None) -> None:
         """Add supports and connections to a model; nodes that share axis, motion and axes are one call."""

@@ -241,17 +241,19 @@ class Connections:
         model.supports.check_used()
         if not (self.springs or self.geometry.masses):
             return
-        P, used = model.supports.followed()[0], np.repeat(self.mesh.used_nodes(), 3)
-        K, real = csr_array((size, size)), diags_array(1.0 * used)
+        P, moved = model.supports.followed(moves.reshape(-1, 3))
+        K, loose = csr_array((size, size)), np.flatnonzero(~np.repeat(self.mesh.used_nodes(), 3) & ~fixed)
         for card, dofs, b, k in self.springs:
             if large and (~fixed[dofs] & (np.abs(b) < 1 - 1e-9)).any():
                 card.wrong("with NLGEOM ends of a spring must move along its line alone")
             start = np.arange(len(b) + 1) * b.shape[1]
-            A = csr_array((b.ravel(), dofs.ravel(), start), shape=(len(b), size)) @ P
-            if abs(A[:, np.flatnonzero(~used & (~fixed | moves))]).sum() > 0:
+            A = csr_array((b.ravel(), dofs.ravel(), start), shape=(len(b), size))
+            some = A @ moved
+            A = A @ P
+            if some.any() or abs(A[:, loose]).sum() > 0:
                 card.wrong("a spring ends at a node of no element that nothing holds, or that is moved")
-            K = K + k * (real @ A.T @ A @ real)
-        M = real @ P.T @ diags_array(np.repeat(self.geometry.masses_of(), 3)) @ P @ real
+            K = K + k * (A.T @ A)
+        M = P.T @ diags_array(np.repeat(self.geometry.masses_of(), 3)) @ P
         for A, is_mass in ((K, False), (M, True)):
             if len(nodes := np.unique(A.diagonal().nonzero()[0] // 3)):
                 model.add(OnNodes(nodes, csr_array(A), is_mass))

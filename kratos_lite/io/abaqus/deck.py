@@ -42,7 +42,10 @@ _REFUSED = {
 }
 REFUSED = {keyword: what for what, keywords in _REFUSED.items() for keyword in keywords.split()}
 """What cards stand for that are refused."""
-OF_MESH = ("NODE", "ELEMENT", "NSET", "ELSET", "SURFACE")
+OF_MESH = {
+    "NODE": Geometry.node, "ELEMENT": Geometry.element, "SURFACE": Geometry.surface,
+    "NSET": Geometry.named_set, "ELSET": Geometry.named_set,
+}  # fmt: skip
 OF_MATERIAL = {
     "ELASTIC": ("TYPE",), "DENSITY": (), "EXPANSION": ("TYPE", "ZERO"), "PLASTIC": ("HARDENING",),
     "HYPERELASTIC": ("NEOHOOKE", "MOONEY-RIVLIN", "OGDEN", "N", "MODULI"), "DAMPING": ("ALPHA", "BETA"),
@@ -114,7 +117,7 @@ class Deck:
         cards, self.geometry = list(read_cards(path)), Geometry()
         for card in cards:
             if card.keyword in OF_MESH:
-                getattr(self.geometry, card.keyword.lower())(card)
+                OF_MESH[card.keyword](self.geometry, card)
             elif card.keyword in ("RIGIDBODY", "COUPLING"):
                 self.geometry.reference(card)
         with naming(str(path)):

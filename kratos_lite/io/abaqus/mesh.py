@@ -69,8 +69,7 @@ class Geometry:
         self.node_cards: list[tuple[Ints, Array]] = []
         self.cells: list[Cells] = []
         self.others: list[Cells] = []  # springs, masses, …
-        self.node_sets: dict[str, list[Ints]] = {}
-        self.element_sets: dict[str, list[Ints]] = {}
+        self.sets: dict[str, dict[str, list[Ints]]] = {"NSET": {}, "ELSET": {}}  # ids
         self._surfaces: dict[str, Card] = {}
         self.surfaces: dict[str, Ints] = {}  # rows of nodes, or faces (k, 2): rows of elements, face from 0
         self.rotation: dict[int, int] = {}  # ids of reference nodes, and of those that are their rotations
@@ -93,7 +92,7 @@ class Geometry:
             card.wrong(f"ids of nodes are whole numbers from 1; got {ids[ids < 1][0]}")
         self.node_cards.append((ids, points))
         if "NSET" in card.options:
-            self.node_sets.setdefault(card.option("NSET").upper(), []).append(ids)
+            self._members(card, "NSET").append(ids)
 
     def element(self, card: Card) -> None:
         """Read *ELEMENT."""
@@ -109,24 +108,16 @@ class Geometry:
         cells = Cells(kind, table[:, 0], table[:, 1:], card.place)
         (self.cells if kind in ELEMENT_TYPES else self.others).append(cells)
         if "ELSET" in card.options:
-            self.element_sets.setdefault(card.option("ELSET").upper(), []).append(cells.ids)
+            self._members(card, "ELSET").append(cells.ids)
 
-    def nset(self, card: Card) -> None:
-        """Read *NSET."""
-        card.check_options(("NSET", "GENERATE", "ELSET"))
-        if "ELSET" in card.options:
-            found = self.nodes_of_elements(self.elements_of(card.option("ELSET"), card))
-            self.node_sets.setdefault(card.option("NSET").upper(), []).append(found)
-        else:
-            self._add(card, self.node_sets, "NSET")
-
-    def elset(self, card: Card) -> None:
-        """Read *ELSET."""
-        card.check_options(("ELSET", "GENERATE"))
-        self._add(card, self.element_sets, "ELSET")
-
-    def _add(self, card: Card, sets: dict[str, list[Ints]], kind: str) -> None:
-        members = sets.setdefault(card.option(kind).upper(), [])
+    def named_set(self, card: Card) -> None:
+        """Read *NSET or *ELSET."""
+        kind = card.keyword
+        card.check_options((kind, "GENERATE", "ELSET"))
+        members = self._members(card, kind)
+        if kind == "NSET" and "ELSET" in card.options:
+            members.append(self.nodes_of_elements(self.elements_of(card.option("ELSET"), card)))
+            return
         if "GENERATE" in card.options:
             for row in card.rows():
                 first, last, step = row.integer(0), row.integer(1, row.integer(0)), row.integer(2, 1)
@@ -142,31 +133,33 @@ class Geometry:
                 if word.isdigit():
                     members.append(np.array([row.integer(i)]))
                 elif word:
-                    members.append(self.members(word, sets, row, kind))
+                    members.append(self.ids_of(word, row, kind))
+
+    def _members(self, card: Card, kind: str) -> list[Ints]:
+        """Return the list of members of the set that a card names."""
+        return self.sets[kind].setdefault(card.option(kind).upper(), [])
 
     def surface(self, card: Card) -> None:
         """Read *SURFACE."""
         card.check_options(("NAME", "TYPE"))
         self._surfaces[card.option("NAME").upper()] = card
 
-    def members(self, name: str, sets: dict[str, list[Ints]], at: Row | Card | None, kind: str) -> Ints:
-        """Return the ids in a set."""
-        if (found := sets.get(name.upper())) is None:
+    def ids_of(self, word: str, at: Row | Card | None, kind: str) -> Ints:
+        """Return the ids that a number or the name of a set means; `at` may lack if it is known."""
+        if word.isdigit():
+            return np.array([int(word)])
+        if (found := self.sets[kind].get(word.upper())) is None:
             assert at is not None
-            at.wrong(f"there is no {kind} {name!r}.{nearest(name.upper(), sets)}")
+            at.wrong(f"there is no {kind} {word!r}.{nearest(word.upper(), self.sets[kind])}")
         return np.concatenate([NO_ROWS, *found])
 
-    def nodes_of(self, word: str, at: Row | Card) -> Ints:
-        """Return the ids of nodes that a number or the name of a set means."""
-        return np.array([int(word)]) if word.isdigit() else self.members(word, self.node_sets, at, "NSET")
-
     def elements_of(self, word: str, at: Row | Card | None = None) -> Ints:
-        """Return the ids of elements of a number or the name of a set; `at` may lack if it is known."""
-        return np.array([int(word)]) if word.isdigit() else self.members(word, self.element_sets, at, "ELSET")
+        """Return the ids of elements of a number or the name of a set."""
+        return self.ids_of(word, at, "ELSET")
 
     def nodes(self, word: str, at: Row | Card) -> Ints:
         """Return the rows of nodes that a number or the name of a set means."""
-        ids = self.nodes_of(word, at)
+        ids = self.ids_of(word, at, "NSET")
         rows = self.mesh.node_rows(ids)
         if (rows < 0).any():
             at.wrong(f"there is no node {ids[rows < 0][0]}")
@@ -213,23 +206,22 @@ class Geometry:
     def faces(self, ids: Ints, number: int, at: Row | Card) -> Ints:
         """Return the face of a number of some elements, (k, 2)."""
         known, order, sides = self._elements
-        rows, face = rows_of_ids(known, ids, order), np.zeros(len(ids), dtype=np.int64)
+        rows = rows_of_ids(known, ids, order)
         if (rows < 0).any():
             at.wrong(f"there is no solid element {ids[rows < 0][0]}")
-        for here, ours in sides:
-            some = (rows >= here.start) & (rows < here.stop)
-            if number < len(ours):
-                face[some] = ours[number]
-            elif some.any():
-                at.wrong(f"element {ids[some][0]} has {len(ours)} faces; got number {number + 1}")
-        return np.column_stack([rows, face])
+        if (sides[rows, number] < 0).any():
+            i = np.argmin(sides[rows, number])
+            at.wrong(f"element {ids[i]} has {(sides[rows[i]] >= 0).sum()} faces; got number {number + 1}")
+        return np.column_stack([rows, sides[rows, number]])
 
     @cached_property
-    def _elements(self) -> tuple[Ints, Ints, list[tuple[slice, list[int]]]]:
-        """Ids of elements, their order, and the faces of blocks; kept, as decks may name them by line."""
-        ids = self.mesh.element_ids
-        sides = [(at, face_rows(block.known_shape)) for block, at in with_rows(self.mesh.blocks)]
-        return ids, np.argsort(ids, kind="stable"), sides
+    def _elements(self) -> tuple[Ints, Ints, Ints]:
+        """Ids of elements, their order, and their faces (m, 6) by Abaqus's numbers, or -1."""
+        sides = np.full((self.mesh.n_elements, 6), -1)
+        for block, at in with_rows(self.mesh.blocks):
+            ours = face_rows(block.known_shape)
+            sides[at, : len(ours)] = ours
+        return self.mesh.element_ids, np.argsort(self.mesh.element_ids, kind="stable"), sides
 
     def nodes_of_elements(self, members: Ints) -> Ints:
         """Return the ids of the nodes of solids."""
@@ -272,7 +264,7 @@ class Geometry:
         points = np.concatenate([c[1] for c in self.node_cards])
         ids, last = _last(ids)
         ids, points = self._rotations(ids, points[last])
-        for found in self.node_sets.values():
+        for found in self.sets["NSET"].values():
             found[:] = [nodes[rows_of_ids(ids, nodes) >= 0] for nodes in found]  # a range may skip nodes
         blocks = []
         for cells in self.cells:
@@ -292,9 +284,9 @@ class Geometry:
     def _parts(self, ids: Ints, blocks: list[Block]) -> dict[str, Part]:
         """Return the sets as parts; one of nodes and one of elements of the same name are one part."""
         parts, of_elements = {}, ids_of(blocks)
-        for name in dict.fromkeys([*self.node_sets, *self.element_sets]):
-            nodes = np.concatenate([NO_ROWS, *self.node_sets.get(name, [])])
-            cells = np.concatenate([NO_ROWS, *self.element_sets.get(name, [])])
+        for name in dict.fromkeys([*self.sets["NSET"], *self.sets["ELSET"]]):
+            nodes = np.concatenate([NO_ROWS, *self.sets["NSET"].get(name, [])])
+            cells = np.concatenate([NO_ROWS, *self.sets["ELSET"].get(name, [])])
             rows, elements = distinct(rows_of_ids(ids, nodes)), distinct(rows_of_ids(of_elements, cells))
             elements = elements[elements >= 0]  # springs and masses are no elements of the mesh
             if len(elements) and not len(rows):

@@ -66,7 +66,9 @@ class _Cases(Building):
 
     def _loaded(self, step: Step) -> Model:
         """Return the model with the supports and loads at the end of a linear step."""
-        model, held = self.model(), step.held.copy()
+        T, start = step.acting.temperatures, self.deck.initial
+        now = np.where(T.given[:, 0], T.values[:, 0], start) if T.given.any() else None
+        model, held = self.model(now=now), step.held.copy()
         factor = {name: series(step.period) for name, series in self._series(step).items() if series}
         acting = step.acting.copy()
         held.settle(factor)
@@ -210,7 +212,9 @@ class _Cases(Building):
         for before in self.earlier(steps[0]):
             if before.kind in MOVING or self.is_nonlinear(before) or (is_moving and before.period):
                 steps[0].card.wrong("to go on from the state of another kind of step is not supported")
-        model, series = self.model(large), [self._series(step) for step in steps]
+        given = np.any([step.acting.temperatures.given[:, 0] for step in steps], axis=0)
+        now = np.where(given, np.nan, self.deck.initial) if given.any() else None  # those of each are several
+        model, series = self.model(large, now), [self._series(step) for step in steps]
         self._move(model, steps, series)
         for k, step in enumerate(steps):
             T = step.acting.temperatures
