@@ -32,7 +32,7 @@ RULE = "ccx takes mass and body forces of C3D20R by 2×2×2 points, here they ar
 DIFFERS = {
     **dict.fromkeys([f"beamdy{i}" for i in (*range(1, 8), 14, 15, 19)], MODAL),
     **dict.fromkeys(["beamdy8", "beamdy9"], f"{MODAL}; {RULE}"),
-    **dict.fromkeys(["beamf", "segment1", "segment2"], RULE),
+    **dict.fromkeys(["beamf", "disk2", "segment1", "segment2"], RULE),
     **dict.fromkeys(["beamnh", "beamnlmpc", "beamnlp"], "ccx ends its iterations early"),
     **dict.fromkeys(
         ["beamimpdy1", "beamimpdy1nodirect", "beamimpdy2"], "other increments, and damping in HHT"
@@ -41,7 +41,6 @@ DIFFERS = {
     "spring5": MODAL,
     "beampic": "the iterative solver of ccx ends early",
     "cubef2f3": "faces are tied in the mean here, node by node in ccx",
-    "disk2": "not explained",
     "damper1": "damping by mass of rigid motions in HHT",
 }
 SIZES = (("C3D10", 8), ("C3D10", 13), ("C3D20R", 8), ("C3D8", 20), ("C3D10", 18))

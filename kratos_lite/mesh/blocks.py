@@ -268,6 +268,8 @@ def rows_of_ids(ids: Ints, wanted: ArrayLike, order: Ints | None = None) -> Ints
     if order is None and 0 <= ids.min() and (top := int(ids.max())) < SPARSE * len(ids):
         row_of = np.full(top + 2, -1)  # the last is that of ids that are not there
         row_of[ids[::-1]] = np.arange(len(ids))[::-1]
+        if 0 <= wanted.min(initial=0) and wanted.max(initial=0) <= top:
+            return row_of[wanted]
         return np.asarray(row_of[np.where((wanted < 0) | (wanted > top), top + 1, wanted)])
     order = np.argsort(ids, kind="stable") if order is None else order
     rows = order[np.minimum(np.searchsorted(ids, wanted, sorter=order), len(ids) - 1)]

@@ -6,7 +6,6 @@ Each check either raises one clear error or returns warnings for the report.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from kratos_lite.mesh import Block, Mesh
 from kratos_lite.model.loads import Load
 from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.supports import Supports
+from kratos_lite.solvers.constraints import Constraints
 from kratos_lite.tabular import UNITS, size_in_si, unit_name
 from kratos_lite.typing import Array, Ints, Mask
 from kratos_lite.validation import instance
@@ -154,10 +154,11 @@ def check_scales(mesh: Mesh, groups: Sequence[ElementGroup]) -> Iterator[str]:
     yield from check_wave_speeds((group.material for group in groups), mesh.units)
 
 
-def check_nodes(mesh: Mesh, references: Any = None) -> Iterator[str]:
-    """Warn of nodes that no element uses, but for reference nodes."""
-    unused = mesh.node_ids[~mesh.used_nodes()]
-    unused = unused if references is None else np.setdiff1d(unused, mesh.node_ids[references.nodes])
+def check_nodes(mesh: Mesh, tied: Constraints) -> Iterator[str]:
+    """Warn of nodes that no element uses, but for reference nodes, which are tied to others."""
+    used = mesh.used_nodes().copy()
+    used[np.append(tied.dependents, tied.independents) // 3] = True
+    unused = mesh.node_ids[~used]
     if len(unused):
         shown = " ".join(map(str, unused[:5])) + (" …" if len(unused) > 5 else "")
         yield f"{len(unused)} nodes belong to no element and carry no equations: {shown}"

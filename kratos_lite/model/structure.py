@@ -52,7 +52,6 @@ class Structure(Solid):
         self._named: dict[str, Load] = {}
         self._motion: Attachment | None = None
         self.notes: list[str] = []  # what readers of files remarked, for the report
-        self.references: Any = None  # of decks: what nodes that no element uses stand for
         self.patterns = PatternCache()
         if units == "auto":
             self.recognize_units()
@@ -682,8 +681,8 @@ CHECKS: tuple[Callable[[Structure, Sequence[ElementGroup]], Iterable[str]], ...]
     lambda model, groups: checks.check_scales(model.mesh, groups),
     lambda model, groups: check_locking(model.mesh, groups),
     lambda model, groups: check_spurious_modes(model.mesh, groups, model.supports),
-    lambda model, groups: checks.check_nodes(model.mesh, model.references),
-    lambda model, groups: model.supports.check_used(model.mesh.used_nodes()),
+    lambda model, groups: checks.check_nodes(model.mesh, model.supports.added),
+    lambda model, groups: model.supports.check_used(),
     lambda model, groups: [text for tie in model.supports.ties for text in tie._check(groups, model.motion)],
     lambda model, groups: checks.check_attached(model.attached is not None, model.motion),
     lambda model, groups: warnings_of(model.loads, model.mesh, groups),

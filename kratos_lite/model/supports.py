@@ -15,7 +15,7 @@ from kratos_lite.model.loads.base import key_of
 from kratos_lite.model.local_axes import LocalAxes
 from kratos_lite.model.ties import Coupling, PartTie
 from kratos_lite.solvers.constraints import ConstraintMap, Constraints, constraint_map
-from kratos_lite.solvers.elimination import Redundant, eliminate, independent
+from kratos_lite.solvers.elimination import Redundant, eliminate, independent, without
 from kratos_lite.time_series import function_of
 from kratos_lite.typing import Array, ArrayLike, Csr, Ints, Mask
 from kratos_lite.validation import finite, number, short, whole_numbers
@@ -85,7 +85,7 @@ class Supports:
         self.conditions: list[DirichletCondition] = []
         self.ties: list[Coupling] = []
         self._every: tuple[int, Constraints] = (-1, Constraints.none())
-        self._of_parts = Constraints.none()  # those of ties of parts
+        self._of_parts = self._followers = Constraints.none()  # those of ties of parts; of reference nodes
         self.version = self.value_version = 0  # changes but for values and functions of time; all changes
         self.springs: Csr | None = None  # (3n, 3n) N/m
         self._independent: tuple[int, Constraints, Redundant | None] = (-1, Constraints.none(), None)
@@ -254,8 +254,18 @@ class Supports:
     @property
     def constraints(self) -> Constraints:
         """All constraints: of hanging nodes, those added, of local axes, of ties and remote points."""
+        return self._updated()._every[1]
+
+    @constraints.setter
+    def constraints(self, constraints: Constraints) -> None:
+        self._constraints = Constraints.none()
+        self._inclined, self.ties = Constraints.none(), []
+        self.add_constraints(constraints)
+
+    def _updated(self) -> Supports:
+        """Return itself with the constraints of what is prescribed now."""
         if self._every[0] != self.value_version:
-            every, self._of_parts = self._constraints + self._inclined, Constraints.none()
+            every, self._of_parts = self._of_elements(), Constraints.none()
             known = self.fixed.copy()
             if self.ties:
                 known.flat[independent(every, known)[0].dependents] = True
@@ -269,13 +279,19 @@ class Supports:
                 for nodes in tie.moves_all:
                     known[nodes] = True
             self._every = self.value_version, every
-        return self._every[1]
+        return self
 
-    @constraints.setter
-    def constraints(self, constraints: Constraints) -> None:
-        self._constraints = Constraints.none()
-        self._inclined, self.ties = Constraints.none(), []
-        self.add_constraints(constraints)
+    def _of_elements(self) -> Constraints:
+        """Return the constraints of nodes that elements use; reference nodes, of no element, follow them."""
+        every, mesh, self._followers = self._constraints + self._inclined, self.mesh, Constraints.none()
+        if len(every) and mesh.whole and not mesh.used_nodes().all():
+            from kratos_lite.mesh.hanging import is_corner  # a quick start without reference nodes
+
+            gone = ~np.repeat(mesh.used_nodes(), 3) & ~self.fixed.ravel()
+            # They follow supported nodes first, then corners: the coarse level of multigrid has these alone.
+            order = np.where(self.fixed.ravel(), 0, np.repeat(2 - is_corner(mesh.blocks, mesh.n_nodes), 3))
+            every, self._followers = without(every, gone, order)
+        return every
 
     @property
     def added(self) -> Constraints:
@@ -369,15 +385,43 @@ class Supports:
         """Return the dependents for prescribed values."""
         return eliminate(self.independent(), self.fixed, values)
 
-    def check_used(self, used: Mask) -> list[str]:
-        """Raise ModelError for constraints of nodes that no element uses, by the mask (n,) of those used."""
-        known = self.dependents()
-        dofs = np.concatenate([known.dependents, known.independents])
-        unused = dofs[~used[dofs // 3]]
-        if len(unused):
-            name = self.name(int(unused[0]))
-            raise ModelError(f"a constraint uses {name}, which belongs to no element; remove it")
+    def check_used(self) -> list[str]:
+        """Raise ModelError where constraints leave a node free that no element uses."""
+        dofs = np.append(self.dependents().independents, self._followers.independents)
+        for dof in dofs[~self.mesh.used_nodes()[dofs // 3] & ~self.fixed.flat[dofs]][:1]:
+            raise ModelError(
+                f"equations leave {self.name(int(dof))} free, which no element uses; hold it and, if it is a "
+                "reference node, its rotations"
+            )
         return []
+
+    # ---- reference nodes ---------------------------------------------------------------------------------
+
+    def followed(self, values: Array) -> tuple[Any, Array]:
+        """Return P (3n, 3n) and c: all displacements are P u + c with reference nodes held at values."""
+        from scipy.sparse import diags_array
+
+        known, held = self._updated()._followers, self.fixed & ~self.mesh.used_nodes()[:, None]
+        P = known.following(held.size)
+        c = P @ np.where(held, values, 0.0).ravel()
+        c[known.dependents] += known.constants
+        return P @ diags_array(1.0 * ~held.ravel()), c
+
+    def displacements(self, u: Array, time: float = 0.0) -> Array:
+        """Return displacements (n, 3) at a time with those of reference nodes."""
+        if self.mesh.used_nodes().all():
+            return u
+        values = self.values.copy()
+        for function, mask in self.motions:
+            values[mask] = function(time)
+        P, c = self.followed(values)
+        return np.asarray(P @ u.ravel() + c).reshape(-1, 3)
+
+    def carried(self, forces: Array) -> Array:
+        """Return forces (n, 3) with those on reference nodes passed on to what they follow."""
+        if self.mesh.used_nodes().all():
+            return forces
+        return np.asarray(self.followed(self.values)[0].T @ forces.ravel()).reshape(-1, 3)
 
     # ---- for the equations ------------------------------------------------------------------------------
 
@@ -402,16 +446,12 @@ class Supports:
 
     def past_ties(self, reactions: Array) -> Array:
         """Return reactions (n, 3) with the forces in ties of parts passed on to what tied nodes follow."""
-        ties = self._of_parts if len(self.constraints) else Constraints.none()
+        ties = self._updated()._of_parts
         if not len(ties):
             return reactions
-        out, none = reactions.copy(), np.zeros_like(self.fixed)
+        none = np.zeros_like(self.fixed)
         ties = eliminate(independent(ties, self.fixed)[0], none, np.zeros_like(self.values))
-        np.add.at(
-            out.reshape(-1), ties.independents, ties.weights * reactions.flat[ties.dependents][ties.owner]
-        )
-        out.flat[ties.dependents] = 0.0
-        return out
+        return np.asarray(ties.following(none.size).T @ reactions.ravel()).reshape(-1, 3)
 
     def on_independents(self, forces: Array) -> Array:
         """Return nodal forces (n, 3) with those on hanging nodes passed on to their independents."""

@@ -68,6 +68,20 @@ class Constraints:
         both = [np.concatenate([getattr(self, name), getattr(other, name)]) for name in names]
         return Constraints(np.concatenate([self.dependents, other.dependents]), start, *both)
 
+    def matrix(self, size: int) -> Any:
+        """Return W (c, size) of u[dependents] = W u + constants."""
+        from scipy.sparse import csr_array
+
+        return csr_array((self.weights, self.independents, self.start), shape=(len(self), size))
+
+    def following(self, size: int) -> Any:
+        """Return P (size, size): all displacements are P u of those that are no dependents."""
+        from scipy.sparse import csr_array, diags_array
+
+        stays, entries = np.ones(size), (self.dependents[self.owner], self.independents)
+        stays[self.dependents] = 0.0
+        return diags_array(stays) + csr_array((self.weights, entries), shape=(size, size))
+
     def take(self, keep: Mask) -> Constraints:
         """Return those of a mask (c,)."""
         entries = keep[self.owner]

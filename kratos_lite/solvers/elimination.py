@@ -7,6 +7,8 @@ dependent as pivot, or its largest weight if that of the dependent is small, and
 column of their pivot, which may be many, are eliminated at once.  A row of which no free degree of freedom is
 left is redundant, or contradicts the others.
 
+Degrees of freedom that carry no equations, as those of reference nodes, are eliminated before all others.
+
 Source: Davis, Rajamanickam & Sid-Lakhdar, Acta Numerica 25 (2016) 383-566 (threshold pivoting, orderings);
 Luby, SIAM J. Comput. 15 (1986) 1036-1053 (independent sets by random order).
 """
@@ -25,8 +27,8 @@ from kratos_lite.typing import Array, Csr, Ints, Mask
 
 STATED = 0.1
 """Fraction of the largest weight of a row from which the dependent that was stated is its pivot."""
-ROUNDING, REDUNDANT = 1e-13, 1e-6
-"""Weights that are 0, and what is left of a redundant row where its terms canceled, as fractions of these."""
+ROUNDING, NOTHING, REDUNDANT = 1e-13, 1e-12, 1e-6
+"""Weights that are 0, rows that are, and what is left of a redundant row of its terms that canceled."""
 SHOWN, MOST = 4, 1000
 """Equations, and terms of an equation, that an error shows; iterations to find which follow from others."""
 
@@ -37,7 +39,7 @@ def eliminate(constraints: Constraints, fixed: Mask, values: Array) -> Constrain
         return constraints
     from scipy.sparse import diags_array
 
-    W, is_fixed = _weights(constraints, fixed.size), fixed.ravel()
+    W, is_fixed = constraints.matrix(fixed.size), fixed.ravel()
     constants = constraints.constants + W @ np.where(is_fixed, values.ravel(), 0.0)
     W, constants = _followed(W, constants, constraints.dependents)
     W = W @ diags_array(1.0 * ~is_fixed)
@@ -59,13 +61,6 @@ def _followed(W: Any, constants: Array, dependents: Ints) -> tuple[Any, Array]:
     while P.nnz:
         constants, W, P = constants + P @ constants, W + P @ W, P @ P
     return W, constants
-
-
-def _weights(constraints: Constraints, size: int) -> Any:
-    from scipy.sparse import csr_array
-
-    entries = constraints.weights, constraints.independents, constraints.start
-    return csr_array(entries, shape=(len(constraints), size))
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,12 +118,39 @@ def independent(constraints: Constraints, fixed: Mask) -> tuple[Constraints, Red
     wrong = _wrong(constraints, fixed.ravel())
     if not wrong.any():
         return constraints, None
-    used = np.bincount(np.concatenate([constraints.dependents, constraints.independents])) > 0
-    dofs, free = np.flatnonzero(used), ~fixed.ravel()
-    local = constraints.renumbered(np.where(used, np.cumsum(used) - 1, -1))
-    hard = _together(local, free[dofs], wrong)
-    solved, rest = _solved(local.take(hard), dofs, free[dofs])
+    dofs, local = _renumbered(constraints)
+    free = ~fixed.ravel()[dofs]
+    hard = _together(local, free, wrong)
+    solved, rest = _solved(local.take(hard), dofs, free)
     return constraints.take(~hard) + solved, rest
+
+
+def without(constraints: Constraints, gone: Mask, order: Ints) -> tuple[Constraints, Constraints]:
+    """Return constraints in which some degrees of freedom (N,) are replaced, and what these depend on.
+
+    That is said by constraints whose dependents come first in an order (N,).
+    """
+    some = gone[constraints.dependents]
+    some |= np.bincount(constraints.owner, gone[constraints.independents], len(constraints)) > 0
+    if not some.any():
+        return constraints, Constraints.none()
+    from scipy.sparse import csr_array, diags_array
+
+    dofs, local = _renumbered(constraints.take(some))
+    solved, rest = _solved(local, dofs, gone[dofs], order[dofs])
+    A = csr_array(rest.weights @ diags_array(1.0 * np.append(~gone[dofs], True)))
+    kept = abs(A).max(axis=1).toarray().ravel() > NOTHING
+    stated = local.dependents[rest.rows[kept]]
+    pivot, weight, _ = _pivots(A[kept], np.ones(len(dofs), dtype=bool), stated, 0.0 * stated, 0.0 * stated)
+    if not weight.all():
+        raise ModelError("equations of nodes that no element uses contradict each other; remove one of them")
+    return constraints.take(~some) + _constraints(pivot, _for(pivot, weight, A[kept]), dofs), solved
+
+
+def _renumbered(constraints: Constraints) -> tuple[Ints, Constraints]:
+    """Return the degrees of freedom (n,) that occur, and the constraints by their numbers among these."""
+    used = np.bincount(np.concatenate([constraints.dependents, constraints.independents])) > 0
+    return np.flatnonzero(used), constraints.renumbered(np.where(used, np.cumsum(used) - 1, -1))
 
 
 def _wrong(constraints: Constraints, fixed: Mask) -> Mask:
@@ -139,7 +161,7 @@ def _wrong(constraints: Constraints, fixed: Mask) -> Mask:
     if times[constraints.independents].any():
         from scipy.sparse.csgraph import connected_components
 
-        P = _weights(constraints, len(fixed))[:, dependents]
+        P = constraints.matrix(len(fixed))[:, dependents]
         P.sum_duplicates()
         label = connected_components(P, connection="strong")[1]
         wrong |= (np.bincount(label)[label] > 1) | (P.diagonal() != 0)
@@ -172,21 +194,41 @@ def _rows(constraints: Constraints, n: int) -> Any:
     return csr_array(diags_array(1 / np.where(size > 0, size, 1.0)) @ A)
 
 
-def _solved(constraints: Constraints, dofs: Ints, free: Mask) -> tuple[Constraints, Redundant]:
-    """Return constraints of some dofs (n,) by elimination with pivoting, and what is redundant."""
+def _for(pivot: Ints, weight: Array, A: Any) -> Any:
+    """Return W (k, n + 1) of u_pivot = W u that rows A u = 0 mean, in which pivots have some weights."""
+    from scipy.sparse import csr_array, diags_array
+
+    one = csr_array((np.ones(len(pivot)), pivot, np.arange(len(pivot) + 1)), shape=A.shape)
+    return rounded(csr_array(diags_array(-1 / weight) @ A + one))
+
+
+def _constraints(dependents: Ints, W: Any, dofs: Ints) -> Constraints:
+    """Return u[dependents] = W u with u = 1 at last, of some dofs (n,)."""
+    n = len(dofs)
+    made = Constraints.of_rows(dependents, W[:, :n], W[:, [n]].toarray().ravel())
+    return replace(made, dependents=dofs[dependents], independents=dofs[made.independents])
+
+
+def _solved(
+    constraints: Constraints, dofs: Ints, free: Mask, order: Ints | int = 0
+) -> tuple[Constraints, Redundant]:
+    """Return constraints of some dofs (n,) by elimination with pivoting, and what is redundant.
+
+    Of rows that are as good, those whose dependents come first in an order (n,) give pivots first.
+    """
     from scipy.sparse import csr_array, diags_array, vstack
 
     n, rows, columns = len(free), np.arange(len(constraints)), np.flatnonzero(free)
     chance, lost = np.random.default_rng(0).random(len(rows)), np.zeros(len(rows))
+    chance += np.broadcast_to(order, n)[constraints.dependents]
     A, found, left, pivots, redundant = _rows(constraints, n), [], [], [rows[:0]], [rows[:0]]
     while len(rows):
         pivot, weight, first = _pivots(A, free, constraints.dependents[rows], chance[rows], REDUNDANT * lost)
         rest, p = ~first & (weight != 0), pivot[first]
         left.append(A[weight == 0])
         redundant.append(rows[weight == 0])
-        one = csr_array((np.ones(len(p)), (np.arange(len(p)), p)), shape=(len(p), n + 1))
         pivots.append(p)
-        found.append(rounded(diags_array(-1 / weight[first]) @ A[first] + one))
+        found.append(_for(p, weight[first], A[first]))
         others = np.ones(n + 1)
         others[p] = 0.0
         K, W = A[rest][:, p], _followed(found[-1], np.zeros(len(p)), p)[0]
@@ -197,9 +239,9 @@ def _solved(constraints: Constraints, dofs: Ints, free: Mask) -> tuple[Constrain
         lost = np.maximum(lost[rest], gone.max(axis=1).toarray()) if len(rows) else lost[rest]
     dependents = np.concatenate(pivots)
     W = rounded(_followed(csr_array(vstack(found)), np.zeros(len(dependents)), dependents)[0])
-    solved = Constraints.of_rows(dependents, W[:, :n], W[:, [n]].toarray().ravel())
-    solved = replace(solved, dependents=dofs[dependents], independents=dofs[solved.independents])
-    return solved, Redundant(constraints, dofs, free, np.concatenate(redundant), csr_array(vstack(left)))
+    return _constraints(dependents, W, dofs), Redundant(
+        constraints, dofs, free, np.concatenate(redundant), csr_array(vstack(left))
+    )
 
 
 def _pivots(A: Any, free: Mask, stated: Ints, chance: Array, rest: Array) -> tuple[Ints, Array, Mask]:

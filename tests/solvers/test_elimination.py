@@ -7,7 +7,7 @@ import kratos_lite as kl
 from kratos_lite.distributed.cut import Cut
 from kratos_lite.errors import ModelError
 from kratos_lite.solvers.constraints import Constraints, constraint_map
-from kratos_lite.solvers.elimination import eliminate, independent
+from kratos_lite.solvers.elimination import eliminate, independent, without
 
 
 def equations(seed):
@@ -53,6 +53,34 @@ def test_any_equations_that_agree_are_solved(seed):
     else:
         with pytest.raises(ModelError, match="contradicts itself"):
             rest.check(values.ravel(), 1.0, str, "{} {}", "")
+
+
+def rows_of(constraints, size):
+    """Return (A, b) of A u = b."""
+    A = np.zeros((len(constraints), size + 1))
+    np.add.at(A, (np.arange(len(A)), constraints.dependents), 1.0)
+    np.add.at(A, (constraints.owner, constraints.independents), -constraints.weights)
+    A[:, -1] = constraints.constants
+    return A
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_equations_without_some_degrees_of_freedom_mean_the_same(seed):
+    given, fixed, _, _ = equations(seed)
+    gone = np.random.default_rng(seed).random(fixed.size) < 0.3
+    rest, of_gone = without(given, gone, np.zeros(fixed.size, dtype=int))
+    A, B, C = (rows_of(each, fixed.size) for each in (given, rest, of_gone))
+    ranks = [np.linalg.matrix_rank(M, tol=1e-7) for M in (A, np.vstack([B, C]), np.vstack([A, B, C]))]
+    assert ranks[0] == ranks[1] == ranks[2]
+    assert gone[of_gone.dependents].all()
+    assert np.abs(B[:, :-1][:, gone]).max(initial=0.0) == 0
+
+
+def test_equations_of_a_node_of_no_element_that_contradict_are_refused():
+    twice = Constraints.of(np.array([0, 0]), np.array([[1], [1]]), np.ones(2), np.array([0.0, 1.0]))
+    gone = np.array([True, True, False])
+    with pytest.raises(ModelError, match="contradict each other"):
+        without(twice, gone, np.zeros(3, dtype=int))
 
 
 @pytest.mark.parametrize("step", [1, 7, -1])

@@ -11,11 +11,11 @@ from kratos_lite import voigt
 from kratos_lite.analysis.model import Model
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.io.abaqus.deck import Deck, Step
-from kratos_lite.io.abaqus.loads import Acting, with_faces
-from kratos_lite.io.abaqus.materials import material_of
-from kratos_lite.io.abaqus.mesh import ELEMENT_TYPES, FINITE
+from kratos_lite.io.abaqus.loads import Acting
+from kratos_lite.io.abaqus.materials import Definition, material_of
+from kratos_lite.io.abaqus.mesh import ELEMENT_TYPES, FINITE, with_faces
 from kratos_lite.io.abaqus.supports import Nodal
-from kratos_lite.mesh import NO_ROWS, Mesh, rows_of_ids, with_rows
+from kratos_lite.mesh import NO_ROWS, Mesh, distinct, rows_of_ids, select, with_rows
 from kratos_lite.model.loads.base import Load
 from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.loads.nodal import NodalForces
@@ -23,7 +23,7 @@ from kratos_lite.model.loads.surface import ConditionLoads
 from kratos_lite.model.loads.temperature import Temperature
 from kratos_lite.quadrature import Rule, by_order
 from kratos_lite.time_series import TimeSeries
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Ints
 
 
 class Building:
@@ -31,11 +31,12 @@ class Building:
 
     def __init__(self, deck: Deck) -> None:
         self.deck = deck
-        faces = [face for step in deck.steps for face in step.acting.faces]
-        self.mesh, self.number = with_faces(deck.mesh, faces, "SmallDisplacementSurfaceLoadCondition")
+        pressed = np.any([step.acting.pressures.given for step in deck.steps], axis=0)
+        faces = np.argwhere(pressed).reshape(-1, 2)
+        self.mesh, self.faces = with_faces(deck.mesh, faces, "SmallDisplacementSurfaceLoadCondition")
 
-    def model(self, large: bool = False) -> Model:
-        """Return the model without its loads and supports."""
+    def model(self, large: bool = False, now: Array | None = None) -> Model:
+        """Return the model without its loads and supports, at temperatures (n,) or those of the beginning."""
         deck = self.deck
         mesh = self._finite() if large else self.mesh
         model = Model(mesh)
@@ -48,44 +49,50 @@ class Building:
                 card.wrong(f"there is no *MATERIAL {name}")
             if axes and axes not in deck.orientations:
                 card.wrong(f"there is no *ORIENTATION {axes}")
-            deck.cards.elements_of(elset, card)
+            deck.geometry.elements_of(elset, card)
             rows = mesh.parts[elset].elements if elset in mesh.parts else NO_ROWS
-            material = material_of(deck.materials[name], deck.orientations.get(axes), finite=large)
+            definition = self._at(deck.materials[name], rows, now)
+            material = material_of(definition, deck.orientations.get(axes), finite=large)
             model.assign(material, rows)
             assigned[rows] = True
         if not assigned.all():
             missing = mesh.element_ids[~assigned][0]
-            place = next(cells.place for cells in deck.cards.cells if missing in cells.ids)
+            place = next(cells.place for cells in deck.geometry.cells if missing in cells.ids)
             raise InputError(f"{place}: element {missing} is in no *SOLID SECTION")
         self._stress(model)
         model.recognize_units()
         model.notes += deck.notes
         return model
 
-    def hold(self, model: Model, held: Nodal, series: dict[str, TimeSeries] | None = None) -> None:
-        """Add supports and connections to a model; nodes that share axis, amplitude and axes are one call."""
-        axes, series = self.deck.axes, series or {}
+    def _at(self, definition: Definition, rows: Ints, now: Array | None) -> Definition:
+        """Return a material at the temperatures of elements."""
+        start = self.deck.initial
+        if now is None and not start.any():
+            return definition
+        nodes = np.concatenate([NO_ROWS, *(b.nodes.ravel() for b in select(self.mesh.blocks, rows))])
+        both = ((start if T is None else T)[self.deck.geometry.twin[nodes]] for T in (now, start))
+        one, other = (float(T[0]) if len(T) and np.ptp(T) == 0 else None for T in both)
+        return replace(definition, now=one, start=other)
+
+    def hold(self, model: Model, held: Nodal, moves: dict[str, TimeSeries] | None = None) -> None:
+        """Add supports and connections to a model; nodes that share axis, motion and axes are one call."""
+        axes = self.deck.axes
         local = axes.of_node
         for system in np.unique(local[held.given.any(axis=1)]).tolist():
             of = held.given & (local == system)[:, None]
             frame = axes.each[system] if system >= 0 else None
             for axis in range(3):
                 rows = np.flatnonzero(of[:, axis])
-                for name in sorted(set(held.amplitudes[rows, axis])):
-                    some = rows[held.amplitudes[rows, axis] == name]
-                    values = held.values[some, axis]
+                numbers = held.amplitudes[rows, axis]
+                for number in np.flatnonzero(np.bincount(numbers)):
+                    some, name = rows[numbers == number], held.names[number]
                     letter = "xyz"[axis] if frame is None else frame.letters[axis]
                     if frame is not None and (alone := some[~self.mesh.used_nodes()[some]]).size:
                         node = self.mesh.node_ids[alone[0]]
                         text = "*BOUNDARY along axes of *TRANSFORM is supported at nodes of elements"
                         raise ModelError(f"{text}; node {node} is a reference node; give its axes x y z")
-                    if not name:
-                        model.fix(some, letter, values[:, None], local=frame)
-                        continue
-                    times, factors = series[name].times, series[name].values
-                    for value in np.unique(values).tolist():
-                        moved = TimeSeries(times, value * factors)
-                        model.fix(some[values == value], letter, moved, local=frame)
+                    value = moves[name] if name and moves else held.values[some, axis][:, None]
+                    model.fix(some, letter, value, local=frame)
         self.deck.connections.connect(model)
 
     def loads(self, model: Model, acting: Acting) -> Iterable[tuple[Load, str]]:
@@ -95,38 +102,33 @@ class Building:
             if "DENSITY" not in deck.materials[name].cards:
                 deck.materials[name].card.wrong("GRAV and CENTRIF need its *DENSITY")
         mesh, n = model.mesh, model.mesh.n_nodes
-        F, carried = acting.forces, np.asarray if model.references is None else model.references.carried
-        for name in sorted(set(F.amplitudes[F.given])):
-            values = np.where(F.given & (F.amplitudes == name), F.values, 0.0)
+        F, P, carried = acting.forces, acting.pressures, model.supports.carried
+        for name, of in F.by_amplitude():
+            values = np.where(of, F.values, 0.0)
             turned = np.flatnonzero(values.any(axis=1) & (deck.axes.of_node >= 0))
             values[turned] = np.einsum("ni,nij->nj", values[turned], deck.axes.directions(mesh, turned))
             yield NodalForces(carried(values)), name
-        for name in sorted({term.amplitude for term in acting.faces.values()}):
-            pressure = np.zeros(len(self.number))
-            for face, term in acting.faces.items():
-                if term.amplitude == name:
-                    pressure[self.number[face]] = term.values[0]
+        for name, of in P.by_amplitude():
+            some = np.where(of, P.values, 0.0)[tuple(self.faces.T)]
             none = {cell: np.zeros((n, 3)) for cell in ("point", "line", "triangle", "quadrilateral")}
-            yield ConditionLoads(np.zeros((len(self.number), 3)), none, pressure, np.zeros(n)), name
-        for (kind, at, _), term in acting.bodies.items():
-            ids = np.unique(deck.cards.elements_of(at))
-            where, masses = rows_of_ids(mesh.element_ids, ids), deck.cards.masses_of(ids)
+            yield ConditionLoads(np.zeros((len(some), 3)), none, some, np.zeros(n)), name
+        for (kind, at, places), (size, name, _) in acting.bodies.items():
+            ids = distinct(deck.geometry.elements_of(at))
+            where, masses = rows_of_ids(mesh.element_ids, ids), deck.geometry.masses_of(ids)
             where = where[where >= 0]
             if kind == "GRAV":
-                size, *direction = term.values
-                force = size * np.array(direction)
+                force = size * np.array(places)
                 if masses.any():
-                    yield NodalForces(carried(masses[:, None] * force)), term.amplitude
-                yield Gravity(force, where), term.amplitude
+                    yield NodalForces(carried(masses[:, None] * force)), name
+                yield Gravity(force, where), name
             elif masses.any():
                 raise ModelError("*DLOAD: CENTRIF on masses is not supported; give their force by *CLOAD")
             else:
-                yield Gravity(_centrifugal(term.values), where), term.amplitude
+                yield Gravity(_centrifugal(size, places), where), name
         T, initial = acting.temperatures, deck.initial
         same = float(initial[0]) if (initial == initial[0]).all() else 0.0
-        for name in sorted(set(T.amplitudes[T.given])):
-            of = T.given[:, 0] & (T.amplitudes[:, 0] == name)
-            difference = np.where(of, T.values[:, 0] - initial, 0.0)[deck.cards.twin]
+        for name, of in T.by_amplitude():
+            difference = np.where(of, T.values - initial[:, None], 0.0)[:, 0][deck.geometry.twin]
             yield Temperature(difference + same, same), name
 
     def is_nonlinear(self, step: Step) -> bool:
@@ -182,10 +184,9 @@ class Building:
             model.add_prestress(table[first, 2:][:, voigt.ABAQUS], some)
 
 
-def _centrifugal(values: tuple[float, ...]) -> Callable[[Array], Array]:
+def _centrifugal(square: float, places: tuple[float, ...]) -> Callable[[Array], Array]:
     """Return ω² times the distance from an axis, of places."""
-    square, center, axis = values[0], np.array(values[1:4]), np.array(values[4:7])
-    axis /= np.linalg.norm(axis)
+    center, axis = np.array(places[:3]), np.array(places[3:]) / np.linalg.norm(places[3:])
 
     def acceleration(X: Array) -> Array:
         arm = X - center

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NoReturn
 
@@ -21,6 +21,10 @@ _BROKEN = re.compile(rb",[ \t]*\n")
 """Where a row goes on in the next line."""
 _OPTION = re.compile(r'\s*([^=,"]+?)\s*(?:=\s*("[^"]*"|[^,]*?))?\s*(?:,|$)')
 _BLANKS, _LINES = bytes.maketrans(b",", b" "), bytes.maketrans(b", \t", b"\n\n\n")
+LISTS = frozenset(
+    "NODE ELEMENT NSET ELSET BOUNDARY CLOAD DLOAD DSLOAD TEMPERATURE EQUATION INITIALCONDITIONS".split()
+)
+"""Cards whose lines each stand for themselves, so that they may be several cards."""
 DEEPEST = 20
 """Files that are included in each other."""
 
@@ -108,9 +112,14 @@ class Card:
 
     def plain(self, kinds: str) -> tuple[Ints, Array, Ints] | None:
         """Return integers (m, a), reals (m, b) and lines of plain rows, or None; `kinds` are i and r."""
-        text, alone = kernels("text"), len(kinds) == 1
-        data = self.data.translate(_LINES) if alone else _BROKEN.sub(b" ", self.data).translate(_BLANKS)
-        return text.rows(data, 0, len(data), kinds, self.line) if text else None
+        if (text := kernels("text")) is None:
+            return None
+        data = self.data.translate(_LINES if len(kinds) == 1 else _BLANKS)
+        found = text.rows(data, 0, len(data), kinds, self.line)
+        if found is None and len(kinds) > 1 and len(data := _BROKEN.sub(b" ", self.data)):
+            data = data.translate(_BLANKS)
+            found = text.rows(data, 0, len(data), kinds, self.line)
+        return found
 
     def every(self) -> Array:
         """Return all numbers of the data in order, whatever the lines; InputError at the first wrong one."""
@@ -130,21 +139,22 @@ class Card:
         return whole.reshape(-1, width)
 
 
-def read_cards(path: Path, *, depth: int = 0) -> Iterator[Card]:
-    """Yield the cards of a deck and of the files that it includes."""
+def read_cards(path: Path, *, before: Card | None = None, depth: int = 0) -> Iterator[Card]:
+    """Yield the cards of a deck and of the files that it includes, which may go on with a card before."""
     data = read_bytes(path)
     stars = list(_starred(data))
     starts = [at for at in stars if not data.startswith(b"**", at)]
-    stray = [
-        line for line in data[: starts[0] if starts else None].split(b"\n") if _COMMENT.sub(b"", line).strip()
-    ]
-    if stray or not starts:
-        found = shown(stray[0]) if stray else "nothing"
+    lead = _COMMENT.sub(b"", data[: starts[0] if starts else None])
+    if lead.strip() and before:
+        before = _continued(before, str(path), 1, lead)
+        yield before
+    elif lead.strip() or not starts:
+        found = shown(lead.strip().split(b"\n")[0]) if lead.strip() else "nothing"
         raise InputError(f"{path}: a deck begins with a card such as *NODE; got {found}")
-    has_comments, line, before = len(stars) > len(starts), 1, 0
-    for at, after in zip(starts, [*starts[1:], len(data)], strict=True):
-        line += data.count(b"\n", before, at)
-        before, end = at, _line_end(data, at)
+    has_comments, line, last = len(stars) > len(starts), 1, 0
+    for at, after in zip(starts, [*starts[1:], len(data)], strict=False):
+        line += data.count(b"\n", last, at)
+        last, end = at, _line_end(data, at)
         header = data[at:end].strip()
         while header.endswith(b",") and end < after:  # the options may go on in the next line
             stop = _line_end(data, end + 1)
@@ -155,13 +165,24 @@ def read_cards(path: Path, *, depth: int = 0) -> Iterator[Card]:
         body = _COMMENT.sub(b"", body) if has_comments and b"**" in body else body
         card = _card(header, body, str(path), line + data.count(b"\n", at, end))
         if card.keyword != "INCLUDE":
+            before = card
             yield card
-        elif depth == DEEPEST:
+            continue
+        if depth == DEEPEST:
             card.wrong("files include each other; remove one of the cards")
-        elif row := next(card.rows(), None):
-            row.wrong("a line after *INCLUDE belongs to no card; begin it by one")
-        else:
-            yield from read_cards(_included(path, card), depth=depth + 1)
+        for each in read_cards(_included(path, card), before=before, depth=depth + 1):
+            before = each
+            yield each
+        if card.data.strip() and before:
+            yield _continued(before, card.file, card.line, card.data)
+
+
+def _continued(card: Card, file: str, line: int, data: bytes) -> Card:
+    """Return a card whose data are in another file, or go on there."""
+    if card.data.strip() and card.keyword not in LISTS:
+        text = f"the data of *{card.keyword} of {card.place} go on here; put them in one file"
+        raise InputError(f"{file}:{line}: {text}")
+    return replace(card, file=file, line=line, data=data)
 
 
 def _starred(data: bytes) -> Iterator[int]:

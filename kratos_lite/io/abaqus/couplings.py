@@ -6,45 +6,36 @@ displacements are the rotations of these.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from kratos_lite.analysis.model import Model
 from kratos_lite.assembly.sparsity_pattern import dofs_of
-from kratos_lite.errors import ModelError
 from kratos_lite.io.abaqus.cards import Card, Row
-from kratos_lite.io.abaqus.loads import LoadCards, with_faces
-from kratos_lite.io.abaqus.mesh import FINITE, Cells, MeshCards
-from kratos_lite.io.abaqus.supports import Axes, node_rows
-from kratos_lite.mesh import Block, Mesh
-from kratos_lite.mesh.hanging import is_corner
+from kratos_lite.io.abaqus.mesh import FINITE, Cells, Geometry
+from kratos_lite.io.abaqus.supports import Axes
+from kratos_lite.mesh import Mesh
 from kratos_lite.mesh.join import split
 from kratos_lite.model.attachments import OnNodes
 from kratos_lite.model.loads.surface import Pressure, Traction
-from kratos_lite.solvers.constraints import Constraints, independent_rows, rigid_modes
-from kratos_lite.solvers.elimination import rounded
-from kratos_lite.typing import Array, Csr, Ints, Mask
-
-HELD, CORNER, MIDDLE = 1.0, 0.3, 0.1
-"""What equations count from which reference nodes follow: of supported, corner and other nodes."""
+from kratos_lite.solvers.constraints import Constraints, rigid_modes
+from kratos_lite.typing import Array, Ints
 
 
 class Connections:
     """Reads the cards that connect nodes."""
 
-    def __init__(self, cards: MeshCards, mesh: Mesh, cuts: Sequence[Card]) -> None:
-        self.cards, self.mesh = cards, mesh
+    def __init__(self, geometry: Geometry, cuts: Sequence[Card]) -> None:
+        self.geometry = geometry
         self.rows = list[tuple[Ints, Array]]()  # dofs (m, k) and weights of equations Σ weights u[dofs] = 0
         self.ties = list[tuple[Ints, Ints, float | None]]()
         self.springs = list[tuple[Card, Ints, Array, float]]()  # dofs (m, k), directions (m, k), N/m
         self.turning = list[tuple[Ints, Card]]()  # rotations (3,) of rigid parts
-        self.passed = list[
-            tuple[Ints, Ints, Array]
-        ]()  # dofs (m,) and (k,) of reference nodes, which u = R u_k follow
-        cards.twin = np.arange(mesh.n_nodes)
+        # dofs (m,) and (k,) of reference nodes, which u = R u_k follow
+        self.passed = list[tuple[Ints, Ints, Array]]()
         self.axes: Axes  # of nodes
         self._coupling: tuple[int, Card] | None = None
         for card in cuts:
@@ -56,10 +47,10 @@ class Connections:
         """Read *RIGID BODY."""
         card.check_options(("NSET", "ELSET", "REFNODE", "ROTNODE"))
         if "NSET" in card.options:
-            nodes = node_rows(card.option("NSET"), card, self.cards, self.mesh)
+            nodes = self.geometry.nodes(card.option("NSET"), card)
         else:
-            elements = self.cards.elements_of(card.option("ELSET"), card)
-            nodes = self.mesh.node_rows(self.cards.nodes_of_elements(elements))
+            elements = self.geometry.elements_of(card.option("ELSET"), card)
+            nodes = self.mesh.node_rows(self.geometry.nodes_of_elements(elements))
         self._rigid(np.unique(nodes), self._node(card, "REFNODE"), [0, 1, 2], card)
 
     def coupling(self, card: Card) -> None:
@@ -71,14 +62,17 @@ class Connections:
         """Read *KINEMATIC: nodes follow their reference node along some axes."""
         ref, of, axes = self._coupled(card)
         self._rigid(
-            self._surface_nodes(of.option("SURFACE"), of), ref, [axis for axis in axes if axis < 3], card
+            self.geometry.surface_nodes(of.option("SURFACE"), of),
+            ref,
+            [axis for axis in axes if axis < 3],
+            card,
         )
 
     def distributing(self, card: Card) -> None:
         """Read *DISTRIBUTING: a reference node moves as the nodes of faces do in the mean, by their areas."""
         # Σ w |u - u_ref - θ × (x - x_ref)|² is least, so that forces and moments go to nodes as in CalculiX.
         ref, of, axes = self._coupled(card)
-        faces: Any = self._faces(of.option("SURFACE"), of)
+        faces: Any = self.geometry.surface_blocks(of.option("SURFACE"), of)
         X = self.mesh.points
         w = Traction(faces, (1.0, 0.0, 0.0)).forces(self.mesh, [])[:, 0]
         nodes, some = np.flatnonzero(w), np.unique([0, 1, 2, *axes])
@@ -91,7 +85,7 @@ class Connections:
     def distributingcoupling(self, card: Card) -> None:
         """Read *DISTRIBUTING COUPLING: a reference node follows nodes in the mean, by their weights."""
         card.check_options(("ELSET",))
-        each = [(node_rows(r.text(0), r, self.cards, self.mesh), r.number(1, 1.0)) for r in card.rows()]
+        each = [(self.geometry.nodes(r.text(0), r), r.number(1, 1.0)) for r in card.rows()]
         nodes = np.concatenate([rows for rows, _ in each])
         w = np.concatenate([np.full(len(rows), weight) for rows, weight in each])
         for cells in self._others(card, ("DCOUP3D",)):
@@ -104,7 +98,7 @@ class Connections:
         word = card.options.get("POSITIONTOLERANCE", "")
         tolerance = Row(card.place, (word,)).number(0) if word else None
         for row in card.rows():
-            slave, master = (self._surface_nodes(row.text(i), row) for i in (0, 1))
+            slave, master = (self.geometry.surface_nodes(row.text(i), row) for i in (0, 1))
             self.ties.append((master, slave, tolerance))
 
     def spring(self, card: Card) -> None:
@@ -133,7 +127,7 @@ class Connections:
         card.check_options(("ELSET",))
         line = next(card.rows(), None) or card.wrong("a mass is needed on its data line")
         for cells in self._others(card, ("MASS",)):
-            self.cards.masses.append((cells.ids, self.mesh.node_rows(cells.nodes[:, 0]), line.number(0)))
+            self.geometry.masses.append((cells.ids, self.mesh.node_rows(cells.nodes[:, 0]), line.number(0)))
 
     def equation(self, card: Card) -> None:
         """Read *EQUATION, along local axes."""
@@ -159,12 +153,17 @@ class Connections:
 
     # ---- what they say -----------------------------------------------------------------------------------
 
+    @property
+    def mesh(self) -> Mesh:
+        """The mesh of the deck."""
+        return self.geometry.mesh
+
     def _node(self, card: Card, option: str) -> int:
-        return int(node_rows(card.option(option), card, self.cards, self.mesh)[0])
+        return int(self.geometry.nodes(card.option(option), card)[0])
 
     def _six(self, ref: int) -> Ints:
         """Return the degrees of freedom (6,) of a reference node, those of its rotations last."""
-        rotation = self.cards.rotation[int(self.mesh.node_ids[ref])]
+        rotation = self.geometry.rotation[int(self.mesh.node_ids[ref])]
         return dofs_of(np.append(ref, self.mesh.node_rows(np.array([rotation]))))
 
     def _coupled(self, card: Card) -> tuple[int, Card, list[int]]:
@@ -181,22 +180,11 @@ class Connections:
 
     def _others(self, card: Card, kinds: Sequence[str]) -> list[Cells]:
         """Return the elements of a card, which are no solids."""
-        ids = self.cards.elements_of(card.option("ELSET"), card)
-        found = [(c, np.isin(c.ids, ids)) for c in self.cards.others if c.kind in kinds]
+        ids = self.geometry.elements_of(card.option("ELSET"), card)
+        found = [(c, np.isin(c.ids, ids)) for c in self.geometry.others if c.kind in kinds]
         if sum(some.sum() for _, some in found) < len(ids):
             card.wrong(f"{card.option('ELSET')} has other elements than {', '.join(kinds)}")
         return [replace(c, ids=c.ids[some], nodes=c.nodes[some]) for c, some in found if some.any()]
-
-    def _faces(self, name: str, at: Row | Card) -> list[Block]:
-        """Return the faces of a surface."""
-        faces = LoadCards(self.cards, self.mesh).surface(name, at)
-        return list(with_faces(self.mesh, faces, "SurfaceCondition")[0].conditions)
-
-    def _surface_nodes(self, name: str, at: Row | Card) -> Ints:
-        surface = self.cards.surfaces.get(name.upper())
-        if surface is not None and surface.nodes is not None:
-            return np.unique(self.mesh.node_rows(surface.nodes))
-        return np.unique(np.concatenate([block.nodes.ravel() for block in self._faces(name, at)]))
 
     def _follow(self, dofs: Ints, others: Ints, weights: Array) -> None:
         """Let u[dofs] = Σ weights u[others]."""
@@ -215,8 +203,8 @@ class Connections:
     def _cut(self, card: Card) -> None:
         """Cut the mesh for *PRE-TENSION SECTION: the way between both sides is the displacement of a node."""
         card.check_options(("SURFACE", "NODE", "NAME"))
-        mesh, rows = self.mesh, self._surface_nodes(card.option("SURFACE"), card)
-        faces: Any = self._faces(card.option("SURFACE"), card)
+        mesh, rows = self.mesh, self.geometry.surface_nodes(card.option("SURFACE"), card)
+        faces: Any = self.geometry.surface_blocks(card.option("SURFACE"), card)
         n = Pressure(faces, -1.0, normal="nodes").forces(mesh, []).sum(axis=0)
         new, copies = split(mesh, rows), mesh.n_nodes + np.arange(len(rows))
         order = np.arange(new.n_nodes)
@@ -224,7 +212,8 @@ class Connections:
             order[rows], order[copies] = copies, rows
         cells = [replace(block, nodes=order[block.nodes].astype(np.int32)) for block in new.blocks]
         parts = {name: part for name, part in new.parts.items() if name not in ("cut-", "cut+")}
-        self.mesh, self.cards.twin = new.replace(blocks=cells, parts=parts), np.append(self.cards.twin, rows)
+        self.geometry.mesh = new.replace(blocks=cells, parts=parts)
+        self.geometry.twin = np.append(self.geometry.twin, rows)
         line = next(card.rows(), None)
         n = n if line is None else np.array(line.numbers(3))
         others = np.column_stack([dofs_of(rows), np.full(3 * len(rows), 3 * self._node(card, "NODE"))])
@@ -243,7 +232,7 @@ class Connections:
 
     def connect(self, model: Model) -> None:
         """Connect the nodes of a model that has its supports."""
-        if not (self.rows or self.ties or self.springs or self.cards.masses):
+        if not (self.rows or self.ties or self.springs or self.geometry.masses):
             return
         from scipy.sparse import csr_array, diags_array  # half the time of a small deck
 
@@ -254,103 +243,41 @@ class Connections:
         for rotations, card in self.turning if large else ():
             if not fixed[rotations].all() or moves[rotations].any():
                 card.wrong("with NLGEOM its rotation must be held at 0, as large rotations are not supported")
-        references = model.references = self._constrain(model, fixed)
+        if self.rows:
+            model.supports.add_constraints(self._equations())
         for master, slave, tolerance in self.ties:
             model.tie(master, slave, tolerance=tolerance)
         if self.ties:
             model.notes.append("*TIE holds in the mean over faces (mortar), in CalculiX node by node")
-        loose = ~np.repeat(self.mesh.used_nodes(), 3) & (~fixed | moves)
-        K: Any = csr_array((size, size))
-        real = diags_array(1.0 * ~references.held)
+        model.supports.check_used()
+        if not (self.springs or self.geometry.masses):
+            return
+        P, moved = model.supports.followed(moves.reshape(-1, 3))
+        K, loose = csr_array((size, size)), np.flatnonzero(~np.repeat(self.mesh.used_nodes(), 3) & ~fixed)
         for card, dofs, b, k in self.springs:
             if large and (~fixed[dofs] & (np.abs(b) < 1 - 1e-9)).any():
                 card.wrong("with NLGEOM ends of a spring must move along its line alone")
             start = np.arange(len(b) + 1) * b.shape[1]
-            A = csr_array((b.ravel(), dofs.ravel(), start), shape=(len(b), size)) @ references.P
-            if abs(A[:, np.flatnonzero(loose)]).sum() > 0:
+            A = csr_array((b.ravel(), dofs.ravel(), start), shape=(len(b), size))
+            some = A @ moved
+            A = A @ P
+            if some.any() or abs(A[:, loose]).sum() > 0:
                 card.wrong("a spring ends at a node of no element that nothing holds, or that is moved")
-            K = K + k * (real @ A.T @ A @ real)
-        masses = diags_array(np.repeat(self.cards.masses_of(), 3))
-        M = references.P.T @ masses @ references.P @ real
+            K = K + k * (A.T @ A)
+        M = P.T @ diags_array(np.repeat(self.geometry.masses_of(), 3)) @ P
         for A, is_mass in ((K, False), (M, True)):
             if len(nodes := np.unique(A.diagonal().nonzero()[0] // 3)):
                 model.add(OnNodes(nodes, csr_array(A), is_mass))
 
-    def _constrain(self, model: Model, fixed: Mask) -> References:
-        """Add the equations without free reference nodes, which follow what equations choose for them."""
-        from scipy.sparse import csr_array, diags_array
+    def _equations(self) -> Constraints:
+        """Return the equations: the first of each depends on the others."""
+        from scipy.sparse import csr_array
 
-        mesh, size = self.mesh, len(fixed)
-        counts = np.concatenate([[0], *(np.full(len(c), c.shape[1]) for c, _ in self.rows)])
-        dofs, w = (np.concatenate([[], *(row[i].ravel() for row in self.rows)]) for i in (0, 1))
-        E = csr_array((w, dofs.astype(np.int64), np.cumsum(counts)), shape=(len(counts) - 1, size))
-        first = E.indices[E.indptr[:-1]]
-        E.sum_duplicates()
-        E.eliminate_zeros()
-        used = np.repeat(mesh.used_nodes(), 3)
-        gone = ~used & ~fixed & (abs(E).sum(axis=0) > 0)
-        q, stays = np.flatnonzero(gone), diags_array(1.0 * ~gone)
-        corner = np.where(is_corner(mesh.blocks, mesh.n_nodes), CORNER, MIDDLE)
-        S = _solved(E[:, q], np.where(fixed, HELD, np.repeat(corner, 3))[first], model.supports.name, q)
-        P = stays + csr_array(diags_array(1.0 * gone))[:, q] @ S @ E @ stays
-        left, sizes = csr_array(E @ P), abs(E).max(axis=1).toarray().ravel()
-        keep = (np.diff(S.tocsc().indptr) == 0) & (abs(left).max(axis=1).toarray().ravel() > 1e-12 * sizes)
-        if keep.any():
-            _depend(model, left[keep], first[keep])
-        return References(csr_array(P), ~used & fixed, np.unique(E.indices // 3))
-
-
-@dataclass(frozen=True, eq=False)
-class References:
-    """Reference nodes, which follow others: all displacements are P u."""
-
-    P: Csr  # (3n, 3n)
-    held: Mask  # (3n,), what is prescribed at nodes that no element uses
-    nodes: Ints  # of equations
-
-    def carried(self, forces: Array) -> Array:
-        """Return forces (n, 3) with those on reference nodes passed on to what they follow."""
-        return np.where(self.held, 0.0, self.P.T @ forces.ravel()).reshape(-1, 3)
-
-    def displacements(self, model: Model, u: Array, time: float = 0.0) -> Array:
-        """Return displacements (n, 3) at a time with those of the reference nodes."""
-        values = model.supports.values.copy()
-        for function, mask in model.supports.motions:
-            values[mask] = function(time)
-        return np.asarray(self.P @ np.where(self.held, values.ravel(), u.ravel())).reshape(-1, 3)
-
-
-def _solved(B: Csr, worth: Array, name: Callable[[int], str], q: Ints) -> Csr:
-    """Return S (k, m) with which q = S r solves k of B q + r = 0 (m, k), chosen by what they are worth."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    label, some = connected_components(abs(B).T @ abs(B))[1], np.flatnonzero(np.diff(B.indptr))
-    of_row = label[B.indices[B.indptr[some]]]
-    rows, columns, entries = (list[Array]() for _ in range(3))
-    for i in np.unique(label):
-        r, c = some[of_row == i], np.flatnonzero(label == i)
-        A = B[r][:, c].toarray()
-        sizes = np.linalg.norm(A, axis=0)
-        chosen = independent_rows(A / sizes * worth[r, None])
-        if len(chosen) < len(c):
-            at = name(int(q[c[0]]))
-            raise ModelError(f"equations leave {at} free, a reference node; hold its rotations")
-        rows.append(np.repeat(c, len(c)))
-        columns.append(np.tile(r[chosen], len(c)))
-        entries.append(-np.linalg.inv(A[chosen]).ravel())
-    places = tuple(np.concatenate([[], *parts]).astype(np.int64) for parts in (rows, columns))
-    return coo_array((np.concatenate([[], *entries]), places), shape=B.shape[::-1]).tocsr()
-
-
-def _depend(model: Model, E: Csr, first: Ints) -> None:
-    """Add equations, of which that depends on the others which they say first, unless its weight is small."""
-    from scipy.sparse import csr_array, diags_array
-
-    def at(dofs: Ints) -> Csr:
-        return csr_array((np.ones(len(dofs)), dofs, np.arange(len(dofs) + 1)), shape=E.shape)
-
-    free = diags_array(np.where(model.supports.fixed.ravel(), 1e-3, 1.0))
-    first = np.asarray(((abs(E) + 9 * abs(E).multiply(at(first))) @ free).argmax(axis=1)).ravel()
-    rows = at(first) - diags_array(1 / E.multiply(at(first)).sum(axis=1)) @ E
-    model.supports.add_constraints(Constraints.of_rows(first, rounded(csr_array(rows)), np.zeros(len(first))))
+        first = np.concatenate([dofs[:, 0] for dofs, _ in self.rows])
+        others = np.concatenate([dofs[:, 1:].ravel() for dofs, _ in self.rows])
+        weights = np.concatenate([(-w[:, 1:] / w[:, :1]).ravel() for _, w in self.rows])
+        counts = np.concatenate([[0], *(np.full(len(c), c.shape[1] - 1) for c, _ in self.rows)])
+        W: Any = csr_array((weights, others, np.cumsum(counts)), shape=(len(first), self.mesh.points.size))
+        W.sum_duplicates()
+        W.eliminate_zeros()
+        return Constraints.of_rows(first, W, np.zeros(len(first)))

@@ -11,10 +11,10 @@ import numpy as np
 from kratos_lite.errors import InputError, naming, nearest
 from kratos_lite.io.abaqus.cards import Card, read_cards
 from kratos_lite.io.abaqus.couplings import Connections
-from kratos_lite.io.abaqus.loads import Acting, LoadCards
+from kratos_lite.io.abaqus.loads import Acting, read_load
 from kratos_lite.io.abaqus.materials import Definition, axes_of, orientation
-from kratos_lite.io.abaqus.mesh import MeshCards
-from kratos_lite.io.abaqus.supports import Axes, Nodal, boundary, node_rows
+from kratos_lite.io.abaqus.mesh import Geometry
+from kratos_lite.io.abaqus.supports import Axes, Nodal, boundary
 from kratos_lite.model.local_axes import LocalAxes
 from kratos_lite.time_series import TimeSeries
 from kratos_lite.typing import Array
@@ -42,7 +42,10 @@ _REFUSED = {
 }
 REFUSED = {keyword: what for what, keywords in _REFUSED.items() for keyword in keywords.split()}
 """What cards stand for that are refused."""
-OF_MESH = ("NODE", "ELEMENT", "NSET", "ELSET", "SURFACE")
+OF_MESH = {
+    "NODE": Geometry.node, "ELEMENT": Geometry.element, "SURFACE": Geometry.surface,
+    "NSET": Geometry.named_set, "ELSET": Geometry.named_set,
+}  # fmt: skip
 OF_MATERIAL = {
     "ELASTIC": ("TYPE",), "DENSITY": (), "EXPANSION": ("TYPE", "ZERO"), "PLASTIC": ("HARDENING",),
     "HYPERELASTIC": ("NEOHOOKE", "MOONEY-RIVLIN", "OGDEN", "N", "MODULI"), "DAMPING": ("ALPHA", "BETA"),
@@ -119,17 +122,17 @@ class Deck:
 
     def __init__(self, path: Path) -> None:
         self.path, self.notes = path, list[str]()
-        cards, self.cards = list(read_cards(path)), MeshCards()
+        cards, self.geometry = list(read_cards(path)), Geometry()
         for card in cards:
             if card.keyword in OF_MESH:
-                getattr(self.cards, card.keyword.lower())(card)
+                OF_MESH[card.keyword](self.geometry, card)
             elif card.keyword in ("RIGIDBODY", "COUPLING"):
-                self.cards.reference(card)
+                self.geometry.reference(card)
         with naming(str(path)):
             cuts = [card for card in cards if card.keyword == "PRE-TENSIONSECTION"]
-            self.connections = Connections(self.cards, self.cards.mesh(path.name), cuts)
-        mesh = self.mesh = self.connections.mesh
-        n = mesh.n_nodes
+            self.geometry.build(path.name)
+            self.connections = Connections(self.geometry, cuts)
+        self.mesh, n = self.geometry.mesh, self.geometry.mesh.n_nodes
         self.materials = dict[str, Definition]()
         self.sections = list[tuple[str, str, str, Card]]()  # ELSET, MATERIAL, ORIENTATION
         self.orientations = dict[str, LocalAxes]()
@@ -137,10 +140,9 @@ class Deck:
         self.in_total_time = set[str]()  # amplitudes
         self.start = dict[str, Array]()  # DISPLACEMENT and VELOCITY (n, 3) at the beginning
         self.stresses = list[Card]()  # at the beginning
-        self.held, self.acting = Nodal.none(n), Acting.none(n)
+        self.held, self.acting = Nodal.none(n), Acting.none(self.mesh)
         self.axes = self.connections.axes = Axes(np.full(n, -1))
         self.initial = np.zeros(n)  # temperatures
-        self.loads = LoadCards(self.cards, mesh)
         self.steps = list[Step]()
         self.open: Step | None = None  # the step that is being read
         self._given = set[str]()  # kinds of supports and loads in it
@@ -213,7 +215,7 @@ class Deck:
     def transform(self, card: Card) -> None:
         """Read *TRANSFORM."""
         card.check_options(("NSET", "TYPE"))
-        rows = node_rows(card.option("NSET"), card, self.cards, self.mesh)
+        rows = self.geometry.nodes(card.option("NSET"), card)
         line = next(card.rows(), None) or card.wrong("two points are needed on its data line")
         self.axes.each.append(axes_of(line, card.option("TYPE", "R")))
         self.axes.of_node[rows] = len(self.axes.each) - 1
@@ -226,13 +228,13 @@ class Deck:
             self.stresses.append(card)
         elif kind == "TEMPERATURE":
             for row in card.rows():
-                self.initial[node_rows(row.text(0), row, self.cards, mesh)] = row.number(1)
+                self.initial[self.geometry.nodes(row.text(0), row)] = row.number(1)
         elif kind in ("DISPLACEMENT", "VELOCITY"):
             field = self.start.setdefault(kind, np.zeros((mesh.n_nodes, 3)))
             for row in card.rows():
                 if (axis := row.integer(1)) not in (1, 2, 3):
                     row.wrong(f"directions are 1, 2 and 3; got {axis}")
-                field[node_rows(row.text(0), row, self.cards, mesh), axis - 1] = row.number(2)
+                field[self.geometry.nodes(row.text(0), row), axis - 1] = row.number(2)
         else:
             card.wrong(f"TYPE={kind} is not supported; TEMPERATURE, STRESS, DISPLACEMENT and VELOCITY are")
 
@@ -243,7 +245,7 @@ class Deck:
     def boundary(self, card: Card) -> None:
         """Read *BOUNDARY, of the model or of a step."""
         card = self._checked(card, "BOUNDARY")
-        boundary(card, self.held, self.cards, self.mesh)
+        boundary(card, self.held, self.geometry)
 
     # ---- steps ----------------------------------------------------------------------------------------
 
@@ -273,7 +275,7 @@ class Deck:
             step.card.wrong(f"PERTURBATION is supported with *FREQUENCY; got *{card.keyword}")
         step.procedure = card
         if card.keyword == "BUCKLE":  # under its own loads alone
-            self.acting = Acting.none(self.mesh.n_nodes)
+            self.acting = Acting.none(self.mesh)
 
     def modal_damping(self, card: Card) -> None:
         """Read *MODAL DAMPING."""
@@ -285,7 +287,7 @@ class Deck:
         if self._in_step(card).procedure is None:
             card.wrong("it belongs after the procedure of the step, such as *STATIC")
         card = self._checked(card, card.keyword.replace("DSLOAD", "DLOAD"))
-        self.loads.read(card, self.acting, len(self.steps) + 1)
+        read_load(card, self.acting, self.geometry, len(self.steps) + 1)
 
     def output(self, card: Card) -> None:
         """Read a card that asks for results."""

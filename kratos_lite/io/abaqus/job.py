@@ -15,9 +15,7 @@ from kratos_lite.atomic import all_or_none, write_whole
 from kratos_lite.errors import naming
 from kratos_lite.io.abaqus.cards import Card, Row
 from kratos_lite.io.abaqus.deck import Deck, Step
-from kratos_lite.io.abaqus.loads import with_faces
 from kratos_lite.io.abaqus.steps import cases_of
-from kratos_lite.io.abaqus.supports import node_rows
 from kratos_lite.io.case import Case
 from kratos_lite.io.run import prepare, run
 from kratos_lite.io.writers import dat
@@ -196,9 +194,8 @@ class Job:
                 if word in dat.VARIABLES and rows is not None:
                     self.dat += dat.prints(result, rows, word, where, time, totals, local, known)
         for card in (card for card in self.asked if card.keyword in OF_FACES and _every(card) != 0):
-            name, mesh = card.option("SURFACE"), result.mesh
-            faces = self.deck.loads.surface(name, card)
-            blocks = with_faces(mesh.replace(conditions=()), faces, "SurfaceCondition")[0].conditions
+            name = card.option("SURFACE")
+            blocks = self.deck.geometry.surface_blocks(name, card)
             self.dat += dat.section_print(result, blocks, name.upper(), time)
 
     def _local(self, card: Card) -> list[tuple[str, LocalAxes, Ints]]:
@@ -212,16 +209,16 @@ class Job:
 
     def _rows(self, card: Card) -> Ints | None:
         """Return the nodes or elements of a card, in the order of their set, or None for all of them."""
-        mesh, cards = self.deck.mesh, self.deck.cards
+        mesh, geometry = self.deck.mesh, self.deck.geometry
         if card.keyword in OF_FACES:
-            self.deck.loads.surface(card.option("SURFACE"), card)
+            geometry.surface_faces(card.option("SURFACE"), card)
         if not _words(card):
             return None
         if card.keyword == "NODEPRINT" or "NSET" in card.options:
-            return node_rows(card.option("NSET").upper(), card, cards, mesh)
+            return geometry.nodes(card.option("NSET"), card)
         if card.keyword != "ELPRINT":
             return None
-        rows = rows_of_ids(mesh.element_ids, cards.elements_of(card.option("ELSET").upper(), card))
+        rows = rows_of_ids(mesh.element_ids, geometry.elements_of(card.option("ELSET").upper(), card))
         return np.asarray(rows[rows >= 0])
 
     def _frequencies(self, case: Case, omega: Any, shapes: Any) -> list[str]:

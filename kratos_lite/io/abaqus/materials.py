@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -31,19 +31,26 @@ class Definition:
 
     card: Card
     cards: dict[str, Card] = field(default_factory=dict)
+    now: float | None = 0.0  # its temperature, and that at the beginning; None where there are several
+    start: float | None = 0.0
 
     def constants(self, keyword: str, count: int) -> list[float]:
-        """Return the constants of a card, which must be the same at all temperatures."""
+        """Return the constants of a card at the temperature, between lines for others."""
         card = self.cards[keyword]
         rows, height = list(card.rows()), -(-count // WIDTH)
         if not rows or len(rows) % height:
             card.wrong(f"{count} constants are needed, {WIDTH} on a line; got {len(rows)} lines")
         sizes = [min(count - WIDTH * i, WIDTH) for i in range(height)]
         lines = [row.numbers(sizes[i % height]) for i, row in enumerate(rows)]
-        for i in range(height, len(rows)):
-            if lines[i] != lines[i - height]:
-                rows[i].wrong(f"*{keyword} that depends on the temperature is not supported; give it at one")
-        return [value for line in lines[:height] for value in line]
+        table = np.concatenate(lines).reshape(-1, count)
+        if (table == table[0]).all():
+            return table[0].tolist()
+        if self.now is None:
+            card.wrong("it depends on the temperature, which must be the same in the body and the step")
+        at = [row.number(sizes[-1]) for row in rows[height - 1 :: height]]
+        if (np.diff(at) <= 0).any():
+            card.wrong(f"temperatures must ascend; got {', '.join(f'{T:g}' for T in at)}")
+        return [float(np.interp(self.now, at, column)) for column in table.T]
 
     def typed(self, keyword: str, sizes: dict[str, int]) -> tuple[str, list[float]]:
         """Return the TYPE of a card, ISO by default, and its constants."""
@@ -92,10 +99,16 @@ def _law(definition: Definition, axes: LocalAxes | None, finite: bool) -> Materi
 
 
 def _expansion(definition: Definition) -> Array:
-    """Return the thermal strain (6,) in 1/K; ZERO= changes nothing, as it is the same at all temperatures."""
+    """Return the thermal strain (6,) in 1/K from the temperature at the beginning."""
     if "EXPANSION" not in definition.cards:
         return np.zeros(6)
     kind, given = definition.typed("EXPANSION", EXPANSION)
+    now, start, card = definition.now, definition.start, definition.cards["EXPANSION"]
+    if now is not None and start is not None and now != start:  # both strains count from ZERO
+        zero = Row(card.place, (card.option("ZERO", "0"),)).number(0)
+        first = replace(definition, now=start).typed("EXPANSION", EXPANSION)[1]
+        strains = np.array(given) * (now - zero) - np.array(first) * (start - zero)
+        given = (strains / (now - start)).tolist()
     given = 3 * given if kind == "ISO" else given
     return np.array([*given, 0.0, 0.0, 0.0])[voigt.ABAQUS] * voigt.SHEAR_TWICE
 

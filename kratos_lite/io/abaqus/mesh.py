@@ -2,15 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import InputError, nearest
 from kratos_lite.io.abaqus.cards import Card, Row
-from kratos_lite.mesh import NO_ROWS, Block, Mesh, Part, distinct, ids_of, mask_of, rows_of_ids, select
+from kratos_lite.mesh import (
+    NO_ROWS,
+    Block,
+    Mesh,
+    Part,
+    distinct,
+    ids_of,
+    mask_of,
+    rows_of_ids,
+    select,
+    with_rows,
+)
 from kratos_lite.shapes import Shape
+from kratos_lite.shapes.faces import FACE_SHAPES
 from kratos_lite.typing import Array, Ints
 
 ELEMENT_TYPES = {
@@ -45,29 +58,23 @@ class Cells:
     place: str
 
 
-@dataclass
-class Surface:
-    """A surface: faces of elements, or nodes."""
+class Geometry:
+    """What the cards of a deck say of nodes, elements, sets and surfaces, and the mesh that they are."""
 
-    elements: Ints = field(default_factory=NO_ROWS.copy)  # ids
-    faces: Ints = field(default_factory=NO_ROWS.copy)  # from 0
-    nodes: Ints | None = None  # ids
-
-
-class MeshCards:
-    """What the cards of a deck say about its mesh; names of sets are in capitals."""
+    # Names of sets are in capitals; the mesh is there once all cards are read.
+    mesh: Mesh
+    twin: Ints  # the row of the node of which each is a copy
 
     def __init__(self) -> None:
         self.node_cards: list[tuple[Ints, Array]] = []
         self.cells: list[Cells] = []
         self.others: list[Cells] = []  # springs, masses, …
-        self.node_sets: dict[str, list[Ints]] = {}
-        self.element_sets: dict[str, list[Ints]] = {}
-        self.surfaces: dict[str, Surface] = {}
+        self.sets: dict[str, dict[str, list[Ints]]] = {"NSET": {}, "ELSET": {}}  # ids
+        self._surfaces: dict[str, Card] = {}
+        self.surfaces: dict[str, Ints] = {}  # rows of nodes, or faces (k, 2): rows of elements, face from 0
         self.rotation: dict[int, int] = {}  # ids of reference nodes, and of those that are their rotations
         self.rigid: set[int] = set()  # those of rigid bodies
         self.masses: list[tuple[Ints, Ints, float]] = []  # ids of elements, rows of nodes, kg
-        self.twin: Ints  # the row of the node of which each is a copy
 
     def node(self, card: Card) -> None:
         """Read *NODE."""
@@ -85,7 +92,7 @@ class MeshCards:
             card.wrong(f"ids of nodes are whole numbers from 1; got {ids[ids < 1][0]}")
         self.node_cards.append((ids, points))
         if "NSET" in card.options:
-            self.node_sets.setdefault(card.option("NSET").upper(), []).append(ids)
+            self._members(card, "NSET").append(ids)
 
     def element(self, card: Card) -> None:
         """Read *ELEMENT."""
@@ -101,24 +108,16 @@ class MeshCards:
         cells = Cells(kind, table[:, 0], table[:, 1:], card.place)
         (self.cells if kind in ELEMENT_TYPES else self.others).append(cells)
         if "ELSET" in card.options:
-            self.element_sets.setdefault(card.option("ELSET").upper(), []).append(cells.ids)
+            self._members(card, "ELSET").append(cells.ids)
 
-    def nset(self, card: Card) -> None:
-        """Read *NSET."""
-        card.check_options(("NSET", "GENERATE", "ELSET"))
-        if "ELSET" in card.options:
-            found = self.nodes_of_elements(self.elements_of(card.option("ELSET"), card))
-            self.node_sets.setdefault(card.option("NSET").upper(), []).append(found)
-        else:
-            self._add(card, self.node_sets, "NSET")
-
-    def elset(self, card: Card) -> None:
-        """Read *ELSET."""
-        card.check_options(("ELSET", "GENERATE"))
-        self._add(card, self.element_sets, "ELSET")
-
-    def _add(self, card: Card, sets: dict[str, list[Ints]], kind: str) -> None:
-        members = sets.setdefault(card.option(kind).upper(), [])
+    def named_set(self, card: Card) -> None:
+        """Read *NSET or *ELSET."""
+        kind = card.keyword
+        card.check_options((kind, "GENERATE", "ELSET"))
+        members = self._members(card, kind)
+        if kind == "NSET" and "ELSET" in card.options:
+            members.append(self.nodes_of_elements(self.elements_of(card.option("ELSET"), card)))
+            return
         if "GENERATE" in card.options:
             for row in card.rows():
                 first, last, step = row.integer(0), row.integer(1, row.integer(0)), row.integer(2, 1)
@@ -134,37 +133,95 @@ class MeshCards:
                 if word.isdigit():
                     members.append(np.array([row.integer(i)]))
                 elif word:
-                    members.append(self.members(word, sets, row, kind))
+                    members.append(self.ids_of(word, row, kind))
+
+    def _members(self, card: Card, kind: str) -> list[Ints]:
+        """Return the list of members of the set that a card names."""
+        return self.sets[kind].setdefault(card.option(kind).upper(), [])
 
     def surface(self, card: Card) -> None:
         """Read *SURFACE."""
         card.check_options(("NAME", "TYPE"))
-        new = Surface()
-        of_nodes = card.option("TYPE", "ELEMENT").upper() == "NODE"
-        for row in card.rows():
-            if of_nodes:
-                found = self.nodes_of(row.text(0), row)
-                new.nodes = found if new.nodes is None else np.concatenate([new.nodes, found])
-                continue
-            ids = self.elements_of(row.text(0), row)
-            new.elements = np.concatenate([new.elements, ids])
-            new.faces = np.concatenate([new.faces, np.full(len(ids), face_number(row.text(1), row))])
-        self.surfaces[card.option("NAME").upper()] = new
+        self._surfaces[card.option("NAME").upper()] = card
 
-    def members(self, name: str, sets: dict[str, list[Ints]], at: Row | Card | None, kind: str) -> Ints:
-        """Return the ids in a set."""
-        if (found := sets.get(name.upper())) is None:
+    def ids_of(self, word: str, at: Row | Card | None, kind: str) -> Ints:
+        """Return the ids that a number or the name of a set means; `at` may lack if it is known."""
+        if word.isdigit():
+            return np.array([int(word)])
+        if (found := self.sets[kind].get(word.upper())) is None:
             assert at is not None
-            at.wrong(f"there is no {kind} {name!r}.{nearest(name.upper(), sets)}")
+            at.wrong(f"there is no {kind} {word!r}.{nearest(word.upper(), self.sets[kind])}")
         return np.concatenate([NO_ROWS, *found])
 
-    def nodes_of(self, word: str, at: Row | Card) -> Ints:
-        """Return the ids of nodes that a number or the name of a set means."""
-        return np.array([int(word)]) if word.isdigit() else self.members(word, self.node_sets, at, "NSET")
-
     def elements_of(self, word: str, at: Row | Card | None = None) -> Ints:
-        """Return the ids of elements of a number or the name of a set; `at` may lack if it is known."""
-        return np.array([int(word)]) if word.isdigit() else self.members(word, self.element_sets, at, "ELSET")
+        """Return the ids of elements of a number or the name of a set."""
+        return self.ids_of(word, at, "ELSET")
+
+    def nodes(self, word: str, at: Row | Card) -> Ints:
+        """Return the rows of nodes that a number or the name of a set means."""
+        ids = self.ids_of(word, at, "NSET")
+        rows = self.mesh.node_rows(ids)
+        if (rows < 0).any():
+            at.wrong(f"there is no node {ids[rows < 0][0]}")
+        return rows
+
+    def rotations(self, rows: Ints, row: Row) -> Ints:
+        """Return the nodes whose displacements are the rotations of reference nodes among some nodes."""
+        known = np.array(list(self.rotation), dtype=np.int64)
+        refs = known[np.isin(known, self.mesh.node_ids[rows])].tolist()
+        if alone := set(refs) & self.rigid:
+            row.wrong(
+                f"rotations of the rigid body of node {min(alone)} are directions 1, 2, 3 of its ROT NODE"
+            )
+        return self.mesh.node_rows(np.array([self.rotation[ref] for ref in refs], dtype=np.int64))
+
+    def _surface(self, card: Card) -> Ints:
+        """Return the nodes or faces of a surface."""
+        if card.option("TYPE", "ELEMENT").upper() == "NODE":
+            return np.concatenate([NO_ROWS, *(self.nodes(row.text(0), row) for row in card.rows())])
+        found = [
+            self.faces(self.elements_of(row.text(0), row), face_number(row.text(1), row), row)
+            for row in card.rows()
+        ]
+        return np.concatenate([NO_ROWS.reshape(0, 2), *found])
+
+    def surface_faces(self, name: str, at: Row | Card) -> Ints:
+        """Return the faces (k, 2) of a surface."""
+        if (found := self.surfaces.get(name.upper())) is None or found.ndim == 1:
+            at.wrong(f"there is no *SURFACE {name} of faces")
+        return found
+
+    def surface_blocks(self, name: str, at: Row | Card) -> list[Block]:
+        """Return the faces of a surface with their nodes."""
+        faces = self.surface_faces(name, at)
+        return list(with_faces(self.mesh.replace(conditions=()), faces, "SurfaceCondition")[0].conditions)
+
+    def surface_nodes(self, name: str, at: Row | Card) -> Ints:
+        """Return the nodes of a surface."""
+        found = self.surfaces.get(name.upper())
+        if found is not None and found.ndim == 1:
+            return np.unique(found)
+        return np.unique(np.concatenate([block.nodes.ravel() for block in self.surface_blocks(name, at)]))
+
+    def faces(self, ids: Ints, number: int, at: Row | Card) -> Ints:
+        """Return the face of a number of some elements, (k, 2)."""
+        known, order, sides = self._elements
+        rows = rows_of_ids(known, ids, order)
+        if (rows < 0).any():
+            at.wrong(f"there is no solid element {ids[rows < 0][0]}")
+        if (sides[rows, number] < 0).any():
+            i = np.argmin(sides[rows, number])
+            at.wrong(f"element {ids[i]} has {(sides[rows[i]] >= 0).sum()} faces; got number {number + 1}")
+        return np.column_stack([rows, sides[rows, number]])
+
+    @cached_property
+    def _elements(self) -> tuple[Ints, Ints, Ints]:
+        """Ids of elements, their order, and their faces (m, 6) by Abaqus's numbers, or -1."""
+        sides = np.full((self.mesh.n_elements, 6), -1)
+        for block, at in with_rows(self.mesh.blocks):
+            ours = face_rows(block.known_shape)
+            sides[at, : len(ours)] = ours
+        return self.mesh.element_ids, np.argsort(self.mesh.element_ids, kind="stable"), sides
 
     def nodes_of_elements(self, members: Ints) -> Ints:
         """Return the ids of the nodes of solids."""
@@ -191,13 +248,15 @@ class MeshCards:
     def _rotations(self, ids: Ints, points: Array) -> tuple[Ints, Array]:
         """Return ids and places of all nodes, with further ones where reference nodes have no ROT NODE."""
         new = np.array([ref for ref, rotation in self.rotation.items() if not rotation], dtype=np.int64)
+        if not len(new):
+            return ids, points
         at = rows_of_ids(ids, new)
         more = ids.max() + 1 + np.arange(len(new))
         self.rotation |= dict(zip(new.tolist(), more.tolist(), strict=True))
         return np.append(ids, more), np.vstack([points, points[at]])
 
-    def mesh(self, source: str) -> Mesh:
-        """Return the mesh with a part for each set; solids alone are its elements."""
+    def build(self, source: str) -> None:
+        """Make the mesh with a part for each set; solids alone are its elements."""
         if not self.node_cards or not self.cells:
             what = "*NODE" if not self.node_cards else "*ELEMENT with solids"
             raise InputError(f"{source}: there is no card {what}")
@@ -205,7 +264,7 @@ class MeshCards:
         points = np.concatenate([c[1] for c in self.node_cards])
         ids, last = _last(ids)
         ids, points = self._rotations(ids, points[last])
-        for found in self.node_sets.values():
+        for found in self.sets["NSET"].values():
             found[:] = [nodes[rows_of_ids(ids, nodes) >= 0] for nodes in found]  # a range may skip nodes
         blocks = []
         for cells in self.cells:
@@ -217,17 +276,18 @@ class MeshCards:
                 text = f"element {cells.ids[i]} names node {cells.nodes[i, j]}, which is not there"
                 raise InputError(f"{cells.place}: {text}")
             order = np.argsort(shape.to_vtk)
-            blocks.append(Block(name, rows[:, order], cells.ids))
-        return Mesh(points, blocks, node_ids=ids, source=source, parts=self._parts(ids, blocks))
+            blocks.append(Block(name, rows if (np.diff(order) == 1).all() else rows[:, order], cells.ids))
+        self.mesh = Mesh(points, blocks, node_ids=ids, source=source, parts=self._parts(ids, blocks))
+        self.twin = np.arange(len(ids))
+        self.surfaces = {name: self._surface(card) for name, card in self._surfaces.items()}
 
     def _parts(self, ids: Ints, blocks: list[Block]) -> dict[str, Part]:
         """Return the sets as parts; one of nodes and one of elements of the same name are one part."""
         parts, of_elements = {}, ids_of(blocks)
-        for name in dict.fromkeys([*self.node_sets, *self.element_sets]):
-            nodes = np.concatenate([NO_ROWS, *self.node_sets.get(name, [])])
-            cells = np.concatenate([NO_ROWS, *self.element_sets.get(name, [])])
-            rows = rows_of_ids(ids, distinct(nodes))
-            elements = rows_of_ids(of_elements, distinct(cells))
+        for name in dict.fromkeys([*self.sets["NSET"], *self.sets["ELSET"]]):
+            nodes = np.concatenate([NO_ROWS, *self.sets["NSET"].get(name, [])])
+            cells = np.concatenate([NO_ROWS, *self.sets["ELSET"].get(name, [])])
+            rows, elements = distinct(rows_of_ids(ids, nodes)), distinct(rows_of_ids(of_elements, cells))
             elements = elements[elements >= 0]  # springs and masses are no elements of the mesh
             if len(elements) and not len(rows):
                 found = [block.nodes.ravel() for block in select(blocks, elements)]
@@ -237,10 +297,10 @@ class MeshCards:
         return parts
 
 
-def _last(ids: Ints) -> tuple[Ints, Ints]:
+def _last(ids: Ints) -> tuple[Ints, Ints | slice]:
     """Return the ids, each once, and where each stands last; a node may be defined again, as in CalculiX."""
     if (np.diff(ids) > 0).all():
-        return ids, np.arange(len(ids))
+        return ids, slice(None)
     found, first = np.unique(ids[::-1], return_index=True)
     return found, len(ids) - 1 - first
 
@@ -256,3 +316,17 @@ def face_rows(shape: type[Shape]) -> list[int]:
     """Return which of our faces each face S1, S2, … of a cell is."""
     ours = [frozenset(n for n in face if n < shape.corners) for face in shape.faces]
     return [ours.index(frozenset(face)) for face in FACES[shape.cell]]
+
+
+def with_faces(mesh: Mesh, faces: Ints, name: str) -> tuple[Mesh, Ints]:
+    """Return the mesh with conditions on faces (k, 2), and the face of each."""
+    conditions, found = list[Block](), [faces[:0]]
+    for block, at in with_rows(mesh.blocks):
+        of = np.unique(faces[(faces[:, 0] >= at.start) & (faces[:, 0] < at.stop)], axis=0)
+        for number, places in enumerate(block.known_shape.faces):
+            some = of[of[:, 1] == number]
+            ids = 1 + sum(map(len, conditions)) + np.arange(len(some))
+            nodes, shape = block.nodes[some[:, 0] - at.start][:, list(places)], FACE_SHAPES[len(places)]
+            conditions += [Block(f"{name}3D{len(places)}N", nodes, ids, shape=shape)] * bool(len(some))
+            found.append(some)
+    return mesh.replace(conditions=conditions) if conditions else mesh, np.concatenate(found)

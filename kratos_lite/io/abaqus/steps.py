@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from itertools import takewhile
 from math import ceil, pi
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -20,6 +20,8 @@ from kratos_lite.io.abaqus.loads import Acting
 from kratos_lite.io.case import Case, TimeIntegration
 from kratos_lite.time_series import TimeSeries
 from kratos_lite.typing import Array
+
+Amplitudes: TypeAlias = dict[str, TimeSeries | None]
 
 AT_ONCE = 1e-9
 """Fraction of a step in which loads act that do not grow over it."""
@@ -64,7 +66,9 @@ class _Cases(Building):
 
     def _loaded(self, step: Step) -> Model:
         """Return the model with the supports and loads at the end of a linear step."""
-        model, held = self.model(), step.held.copy()
+        T, start = step.acting.temperatures, self.deck.initial
+        now = np.where(T.given[:, 0], T.values[:, 0], start) if T.given.any() else None
+        model, held = self.model(now=now), step.held.copy()
         factor = {name: series(step.period) for name, series in self._series(step).items() if series}
         acting = step.acting.copy()
         held.settle(factor)
@@ -131,7 +135,7 @@ class _Cases(Building):
             step.card.wrong("amplitudes over the frequency and supports that move are not supported")
         modes, model = self._modes(step), self.model()
         self.hold(model, step.held)
-        quarter = Acting.none(model.mesh.n_nodes)
+        quarter = Acting.none(model.mesh)
         quarter.forces = step.acting.imaginary
         loads: list[Any] = [load for load, _ in self.loads(model, step.acting)]
         loads += [(load, 1j) for load, _ in self.loads(model, quarter)]
@@ -208,68 +212,62 @@ class _Cases(Building):
         for before in self.earlier(steps[0]):
             if before.kind in MOVING or self.is_nonlinear(before) or (is_moving and before.period):
                 steps[0].card.wrong("to go on from the state of another kind of step is not supported")
-        model, times = self.model(large), np.cumsum([0.0, *(step.period for step in steps)])
-        # when the loads of each step act as a whole
-        reached = [
-            end if step.ramps else start + AT_ONCE * (end - start)
-            for start, end, step in zip(times, times[1:], steps, strict=False)
-        ]
-        self._move(model, steps, times, reached)
+        given = np.any([step.acting.temperatures.given[:, 0] for step in steps], axis=0)
+        now = np.where(given, np.nan, self.deck.initial) if given.any() else None  # those of each are several
+        model, series = self.model(large, now), [self._series(step) for step in steps]
+        self._move(model, steps, series)
         for k, step in enumerate(steps):
             T = step.acting.temperatures
-            if self.deck.initial.any() and T.amplitudes[T.given].any():
+            if self.deck.initial.any() and any(name for name, _ in T.by_amplitude()):
                 step.card.wrong("amplitudes of temperatures need initial temperatures of 0 in this step")
             if k and step.ramps and step.acting.names():
                 step.card.wrong("amplitudes after the first of several nonlinear steps are not supported")
-            factor = {name: _window(times, reached, k, each) for name, each in self._series(step).items()}
             for load, name in self.loads(model, step.acting):
-                model.add(load, amplitude=factor[name])
+                each = [series[k][name] if one is step else None for one in steps]
+                model.add(load, amplitude=_course(steps, np.eye(len(steps))[k], each))
         return model
 
-    def _series(self, step: Step) -> dict[str, TimeSeries | None]:
+    def _series(self, step: Step) -> Amplitudes:
         """Return the amplitudes by names over the time of a step, and None for what has none."""
-        found: dict[str, TimeSeries | None] = {"": None}
+        found: Amplitudes = {"": None}
         for name, series in self.deck.amplitudes.items():
             shift = step.start if name in self.deck.in_total_time else 0.0
             found[name] = TimeSeries(series.times - shift, series.values)
         return found
 
-    def _move(self, model: Model, steps: Sequence[Step], times: Array, reached: list[float]) -> None:
+    def _move(self, model: Model, steps: Sequence[Step], series: Sequence[Amplitudes]) -> None:
         """Support a model in steps in turn, with the displacements that each prescribes."""
         held = steps[0].held.copy()
         for step in steps[1:]:
             if (step.held.given != held.given).any():
                 step.card.wrong("supports that change between nonlinear steps are not supported")
-            if held.amplitudes[held.given].any() or step.held.amplitudes[held.given].any():
-                step.card.wrong("amplitudes of supports in one of several steps are not supported")
         values = np.stack([step.held.values for step in steps], axis=-1)
-        series = {name: each for name, each in self._series(steps[0]).items() if each is not None}
-        moved = held.given & (held.amplitudes == "") & values.any(axis=-1)
-        knots = np.column_stack([reached, times[1:]]).ravel()
-        for key in np.unique(values[moved], axis=0):
-            name, at = f"steps {len(series)}", moved & (values == key).all(axis=-1)
-            held.values[at], held.amplitudes[at] = 1.0, name
-            series[name] = _table([0.0, *knots], [0.0 if steps[0].ramps else key[0], *np.repeat(key, 2)])
-        self.hold(model, held, series)
+        moved = held.given & values.any(axis=-1)
+        numbers = np.stack([step.held.amplitudes[moved] for step in steps], axis=-1)
+        both = np.column_stack([values[moved], numbers])
+        alike, of = np.unique(both, axis=0, return_inverse=True)
+        held.amplitudes[moved], held.names = 1 + of.ravel(), ["", *map(str, range(len(alike)))]
+        courses = {}
+        for i, row in enumerate(alike):
+            sizes, which = np.split(row, 2)
+            each = [s[step.held.names[int(n)]] for s, step, n in zip(series, steps, which, strict=True)]
+            courses[str(i)] = _course(steps, sizes, each)
+        self.hold(model, held, courses)
 
 
-def _window(times: Array, reached: list[float], k: int, series: TimeSeries | None) -> TimeSeries:
-    """Return the factor of what acts in step k: 0 before it, then 1 or an amplitude, and 0 in the next."""
-    start, end = times[k], times[k + 1]
-    knots, values = [reached[k], end], [1.0, 1.0]
-    if series is not None:
-        inner = (series.times > 0) & (series.times < end - start)
-        knots = [start + AT_ONCE * (end - start), *(start + series.times[inner]), end]
-        values = [series(0.0), *series.values[inner], series(end - start)]
-    if k or (series is None and reached[0] == end):
-        knots, values = [start, *knots], [0.0, *values]
-    if k + 1 < len(reached):
-        knots, values = [*knots, reached[k + 1]], [*values, 0.0]
-    return _table(knots, values)
-
-
-def _table(times: list[float], values: list[float]) -> TimeSeries:
-    """Return a series of times that ascend, some of them twice."""
+def _course(steps: Sequence[Step], sizes: Array, amplitudes: Sequence[TimeSeries | None]) -> TimeSeries:
+    """Return over steps in turn what has a size in each, with an amplitude or without: then it keeps it."""
+    first = amplitudes[0](0.0) if amplitudes[0] else 0.0 if steps[0].ramps else 1.0
+    times, values, start = [0.0], [first * sizes[0]], 0.0
+    for step, size, amplitude in zip(steps, sizes, amplitudes, strict=True):
+        whole, inner, factors = step.period if step.ramps else AT_ONCE * step.period, np.zeros(0), [1.0, 1.0]
+        if amplitude is not None:
+            some = (amplitude.times > 0) & (amplitude.times < step.period)
+            whole, inner = AT_ONCE * step.period, amplitude.times[some]
+            factors = [amplitude(0.0), *amplitude.values[some], amplitude(step.period)]
+        times += [start + whole, *(start + inner), start + step.period]
+        values += [size * factor for factor in factors]
+        start += step.period
     knots, at = np.unique(times, return_index=True)
     return TimeSeries(knots, np.array(values)[at])
 

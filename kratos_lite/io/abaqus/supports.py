@@ -2,58 +2,74 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from kratos_lite.io.abaqus.cards import Card, Row
-from kratos_lite.io.abaqus.mesh import MeshCards
+from kratos_lite.io.abaqus.cards import Card
+from kratos_lite.io.abaqus.mesh import Geometry
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.local_axes import LocalAxes
-from kratos_lite.typing import Array, Ints, Mask
+from kratos_lite.typing import Array, Ints, Mask, Numbers
 
 
 @dataclass
 class Nodal:
-    """Values at nodes along directions, (n, k): which are given, with the names of their amplitudes."""
+    """Values at nodes along directions, or of elements on faces, (n, k), and names of their amplitudes."""
 
     given: Mask
     values: Array
-    amplitudes: Array  # of str
-    steps: Ints  # in which each was given
+    amplitudes: Numbers  # their numbers among the names
+    steps: Numbers  # in which each was given
+    names: list[str] = field(default_factory=lambda: [""])
 
     @classmethod
     def none(cls, n: int, k: int = 3) -> Nodal:
         """Return nothing at n nodes."""
-        steps, names = np.zeros((n, k), dtype=np.int64), np.full((n, k), "", dtype=object)
-        return cls(np.zeros((n, k), dtype=bool), np.zeros((n, k)), names, steps)
+        given, values = np.zeros((n, k), dtype=bool), np.zeros((n, k))
+        return cls(given, values, np.zeros((n, k), dtype=np.int16), np.zeros((n, k), dtype=np.int16))
 
     def copy(self) -> Nodal:
         """Return a copy."""
-        return Nodal(self.given.copy(), self.values.copy(), self.amplitudes.copy(), self.steps.copy())
+        if not self.given.any():  # many do not occur in a deck
+            return Nodal.none(*self.given.shape)
+        numbers = self.amplitudes.copy(), self.steps.copy()
+        return Nodal(self.given.copy(), self.values.copy(), *numbers, self.names)
 
     def clear(self) -> None:
         """Remove everything."""
         self.given[:], self.values[:], self.steps[:] = False, 0.0, 0
 
+    def by_amplitude(self) -> Iterator[tuple[str, Mask]]:
+        """Yield the names of the amplitudes in order, each with what has it, (n, k)."""
+        numbers = np.flatnonzero(np.bincount(self.amplitudes[self.given])).tolist()
+        for number in sorted(numbers, key=self.names.__getitem__):
+            yield self.names[number], self.given & (self.amplitudes == number)
+
     def settle(self, factors: dict[str, float]) -> None:
         """Let amplitudes end at factors."""
-        for name in factors.keys() & set(self.amplitudes[self.given]):
-            at = self.given & (self.amplitudes == name)
-            self.values[at] *= factors[name]
-            self.amplitudes[at] = ""
+        for name, at in self.by_amplitude() if len(self.names) > 1 else ():
+            if name in factors:
+                self.values[at] *= factors[name]
+                self.amplitudes[at] = 0
 
     def put(self, rows: Ints, axes: int | slice, value: float, amplitude: str) -> None:
         """Give a value to nodes."""
         self.given[rows, axes], self.values[rows, axes] = True, value
-        self.amplitudes[rows, axes] = amplitude
+        self.amplitudes[rows, axes] = self._number(amplitude)
 
-    def add(self, rows: Ints, axis: int, value: float, amplitude: str, step: int) -> None:
+    def add(self, rows: Ints, axes: Ints | int, value: float, amplitude: str, step: int) -> None:
         """Add a value to those of the same step, and replace those of earlier ones."""
-        self.values[rows[self.steps[rows, axis] < step], axis] = 0.0
-        self.steps[rows, axis] = step
-        np.add.at(self.values[:, axis], rows, value)
-        self.given[rows, axis], self.amplitudes[rows, axis] = True, amplitude
+        at = rows, np.broadcast_to(axes, rows.shape)
+        self.values[at] = np.where(self.steps[at] < step, 0.0, self.values[at])
+        np.add.at(self.values, at, value)
+        self.given[at], self.steps[at], self.amplitudes[at] = True, step, self._number(amplitude)
+
+    def _number(self, name: str) -> int:
+        if name not in self.names:
+            self.names.append(name)
+        return self.names.index(name)
 
 
 @dataclass
@@ -72,25 +88,7 @@ class Axes:
         return out
 
 
-def node_rows(word: str, at: Row | Card, cards: MeshCards, mesh: Mesh) -> Ints:
-    """Return the rows of nodes that a number or the name of a set means."""
-    ids = cards.nodes_of(word, at)
-    rows = mesh.node_rows(ids)
-    if (rows < 0).any():
-        at.wrong(f"there is no node {ids[rows < 0][0]}")
-    return rows
-
-
-def rotation_rows(rows: Ints, cards: MeshCards, mesh: Mesh, row: Row) -> Ints:
-    """Return the nodes whose displacements are the rotations of reference nodes among some nodes."""
-    known = np.array(list(cards.rotation), dtype=np.int64)
-    refs = known[np.isin(known, mesh.node_ids[rows])].tolist()
-    if alone := set(refs) & cards.rigid:
-        row.wrong(f"rotations of the rigid body of node {min(alone)} are directions 1, 2, 3 of its ROT NODE")
-    return mesh.node_rows(np.array([cards.rotation[ref] for ref in refs], dtype=np.int64))
-
-
-def boundary(card: Card, held: Nodal, cards: MeshCards, mesh: Mesh) -> None:
+def boundary(card: Card, held: Nodal, geometry: Geometry) -> None:
     """Read *BOUNDARY."""
     card.check_options(("OP", "AMPLITUDE", "FIXED"))
     if card.options.get("OP", "").upper() == "NEW":
@@ -98,7 +96,7 @@ def boundary(card: Card, held: Nodal, cards: MeshCards, mesh: Mesh) -> None:
     if "FIXED" in card.options:
         card.wrong("option FIXED is not supported; give the value")
     for row in card.rows():
-        rows = node_rows(row.text(0), row, cards, mesh)
+        rows = geometry.nodes(row.text(0), row)
         word = row.text(1)
         if not word.isdigit():
             row.wrong(f"{word!r} is no number of a direction; 1, 2, 3 are x, y, z")
@@ -108,7 +106,8 @@ def boundary(card: Card, held: Nodal, cards: MeshCards, mesh: Mesh) -> None:
         if first == 11:
             row.wrong("temperatures are given by *TEMPERATURE; degree of freedom 11 is not supported")
         value = row.number(3, 0.0)
-        held.put(rows, slice(first - 1, min(last, 3)), value, card.amplitude)
+        amplitude = card.amplitude if value else ""
+        held.put(rows, slice(first - 1, min(last, 3)), value, amplitude)
         if last > 3:  # rotations, which solids do not have
-            turned = rotation_rows(rows, cards, mesh, row)
-            held.put(turned, slice(max(first, 4) - 4, min(last, 6) - 3), value, card.amplitude)
+            turned = geometry.rotations(rows, row)
+            held.put(turned, slice(max(first, 4) - 4, min(last, 6) - 3), value, amplitude)

@@ -33,8 +33,8 @@ def describes_case(path: str | Path) -> bool:
     if kind == ".inp" and Path(path).is_file():
         from kratos_lite.io.text import read_bytes
 
-        text = read_bytes(path).upper()
-        return b"*STEP" in text or b"*SOLID" in text
+        text = read_bytes(path)
+        return b"*STEP" in text or any(word in text.upper() for word in (b"*STEP", b"*SOLID"))
     return kind in (".json", ".py")
 
 

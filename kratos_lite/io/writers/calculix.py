@@ -129,9 +129,9 @@ def error(result: ElementFields) -> Array | None:
 
 
 def displacements(model: Any, u: Array, time: float = 0.0) -> Array:
-    """Return displacements (n, 3) with those of reference nodes, if the model is of a deck that has some."""
-    known = getattr(model, "references", None)
-    return u if known is None else np.asarray(known.displacements(model, u, time))
+    """Return displacements (n, 3) with those of reference nodes, if it is a model with supports."""
+    supports = getattr(model, "supports", None)
+    return u if supports is None else np.asarray(supports.displacements(u, time))
 
 
 AT_NODES: dict[str, Callable[[Any], Array | None]] = {

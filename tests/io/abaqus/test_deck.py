@@ -49,6 +49,11 @@ STEPS = {
         "*STEP\n*STATIC\n*DSLOAD,OP=NEW\nS,P,3.\n" + PRINT,
     ),
     "a comma ends a card": ("*STEP\n*STATIC\n*CLOAD,\nTOP,3,1.\n" + PRINT,),
+    "loads of one step on a body add, too; a missing value is 0": (
+        "*STEP\n*STATIC\n*DLOAD\nEALL,GRAV,9.81,0.,0.6,-0.8\nEALL,GRAV,9.81,0.,0.6,-0.8\n" + PRINT,
+        "*STEP\n*STATIC\n*DLOAD\nEALL,GRAV,5.,0.,0.6,-0.8\n*DLOAD\nEALL,GRAV,2.,1.,0.,0.\n" + PRINT,
+        "*STEP\n*STATIC\n*CLOAD\n7,1\n8,2,1.\n" + PRINT,
+    ),
     "weight, rotation and a surface": (
         "*STEP\n*STATIC\n*DLOAD\nEALL,GRAV,9.81,0.,0.6,-0.8\n" + PRINT,
         "*STEP\n*STATIC\n*DLOAD,OP=NEW\nEALL,CENTRIF,4.,1.,0.,0.,0.,0.,1.\n" + PRINT,
@@ -114,6 +119,23 @@ def test_sets_are_parts_and_included_files_are_read(tmp_path: Path) -> None:
     assert [card.keyword for card in read_cards(deck)][:2] == ["HEADING", "NODE"]
 
 
+@pytest.mark.parametrize(
+    ("head", "inside", "tail"),
+    [("*NODE, NSET=ALL\n", "", ""), ("", "*NODE, NSET=ALL\n", ""), ("*NODE, NSET=ALL\n", "", "8,0,1,1\n")],
+)
+def test_data_go_on_in_included_files(head: str, inside: str, tail: str, tmp_path: Path) -> None:
+    before, rest = CUBE.split("*NODE, NSET=ALL\n")
+    nodes, after = rest.split("*ELEMENT")
+    (tmp_path / "nodes.txt").write_text(inside + nodes.replace(tail or "?", ""))
+    deck = tmp_path / "job.inp"
+    deck.write_text(f"{before}{head}*INCLUDE, INPUT=nodes.txt\n{tail}*ELEMENT{after}")
+    assert np.abs(kl.read_case(deck).model.mesh.points.sum(axis=0) - 4).max() == 0
+    deck.write_text(f"{CUBE}*STEP\n*STATIC\n1.,1.\n*INCLUDE, INPUT=nodes.txt\n*END STEP\n")
+    if not inside:
+        with pytest.raises(kl.InputError, match=r"nodes.txt:1: the data of \*STATIC of .*:30 go on"):
+            kl.read_case(deck)
+
+
 STEP = "*STEP\n*STATIC\n*END STEP\n"
 WRONG = {  # what is added to the cube, and the message, which begins with the line in that, from 0
     "*STEP\n*STATIC\n": "0: *STEP: the step is not ended by *END STEP",
@@ -131,6 +153,9 @@ WRONG = {  # what is added to the cube, and the message, which begins with the l
     "*ELEMENT, TYPE=C3D8\n2,1,2,3,4,5,6,7\n" + STEP: "0: *ELEMENT: 8 numbers are no rows of 9",
     "*ELEMENT, TYPE=C3D4\n2,1,2,3,44\n" + STEP: "0: element 2 names node 44, which is not there",
     "*ELEMENT, TYPE=C3D4\n2,1,2,3,5\n" + STEP: "element 2 is in no *SOLID SECTION",
+    "*STEP\n*STATIC\n*DLOAD\nEALL,CENTRIF,1.,0,0,0,0,0,1.\nEALL,CENTRIF,1.,0,0,0,0,1.,0.\n*END STEP\n": (
+        "4: an element turns about another axis already"
+    ),
     "*BOUNDARY\nTOP,XSYMM\n" + STEP: "1: 'XSYMM' is no number of a direction",
     "*BOUNDARY\nTOP,1,1,1;5\n" + STEP: "1: '1;5' is not a number",
     "*STEP, FOO=1\n*STATIC\n*END STEP\n": "0: *STEP: option FOO is not supported",
@@ -140,7 +165,6 @@ WRONG = {  # what is added to the cube, and the message, which begins with the l
     "*SOLID SECTION, ELSET=EALL, MATERIAL=X\n" + STEP: "0: *SOLIDSECTION: there is no *MATERIAL X",
     "*DENSITY\n1.\n" + STEP: "0: *DENSITY: it belongs after *MATERIAL",
     "*INCLUDE, INPUT=../x.inp\n" + STEP: "leaves the folder",
-    "*INCLUDE, INPUT=x.inp\n5,6\n" + STEP: "1: a line after *INCLUDE belongs to no card",
     "*MATERIAL, NAME=STEEL\n" + STEP: "0: *MATERIAL: the name STEEL is taken",
     "*STEP\n*STATIC\n*CLOAD, AMPLITUDE=A\nTOP,1,1.\n*END STEP\n": "2: *CLOAD: there is no *AMPLITUDE A",
     "*BOUNDARY, AMPLITUDE=A\nTOP,1,1,1.\n" + STEP: "0: *BOUNDARY: there is no *AMPLITUDE A",

@@ -51,6 +51,11 @@ LAWS = {
     "alike at two temperatures": f"*ELASTIC, TYPE=ANISO\n{2 * ANISOTROPIC}*DENSITY\n1.,0.\n1.,9.\n"
     + TURNED + PULLED,
     "heated": "*ELASTIC\n2e4,.3\n*EXPANSION, ZERO=50.\n1e-4,0.\n1e-4,500.\n" + PLAIN + HEATED,
+    "between temperatures": "*ELASTIC\n2e4,.3,0.\n1e4,.35,200.\n*EXPANSION, ZERO=50.\n1e-4,0.\n3e-4,500.\n"
+    + PLAIN + HEATED,
+    "orthotropic between temperatures": ORTHO.replace("\n.5e4", "\n.5e4,30.")
+    + "2e4,1e4,2.5e4,1.2e4,.9e4,2e4,.6e4,.5e4\n.4e4,180.\n*EXPANSION, TYPE=ORTHO\n1e-4,3e-4,2e-4,0.\n"
+    "2e-4,3e-4,1e-4,150.\n" + TURNED + HEATED,
     "heated along axes": ORTHO + "*EXPANSION, TYPE=ORTHO\n1e-4,3e-4,2e-4\n" + TURNED + HEATED,
     "isotropic but heated": "*ELASTIC\n2e4,.3\n*EXPANSION, TYPE=ORTHO\n1e-4,3e-4,2e-4\n" + TURNED + HEATED,
     "sheared by heat": f"*ELASTIC, TYPE=ANISO\n{ANISOTROPIC}"
@@ -126,12 +131,11 @@ WRONG = {  # what follows *MATERIAL, and the message, which begins with the line
     "*DENSITY\n1.\n": "0: *MATERIAL: material M has no *ELASTIC; got DENSITY",
     "*ELASTIC\n": "1: *ELASTIC: 2 constants are needed, 8 on a line; got 0 lines",
     "*ELASTIC\n2e4\n": "2: value 2 of the line is missing",
-    "*ELASTIC\n2e4,.3,0.\n1e4,.3,100.\n": "3: *ELASTIC that depends on the temperature is not supported",
+    "*ELASTIC\n2e4,.3,100.\n1e4,.3,100.\n": "1: *ELASTIC: temperatures must ascend; got 100, 100",
     "*ELASTIC, TYPE=FOO\n1.\n": "1: *ELASTIC: TYPE=FOO is not supported; there are ISO, ORTHO, ENGIN",
     "*ELASTIC, TYPE=ORTHO\n3.,1.,2.,1.,1.,2.,1.,1.\n": "ELASTIC: 9 constants are needed, 8 on a line",
     "*ELASTIC, TYPE=ORTHO\n3.,1.,2.,1.,1.,2.,1.,1.,1.\n": "ELASTIC: 9 constants are needed, 8 on a line",
     "*ELASTIC\n2e4,.6\n": "0: *MATERIAL: nu (POISSON_RATIO) 0.6 must be < 0.5",
-    "*ELASTIC\n2e4,.3\n*DENSITY\n1.,0.\n2.,9.\n": "*DENSITY that depends on the temperature",
     "*ELASTIC\n2e4,.3\n*EXPANSION, TYPE=FOO\n1.\n": "TYPE=FOO is not supported; there are ISO, ORTHO, ANISO",
     "*ELASTIC\n2e4,.3\n*PLASTIC\n25.,.1\n": "3: *PLASTIC: the first line gives the yield stress at",
     "*ELASTIC\n2e4,.3\n*PLASTIC\n25.,0.\n20.,.1\n": "*MATERIAL: the plastic strains of a curve grow from 0",
@@ -157,6 +161,16 @@ def test_what_no_law_here_says_is_refused(text: str, read: Read) -> None:
     with pytest.raises(kl.InputError) as caught:
         read(text + section + STEP, TETRAHEDRON)
     assert re.sub(r"^(\d+)", lambda m: f"job.inp:{first + int(m[1])}", WRONG[text]) in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "step", [HEATED.replace("ALL,120", "4,120"), "*STEP, NLGEOM\n*STATIC\n*TEMPERATURE\nALL,120.\n" + PRINT]
+)
+def test_a_law_at_several_temperatures_is_refused(step: str, read: Read) -> None:
+    with pytest.raises(
+        kl.InputError, match=r"\*ELASTIC: it depends on the temperature, which must be the same"
+    ):
+        read("*ELASTIC\n2e4,.3,0.\n1e4,.3,100.\n" + PLAIN + step, TETRAHEDRON)
 
 
 def test_plasticity_with_large_displacements_is_refused(read: Read) -> None:

@@ -90,6 +90,11 @@ STEPS: dict[str, tuple[str, str]] = {
     "a support with an amplitude": (
         CUBE + AMPLITUDES, f"{FINE}.25,1.\n{EXACT}*BOUNDARY, AMPLITUDE=A\nTOP,1,1,.1\n{PRINT}",
     ),
+    "supports with amplitudes in steps in turn": (
+        CUBE + AMPLITUDES,
+        f"{FINE}.5,1.\n{EXACT}*BOUNDARY\nTOP,1,1,.1\n{PRINT}"
+        f"{FINE}.25,1.\n{EXACT}*BOUNDARY, OP=NEW, AMPLITUDE=A\nBOTTOM,1,3\nTOP,1,1,.2\n{PRINT}",
+    ),
     "rubber turns NLGEOM on": (RUBBER, f"*STEP\n*STATIC\n.5,1.\n{EXACT}*DLOAD\nEALL,P2,-50.\n{PRINT}"),
     "plastic flow and back": (
         PLASTIC,
