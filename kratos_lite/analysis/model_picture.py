@@ -11,7 +11,7 @@ from kratos_lite.errors import ModelError
 from kratos_lite.mesh import Mesh, distinct
 from kratos_lite.mesh.selection import spread
 from kratos_lite.model.attachments import MARKS, SHOWN
-from kratos_lite.model.loads import Temperature
+from kratos_lite.model.loads.temperature import Temperature
 from kratos_lite.model.loads.base import Drawn, Load
 from kratos_lite.model.loads.together import joined
 from kratos_lite.model.structure import Structure
