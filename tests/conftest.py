@@ -37,7 +37,7 @@ LONGEST = (
     *("test_table.py", "test_over_ranks.py", "test_command.py"),
     *("test_examples.py", "test_notebooks.py", "test_benchmarks.py"),
 )
-"""Files whose tests come first: no worker begins one when the others are done, and one worker runs each."""
+"""Files whose tests come first: no worker begins one when the others are done, or shares its fixtures."""
 
 
 def pytest_collection_modifyitems(items):

@@ -70,11 +70,11 @@ def reference(wheels):
     ids=str,
 )
 def test_order_two_while_the_rate_changes(integrator, wheels, reference):
-    transient = shaken_wheel(wheels).transient(integrator=integrator)
-    free, errors = transient.equations.system.constraint_map.free, []
+    errors = []
     for steps in (100, 200):
         transient = shaken_wheel(wheels).transient(integrator=integrator)
         list(kl.integrate(transient, SPAN / steps, steps, every=steps))
+        free = transient.equations.system.constraint_map.free
         errors.append(np.abs(transient.u[free] - reference).max() / np.abs(reference).max())
     assert errors[1] < 4e-3
     assert 1.95 < np.log2(errors[0] / errors[1]) < 2.05
