@@ -41,17 +41,17 @@ def wheel(rate, pressed=True, damping=0.0):
 
 
 # %%
-def dent(rate, degrees, **options):
+def dents(rate, degrees, **options):
     """Return how far the rim moves inwards by the contact, so many degrees from it, in mm per MPa."""
     change = wheel(rate, **options)[1].u - wheel(rate, pressed=False, **options)[1].u
-    place = np.array([np.sin(np.radians(degrees)), -np.cos(np.radians(degrees))])
-    at = np.abs(mesh.points[:, [0, 2]] - place).max(axis=1) < 1e-9
-    return -(change[at][:, [0, 2]] @ place).mean() / p0 * 1e9
+    places = np.column_stack([np.sin(np.radians(degrees)), -np.cos(np.radians(degrees))])
+    at = [np.abs(mesh.points[:, [0, 2]] - place).max(axis=1) < 1e-9 for place in places]
+    return [-(change[a][:, [0, 2]] @ p).mean() / p0 * 1e9 for a, p in zip(at, places, strict=True)]
 
 
 for rate in (0.0, 30.0, 60.0):
-    print(f"{rate:g} rad/s: the contact is pressed in by {dent(rate, 0):.4f} mm per MPa")
-before, behind = (dent(30.0, side, damping=20.0) for side in (45, -45))
+    print(f"{rate:g} rad/s: the contact is pressed in by {dents(rate, [0])[0]:.4f} mm per MPa")
+before, behind = dents(30.0, [45, -45], damping=20.0)
 print(f"with damping, 45° to each side: {before:.4f} and {behind:.4f} mm per MPa")
 
 # %%

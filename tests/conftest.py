@@ -33,8 +33,11 @@ def shared() -> Path:
     return SHARED
 
 
-LONGEST = ("test_table.py", "test_over_ranks.py", "test_command.py", "test_examples.py", "test_notebooks.py")
-"""Files whose tests come first, so that no worker begins one of them when the others are done."""
+LONGEST = (
+    *("test_table.py", "test_over_ranks.py", "test_command.py"),
+    *("test_examples.py", "test_notebooks.py", "test_benchmarks.py"),
+)
+"""Files whose tests come first: no worker begins one when the others are done, or shares its fixtures."""
 
 
 def pytest_collection_modifyitems(items):

@@ -80,6 +80,7 @@ def test_python_of_the_readme_and_of_each_page_runs(tmp_path):
     readme = {f"README {number}": block for number, block in enumerate(python_blocks(README))}
     pages = {page: "\n".join(python_blocks(text_of(page))) for page in PAGES}
     del pages["howto/moving-material.md"]  # runs before its commands
+    assert pages.pop("index.md") in README  # which runs
     printed = run_scripts(tmp_path, readme | pages)
     (sunk,) = (printed[name] for name, block in readme.items() if "0.1322" in block)
     assert abs(float(sunk) / -0.13221477551020406 - 1) < 1e-12

@@ -70,11 +70,11 @@ def reference(wheels):
     ids=str,
 )
 def test_order_two_while_the_rate_changes(integrator, wheels, reference):
-    transient = shaken_wheel(wheels).transient(integrator=integrator)
-    free, errors = transient.equations.system.constraint_map.free, []
-    for steps in (150, 300):
+    errors = []
+    for steps in (100, 200):
         transient = shaken_wheel(wheels).transient(integrator=integrator)
         list(kl.integrate(transient, SPAN / steps, steps, every=steps))
+        free = transient.equations.system.constraint_map.free
         errors.append(np.abs(transient.u[free] - reference).max() / np.abs(reference).max())
     assert errors[1] < 4e-3
     assert 1.95 < np.log2(errors[0] / errors[1]) < 2.05
@@ -234,14 +234,14 @@ STEP = 2.0**-12
 
 
 def graded(wheels, **options):
-    """Return a wheel at 80 rad/s in motion, whose mesh is no mirror image of itself."""
+    """Return a wheel at 90 rad/s in motion, whose mesh is no mirror image of itself."""
     model = wheels.disk("8N", 2, 32)
     points = model.mesh.points.copy()
     r, angle = np.hypot(points[:, 0], points[:, 1]), np.arctan2(points[:, 1], points[:, 0])
     angle = angle + 0.4 * np.sin(angle) + 0.25 * np.sin(2 * angle + 0.7)
     points[:, :2] = np.column_stack([r * np.cos(angle), r * np.sin(angle)])
     model = elsewhere(model, points)
-    model.add(Rotation("z", rate=80.0, **options))
+    model.add(Rotation("z", rate=90.0, **options))
     e = EquationsOfMotion(model)
     model.add(kl.NodalForces(-e.system.scatter(e.inertia_load(0.0))))
     v = np.zeros_like(points)
@@ -252,14 +252,14 @@ def graded(wheels, **options):
 def test_energy_is_constant_on_a_graded_mesh(wheels):
     transient = graded(wheels)
     start = transient.energy()
-    energies = [transient.energy() for _ in kl.integrate(transient, STEP, 2000, every=250)]
-    assert np.abs(np.array(energies) / start - 1).max() < 2000 * EPS  # each step rounds once
+    energies = [transient.energy() for _ in kl.integrate(transient, STEP, 1000, every=250)]
+    assert np.abs(np.array(energies) / start - 1).max() < 1000 * EPS  # each step rounds once
 
 
 def test_energy_grows_without_the_skew_form(wheels):
     transient = graded(wheels, skew=False)
     start = transient.energy()
-    *_, _ = kl.integrate(transient, STEP, 6000, every=6000)
+    *_, _ = kl.integrate(transient, STEP, 2000, every=2000)
     assert transient.energy() > 1.05 * start
 
 

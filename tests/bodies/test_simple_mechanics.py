@@ -104,14 +104,13 @@ def test_a_pendulum_released_from_the_level(kind, integrator, h):
     body.add(kl.Gravity((0, 0, -(np.pi**2))))
     start = float(body.energy())
     m, x, longest = float(body.mass), [1.0], 0.0
-    for _ in kl.integrate(body, h, round(1.02 * PERIOD / h)):
+    for _ in kl.integrate(body, h, round(0.52 * PERIOD / h)):
         p = body.position(np.array([1.0, 0, 0]))
         longest = max(longest, abs(np.linalg.norm(p) - 1))
         x.append(float(p[0]))
-    half = len(x) // 2
-    i = half + int(np.argmax(x[half:]))
+    i = int(np.argmin(x))
     a, b, c = x[i - 1 : i + 2]
-    period = h * (i + (a - c) / (2 * (a - 2 * b + c)))
+    period = 2 * h * (i + (a - c) / (2 * (a - 2 * b + c)))
     assert longest < 1e-11
     soft = 3e-3 if kind is not kl.RigidBody else 2e-4
     assert period == pytest.approx(PERIOD, rel=soft)
@@ -179,7 +178,7 @@ def test_a_prescribed_displacement_is_met_at_every_step(kind, integrator):
     path = kl.TimeSeries([0, 0.02, 0.05], [0.0, 0.004, 0.001])
     body.constrain(kl.PrescribedDisplacement(corners[[0, 1, 2, 3]], (0, 0, 1), path))
     body.constrain(kl.PrescribedDisplacement(corners[[0, 1, 2, 3]], (1, 0, 0), lambda t: t * t))
-    for state in kl.integrate(body, 1e-3, 60):
+    for state in kl.integrate(body, 2e-3, 30):
         moved = body.position(corners[:4]) - corners[:4]
         np.testing.assert_allclose(moved[:, 2], path(state.time), atol=1e-13)
         np.testing.assert_allclose(moved[:, 0], state.time**2, atol=1e-13)
@@ -215,7 +214,7 @@ def test_prescribed_velocities_and_accelerations_are_met_at_every_step(
     body.set_velocity((start, 0, 0))
     points, unit = body.mesh.points[nodes], np.array(way) / np.linalg.norm(way)
     body.constrain(make(points, way, given))
-    for state in kl.integrate(body, 1e-3, 60):
+    for state in kl.integrate(body, 2e-3, 30):
         np.testing.assert_allclose(body.velocity(points) @ unit, expected(state.time), rtol=1e-11, atol=1e-12)
 
 

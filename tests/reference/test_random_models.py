@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.reference import rules, shapes, solid
-from tests.reference.compare import LIMIT, compare
+from tests.reference.compare import CLEAR, LIMIT, compare
 from tests.reference.problems import random_problem
 
 SEEDS = range(60)
@@ -26,7 +26,8 @@ def test_the_random_models_have_everything_that_is_to_be_compared():
     for name in ("gravity", "body_force", "prestress", "stress_free"):
         assert sum(getattr(problem, name) is not None for problem in problems) > 10, name
     assert any(len(constants) == 9 for problem in problems for *_, constants in problem.materials)
-    assert 3 <= sum("refused" in compare(seed) for seed in SEEDS[:40]) < 20
+    singular = [solid.singularity(p, solid.matrices(p)[0]) < CLEAR for p in problems[:40]]
+    assert 3 <= sum(singular) < 20
 
 
 # ---- the reference itself ----------------------------------------------------------------------------

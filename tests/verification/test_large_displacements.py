@@ -86,7 +86,7 @@ def test_an_open_cylinder_is_pulled_apart():
 def test_a_slit_annular_plate_is_lifted():
     """Sze, Liu & Lo (2004): 13.891 and 17.528 at the ends of the edge under 0.8 N/m."""
     h = 0.03
-    box = kl.box((1, 1, 1), (2, 20, 1), "Element3D20N")
+    box = kl.box((1, 1, 1), (2, 18, 1), "Element3D20N")
     s, t, z = box.points.T
     r, angle = 6 + 4 * s, 2 * np.pi * t
     mesh = box.replace(points=np.stack([r * np.cos(angle), r * np.sin(angle), h * (z - 0.5)], axis=1))
@@ -94,7 +94,7 @@ def test_a_slit_annular_plate_is_lifted():
     model.use_rule(2)
     model.fix(np.flatnonzero(t == 1), "xyz")
     model.add(kl.Traction(np.flatnonzero(t == 0), (0, 0, 0.8 / h)), amplitude=lambda t: t)
-    u = last(model, 3, tolerance=1e-4, iterations=60)
+    u = last(model, 2, tolerance=1e-4, iterations=60)
     for radial, exact in ((0, 13.891), (1, 17.528)):
         (node,) = np.flatnonzero((t == 0) & (s == radial) & (z == 0))
         assert abs(u[node, 2] / exact - 1) < 0.01
