@@ -213,7 +213,7 @@ def fichera():
 def test_edges_and_a_corner_take_few_unknowns_and_more_for_less_error():
     """Bulk marking by hand, θ = 1/2 and full solutions, took 23,070 for 5 %: 1.3 times that at most."""
     needed = []
-    for error in (0.1, 0.05):
+    for error in (0.1, 0.07, 0.05):
         report = fichera().solve(error=error).report
         assert report.error <= error
         assert all("von Mises" in text for text in report.warnings)
