@@ -76,7 +76,7 @@ def moving_subjects(body: Body, states: Any, most: int, title: str | None) -> li
     for state in (found[row] for row in evenly(len(found), most)):
         u = body.position(X, check_state_of_body(state, body).q) - X
         head = f"{title or ''}\nt = {state.time:.3f} s".strip()
-        subjects.append(Subject(body.mesh, u, None, head, marks_of(body, state.q), True))
+        subjects.append(Subject(body.mesh, u, None, head, marks_of(body, state.q), moving=True))
     return subjects
 
 

@@ -9,17 +9,16 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from kratos_lite.analysis.fields import FIELDS, Field, Fields, known
+from kratos_lite.analysis.model_picture import legend_of, marks_of_model, materials_of
 from kratos_lite.analysis.peak import place_of_node
 from kratos_lite.analysis.state import ModelInTime, State
 from kratos_lite.errors import InputError, nearest
 from kratos_lite.mesh import Mesh
-from kratos_lite.model.attachments import MARKS
 from kratos_lite.model.local_axes import LocalAxes
 from kratos_lite.model.structure import Structure
 from kratos_lite.tabular import unit_name
 from kratos_lite.typing import Array, Numbers
 from kratos_lite.validation import finite, number, short
-from kratos_lite.view.marks import Marks
 from kratos_lite.view.scene import Options, Subject, Values, factor_of
 
 DEFAULT = "von_mises"  # what colors a result
@@ -127,27 +126,11 @@ def _subject(thing: Any, given: dict[str, Any]) -> Subject:
     u = None if result is None else result.u
     if given["displacement"] is not None:
         u = finite(given["displacement"], "displacement", (mesh.n_nodes, 3))
-    marks = _marks(thing) if isinstance(thing, Structure) else None
-    return Subject(mesh, u, _values(result, mesh, u, given), marks=marks)
-
-
-def _marks(structure: Structure) -> Marks | None:
-    """Return the marks of springs, added masses and remote points; None if there are none."""
-    shown, mesh, none = structure.attachments, structure.mesh, np.zeros((0, 2, 3))
-    if not shown and not structure.remote_points:
-        return None
-    spokes = [none]
-    for point in structure.remote_points:
-        nodes = mesh.nodes(point.where)
-        some = mesh.points[nodes[np.linspace(0, len(nodes) - 1, MARKS).round().astype(int)]]
-        spokes.append(np.stack([np.broadcast_to(point.point, some.shape), some], axis=1))
-
-    def lines(mass: bool, inside: bool) -> Array:
-        some = (one.drawn(mesh) for one in shown if one.is_mass == mass and (one.to is not None) == inside)
-        return np.concatenate([none, *some])
-
-    springs = lines(mass=False, inside=False), none[:, 0], lines(mass=False, inside=True)
-    return Marks(none, *springs, lines(mass=True, inside=False)[:, 0], np.concatenate(spokes))
+    values = _values(result, mesh, u, given)
+    if not isinstance(thing, Structure):
+        return Subject(mesh, u, values)
+    values = materials_of(thing) if values is None else values
+    return Subject(mesh, u, values, marks=marks_of_model(thing), legend=legend_of(thing))
 
 
 def _values(result: Fields | None, mesh: Mesh, u: Array | None, given: dict[str, Any]) -> Values | None:

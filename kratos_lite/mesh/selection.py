@@ -28,6 +28,16 @@ SIDES = {letter + sign: (axis, end) for axis, letter in enumerate("xyz") for end
 """Names of the sides of the bounding box: axis and end."""
 
 
+def spread(X: Array, count: int) -> Ints:
+    """Return at most so many of the rows of points (n, 3): the outermost, then those farthest from these."""
+    chosen, away = list[int](), np.linalg.norm(X - X.mean(axis=0), axis=1) if len(X) else np.zeros(0)
+    while len(chosen) < min(count, len(X)) and (away.max() > 0 or not chosen):
+        chosen.append(int(away.argmax()))
+        distance = np.linalg.norm(X - X[chosen[-1]], axis=1)
+        away = distance if len(chosen) == 1 else np.minimum(away, distance)
+    return np.array(chosen, dtype=np.int64)
+
+
 def find_part(name: Any, parts: Mapping[str, Part], mesh: Cells) -> Part:
     """Return a part by its full name, a side of the bounding box, or the part whose last word the name is."""
     if not isinstance(name, str):

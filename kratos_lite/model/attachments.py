@@ -12,7 +12,7 @@ import numpy as np
 from kratos_lite.assembly.attached import Attached
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh, Where
-from kratos_lite.mesh.selection import point_of
+from kratos_lite.mesh.selection import point_of, spread
 from kratos_lite.model.remote_point import RemotePoint
 from kratos_lite.typing import Array, ArrayLike, Csr, Ints
 from kratos_lite.validation import finite, number, short
@@ -93,7 +93,7 @@ class AttachedMatrix(Attachment):
         else:
             ways = np.linalg.eigh(self.W[..., :3, :3])[1][..., -1].reshape(-1, 3)
             ways = ways * np.where(((places - X.mean(axis=0)) * ways).sum(axis=1) < 0, -1, 1)[:, None]
-        some = np.unique(np.linspace(0, len(places) - 1, MARKS).round().astype(int))
+        some = spread(places, MARKS)
         size = SHOWN * np.linalg.norm(np.ptp(X[mesh.used_nodes()], axis=0))
         ways = size * ways[some] / np.linalg.norm(ways[some], axis=1)[:, None]
         ends = places[some] + ways if other is None else other[None]

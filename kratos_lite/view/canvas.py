@@ -19,6 +19,8 @@ DPI = 150
 """Dots per inch."""
 LARGEST = 100
 """Width and height of a figure in inches."""
+PALETTE = ("#9eb8d6", "#e0b56a", "#8fbf9a", "#d59a9a", "#b8a3d1", "#c9c9c9", "#7fb8bf", "#c7c06b")
+"""Colors of materials, one after the other."""
 PREFIXED = ("m", "Pa", "N", "J", "J/m³", "m/s", "m/s²", "N m", "Hz")
 """Units that take prefixes, such as MPa; numbers in others stay with a power of ten."""
 
@@ -261,15 +263,40 @@ def _power(size: float) -> int:
     return int(np.clip(3 * np.floor(np.log10(abs(size)) / 3), -24, 24)) if size else 0
 
 
+def categories(count: int) -> Any:
+    """Return what gives 0 … count - 1 their colors."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import ListedColormap, Normalize
+
+    some = [PALETTE[i % len(PALETTE)] for i in range(count)]
+    return ScalarMappable(Normalize(-0.5, count - 0.5), ListedColormap(some))
+
+
+def legend(axes: Any, entries: Sequence[tuple[str, Any, str]]) -> None:
+    """Fill axes with a legend of markers, colors and texts that hangs down from their upper left corner."""
+    from matplotlib.lines import Line2D
+
+    lines = [Line2D([], [], ls="", marker=marker, color=color, label=text) for marker, color, text in entries]
+    style: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (0, 1), "borderaxespad": 0.0}
+    without_frame(axes).legend(handles=lines, frameon=False, fontsize=8, handletextpad=0.2, **style)
+
+
 # ---- what is drawn ---------------------------------------------------------------------------------
 
 
-def polygons(axes: Any, corners: Array, colors: Array, widths: Any = 0.45) -> Any:
+def shaded(color: str, light: Array) -> Array:
+    """Return a color under light (m,), (m, 4)."""
+    from matplotlib.colors import to_rgb
+
+    return np.column_stack([light[:, None] * to_rgb(color), np.ones(len(light))])
+
+
+def polygons(axes: Any, corners: Array, colors: Array, widths: Any = 0.45, zorder: float = 2) -> Any:
     """Draw flat polygons (m, k, 2) in their order, each edged in its own color (m, 4)."""
     from matplotlib.collections import PolyCollection
 
     flat: Any = corners
-    style: Any = {"facecolors": colors, "edgecolors": colors, "linewidths": widths, "zorder": 2}
+    style: Any = {"facecolors": colors, "edgecolors": colors, "linewidths": widths, "zorder": zorder}
     return axes.add_collection(PolyCollection(flat, **style), autolim=False)
 
 

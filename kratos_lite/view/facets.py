@@ -113,7 +113,7 @@ def _of_block(body: _Body, block: Block, kinds: Ints) -> tuple[Array, Array, Arr
     P = np.einsum("pa,mad->mpd", N, x[block.nodes])[:, corners].reshape(-1, 4, 3)
     normal = _normals(P)
     front = normal @ rows[2] > EDGE_ON
-    light = _light(normal[front], rows)
+    light = lit(normal[front], rows)
     value = _values(block.nodes, block.ids, body, N[corners].mean(axis=1))[front]
     facing = front.reshape(len(block), len(corners)).any(axis=1)
     edges, beyond, ink = _edges(body, block, kinds, facing)
@@ -168,7 +168,7 @@ def _of_cut(body: _Body, plane: Plane, block: Block, start: int) -> tuple[Array,
     value = values[start + cells] if per_cell and values is not None else corners[..., 3].mean(axis=1)
     normal = _normals(P)
     normal *= np.where(normal @ rows[2] < 0, -1.0, 1.0)[:, None]
-    return P, _light(normal, rows), value, E, np.tile(INK[LINE], (len(E), 1))
+    return P, lit(normal, rows), value, E, np.tile(INK[LINE], (len(E), 1))
 
 
 def _values(nodes: Numbers, parents: Ints, body: _Body, N: Array) -> Array:
@@ -185,7 +185,8 @@ def _normals(P: Array) -> Array:
     return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
 
 
-def _light(normal: Array, rows: Array) -> Array:
+def lit(normal: Array, rows: Array) -> Array:
+    """Return the brightness (m,), 0 … 1, of facets with unit normals (m, 3)."""
     towards = normal @ (LIGHT @ rows) / np.linalg.norm(LIGHT)
     return AMBIENT + (1 - AMBIENT) * (1 + towards) / 2
 

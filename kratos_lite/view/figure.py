@@ -97,8 +97,9 @@ def _laid_out(
     for number, axes in enumerate(panels):
         line, column = divmod(number, columns)
         canvas.move(axes, (column * step[0], -line * step[1]))
-    if scene.colors is not None:
+    if scene.colors is not None and not any(s.values and s.values.names for s in scene.subjects):
         _place_bar(figure, scene)
+    _place_legend(figure, scene)
     _place_title(figure, options.title)
     canvas.fit(figure)
     return figure, panels
@@ -121,6 +122,16 @@ def _place_bar(figure: Any, scene: Scene) -> None:
     extend = {(True, True): "both", (True, False): "min", (False, True): "max"}.get((below, above), "neither")
     bar = canvas.axes_in_inches(figure, place, size)
     canvas.color_bar(bar, scene.colors, values[0].unit, extend, upright=upright)
+
+
+def _place_legend(figure: Any, scene: Scene) -> None:
+    """Draw what marks and colors stand for beneath what is there."""
+    named = next((s.values.names for s in scene.subjects if s.values and s.values.names), ())
+    entries = [("s", scene.colors.to_rgba(i), name) for i, name in enumerate(named)]
+    entries += dict.fromkeys(entry for subject in scene.subjects for entry in subject.legend)
+    if entries:
+        (x0, y0), _ = canvas.bounds(figure)
+        canvas.legend(canvas.axes_in_inches(figure, (x0, y0 - 0.25), (0.1, 0.1)), entries)
 
 
 def _place_title(figure: Any, title: str) -> None:
@@ -146,8 +157,8 @@ def draw_body(axes: Any, scene: Scene, subject: Subject, inch: float, most: int 
     )
     colors = colored(facets, None if values is None else scene.colors)
     drawn.append(draw_facets(axes, scene.rows, facets, colors))
-    for artist in drawn:
-        artist.set_clip_on(scene.zoom is not None)
     if subject.marks is not None:
         drawn += draw_marks(axes, scene.rows, subject.marks, inch)
+    for artist in drawn:
+        artist.set_clip_on(scene.zoom is not None)
     return drawn

@@ -13,7 +13,7 @@ from kratos_lite.mesh import Mesh, mask_of
 from kratos_lite.typing import Array, Ints, Mask
 from kratos_lite.view import canvas
 from kratos_lite.view.camera import View, box_corners, rows_of, window_of
-from kratos_lite.view.marks import Marks
+from kratos_lite.view.marks import Entry, Marks
 from kratos_lite.view.plane import Plane, plane_of
 from kratos_lite.view.rulers import rounded
 
@@ -44,7 +44,8 @@ class Subject:
     u: Array | None = None  # (n, 3) m, displacement; None of what has none
     values: Values | None = None  # what colors it
     title: str = ""  # above the picture
-    marks: Marks | None = None  # what holds it
+    marks: Marks | None = None  # what holds and pushes it
+    legend: Sequence[Entry] = ()  # what the marks stand for
     moving: bool = False  # whether it moves through space, so that its first place is none to show
 
     @property
@@ -149,6 +150,8 @@ def colors_of(subjects: Sequence[Subject], clim: tuple[float, float] | None) -> 
     values = [(subject.values, subject.rows()) for subject in subjects if subject.values is not None]
     if not values:
         return None
+    if any(v.names for v, _ in values):
+        return canvas.categories(max(len(v.names) for v, _ in values))
     log = all(v.log for v, _ in values)
     if clim is None:
         numbers = np.concatenate([v.numbers[rows] for v, rows in values])

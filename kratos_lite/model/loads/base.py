@@ -26,6 +26,9 @@ T = TypeVar("T")
 OfPlace: TypeAlias = "Callable[[Array], ArrayLike]"
 """A function of places (m, 3) in m."""
 
+Drawn: TypeAlias = "tuple[Array, Array, str]"
+"""Places, vectors, and their arrows: ``on`` the surface from outside, ``from`` a place, ``about`` an axis."""
+
 MOST_CHANGE = 0.01
 """Of the forces of a function, by the next quadrature rule; more is a warning."""
 DEEPEST = 8
@@ -83,6 +86,11 @@ class Load(ABC):
     def acting(self, time: float) -> Sequence[tuple[float, Load]]:
         """Return the loads that this one is at a time in s, each with a factor."""
         return [(1.0, self)]
+
+    def drawn(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> list[Drawn]:
+        """Return places (k, 3) in m, vectors (k, 3) there, and how arrows show these."""
+        nodes, forces = self.on_nodes(mesh, groups)
+        return [(mesh.points[nodes], forces, "on")]
 
     def follow(self, mesh: Mesh, x: Array) -> Iterator[tuple[Rows, Array, Array]]:
         """Yield what the load changes on a body that is deformed, and no small displacements are assumed.
@@ -232,6 +240,10 @@ class TimeDependentLoad(Load):
             )
         return load
 
+    def drawn(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> list[Drawn]:
+        """Return what shows the load at the time 0, without its amplitude."""
+        return [some for _, load in self.acting(0.0) for some in load.drawn(mesh, groups)]
+
     def acting(self, time: float) -> Sequence[tuple[float, Load]]:
         """Return the load at a time in s with the factor 1; nothing where nothing acts."""
         load = self.at(time)
@@ -314,6 +326,8 @@ class InTime(Generic[T]):
 def _shown(value: Any) -> str:
     """Return a value of a load in a few words."""
     if isinstance(value, np.ndarray):
+        if not value.ndim:
+            return f"{value:g}"
         return f"({', '.join(f'{x:g}' for x in value)})" if value.shape == (3,) else f"array {value.shape}"
     return getattr(value, "__name__", "a function") if callable(value) else short(value)
 

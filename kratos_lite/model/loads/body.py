@@ -11,12 +11,15 @@ from kratos_lite.assembly import gauss_point_fields
 from kratos_lite.assembly.element_groups import ElementGroup, add_nodal
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh, WhereElements, mask_of
-from kratos_lite.model.loads.base import DistributedLoad, OfPlace, is_of_places, placed, vectors
+from kratos_lite.model.loads.base import DistributedLoad, Drawn, OfPlace, is_of_places, placed, vectors
 from kratos_lite.model.local_axes import LocalAxes
 from kratos_lite.typing import Array, ArrayLike, Ints
 
 if TYPE_CHECKING:
     from kratos_lite.mesh.refined_mesh import RefinedMesh
+
+RESULTANT = 1e-6
+"""Square of a resultant, beside the sum of those of its forces, up to which it is none."""
 
 
 class BodyForce(DistributedLoad):
@@ -68,6 +71,15 @@ class BodyForce(DistributedLoad):
             elif force.any():
                 total += gauss_point_fields.body_force(points, part, scale * force)
         return np.arange(len(total)), total
+
+    def drawn(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> list[Drawn]:
+        """Return the resultant at its center: of weight, that of mass; without one, the forces of nodes."""
+        forces = self.integral(mesh, groups, self.factors)[1]
+        total = forces.sum(axis=0)
+        weights = forces @ total
+        if weights.sum() <= RESULTANT * (forces**2).sum():
+            return super().drawn(mesh, groups)
+        return [((weights @ mesh.points / weights.sum())[None], total[None], "from")]
 
     def _checked_force(self, mesh: Mesh) -> Any:
         """Return the force as an array, or a function of places that is checked."""

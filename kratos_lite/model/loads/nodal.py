@@ -12,7 +12,7 @@ from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.mesh import Mesh, Where
 from kratos_lite.mesh.blocks import without_repeats
 from kratos_lite.mesh.selection import ONE_PLACE, near, nodes_at, point_of
-from kratos_lite.model.loads.base import Load, nodal, vectors
+from kratos_lite.model.loads.base import Drawn, Load, nodal, vectors
 from kratos_lite.model.local_axes import LocalAxes
 from kratos_lite.typing import Array, ArrayLike, Ints
 from kratos_lite.validation import flag, short
@@ -98,6 +98,12 @@ class PointLoad(Load):
         if mesh.whole and not len(nodes):
             raise ModelError(f"a point load finds no node in {self.where!r}")
         return nodes, np.broadcast_to(self._at(mesh.points[nodes]), (len(nodes), 3))
+
+    def drawn(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> list[Drawn]:
+        """Return the force on its point, or those on its nodes."""
+        if self._point is None:
+            return super().drawn(mesh, groups)
+        return [(self._point[None], self._at(self._point)[None], "on")]
 
     def _at(self, points: Array) -> Array:
         """Return the force along x y z at points (..., 3) in m."""

@@ -25,6 +25,7 @@ from kratos_lite.mesh.blocks import NO_ROWS, select, without_repeats
 from kratos_lite.mesh.refined_mesh import RefinedMesh
 from kratos_lite.model.loads.base import (
     DistributedLoad,
+    Drawn,
     Load,
     OfPlace,
     at_places,
@@ -61,6 +62,11 @@ class FaceLoad(DistributedLoad):
     def on_nodes(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> tuple[Ints, Array]:
         """Return nodes (k,), face by face, and the forces (k, 3) in N there."""
         return self.integral(mesh, groups, self.factors)
+
+    def drawn(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> list[Drawn]:
+        """Return the mean traction of each face."""
+        faces = loaded_faces(mesh, self.where, self.what, self.cells)
+        return _means(mesh, zip(faces, self.on_faces(mesh, faces, self.factors), strict=True))
 
     def by_coordinates(self, mesh: Mesh, groups: Sequence[ElementGroup], v: Array) -> Array:
         """Return the derivative (n, 3) in N of v·f by the nodes; ModelError of a function of places."""
@@ -254,6 +260,24 @@ class Resultant(FaceLoad):
         traction = self._traction(mesh, X, dA)
         return [surface_load(b.known_shape, mesh.points[b.nodes], traction, factors) for b in faces]
 
+    def drawn(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> list[Drawn]:
+        """Return the force on its point, and the moment about it."""
+        if self.about is not None:
+            point, way = self.about, "from"
+        elif self._nodes:
+            point, way = mesh.points[without_repeats(mesh.nodes(self.where))].mean(axis=0), "on"
+        else:
+            faces = loaded_faces(mesh, self.where, self.what)
+            X, dA = (np.concatenate(v) for v in zip(*_points_of(mesh, faces, self.factors), strict=True))
+            point, way = dA @ X / dA.sum(), "on"
+        force, moment = self._at(point)[:, None]
+        return [(point[None], force, way), (point[None], moment, "about")]
+
+    def _at(self, point: Array) -> Array:
+        """Return force and moment (2, 3) along x y z on a point."""
+        both = np.array([self.force, self.moment])
+        return both if self.local is None else self.local.globally(both, [point] * 2)
+
     def _traction(self, mesh: Mesh, X: Array, dA: Array) -> Callable[[Array], Array]:
         """Return the traction at places (..., 3), from points (k, 3) that stand for areas (k,)."""
         if not mesh.whole:
@@ -262,9 +286,7 @@ class Resultant(FaceLoad):
         arms = X - center
         inertia = (dA * (arms**2).sum(axis=1)).sum() * np.eye(3) - (dA * arms.T) @ arms
         arm = np.zeros(3) if self.about is None else self.about - center
-        force, moment = self.force, self.moment
-        if self.local is not None:
-            force, moment = self.local.globally([force, moment], [center + arm] * 2)
+        force, moment = self._at(center + arm)
         moment = moment + np.cross(arm, force)
         turn = np.linalg.pinv(inertia, rcond=1e-12, hermitian=True) @ moment
         if np.abs(inertia @ turn - moment).max() > 1e-9 * np.abs(moment).max():
@@ -326,6 +348,16 @@ class ConditionLoads(Load):
     def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
         """Return the nodal forces (n, 3) in N."""
         total = np.zeros_like(mesh.points)
+        for block, forces in self._on_conditions(mesh):
+            add_nodal(total, block.nodes, forces)
+        return total
+
+    def drawn(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> list[Drawn]:
+        """Return the mean traction of each condition."""
+        return _means(mesh, self._on_conditions(mesh))
+
+    def _on_conditions(self, mesh: Mesh) -> Iterator[tuple[Block, Array]]:
+        """Yield conditions and the forces (m, k, 3) in N on their nodes."""
         for block, at in with_rows(mesh.conditions):
             on_face = block.shape is not None and block.shape.cell in SURFACES
             if block.shape is None and (self.force[at].any() or self.pressure[at].any()):
@@ -337,11 +369,10 @@ class ConditionLoads(Load):
             X = mesh.points[block.nodes]
             force = self.force[at, None, :] + self.nodal_force[block.shape.cell][block.nodes]
             if force.any():
-                add_nodal(total, block.nodes, surface_load(block.shape, X, force))
+                yield block, surface_load(block.shape, X, force)
             pressure = self.pressure[at, None] + self.nodal_pressure[block.nodes]
             if on_face and pressure.any():
-                add_nodal(total, block.nodes, surface_pressure(block.shape, X, pressure))
-        return total
+                yield block, surface_pressure(block.shape, X, pressure)
 
     def refined(self, finer: RefinedMesh) -> Load:
         """Return the loads on a finer mesh: conditions keep those of their parents, nodes interpolate."""
@@ -358,6 +389,16 @@ def _pressed(block: Block, mesh: Mesh, x: Array, p: Array) -> tuple[Rows, Array,
     shape, nodes = block.known_shape, block.nodes
     more = surface_pressure(shape, x[nodes], p) - surface_pressure(shape, mesh.points[nodes], p)
     return nodes, more, surface_pressure_tangent(shape, x[nodes], p)
+
+
+def _means(mesh: Mesh, loaded: Iterable[tuple[Block, Array]]) -> list[Drawn]:
+    """Return the middles of faces, and the forces (m, k, 3) on their nodes per area; of lines, per length."""
+    drawn: list[Drawn] = []
+    for block, forces in loaded:
+        X = mesh.points[block.nodes]
+        size = surface_load(block.known_shape, X, np.eye(3)[0]).sum(axis=(1, 2))
+        drawn.append((X.mean(axis=1), forces.sum(axis=1) / size[:, None], "on"))
+    return drawn
 
 
 def _points_of(mesh: Mesh, faces: Sequence[Block], factors: int) -> Iterator[tuple[Array, Array]]:
