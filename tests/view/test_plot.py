@@ -168,6 +168,8 @@ def test_extremes_are_marked_with_their_place_and_number():
     found = {line.get_marker(): line.get_xydata()[0].tolist() for line in figure.axes[0].lines}
     assert found["^"] == [4, 1]
     assert found["v"] == [0, 0]
+    numbers[0] = 1e-9
+    assert any("▼ 0 Pa at node 100" in text for text in words(kl.plot(mesh, values=numbers, unit="Pa")))
     of_elements = kl.plot(mesh, values=np.arange(4.0), view="y-")
     assert any("at element 4, (3.5, 0.5, 0.5) m" in text for text in words(of_elements))
     assert not [text for text in words(kl.plot(mesh, values=np.ones(20))) if "▲" in text]
