@@ -11,8 +11,8 @@ from kratos_lite.errors import ModelError
 from kratos_lite.mesh import Mesh, distinct
 from kratos_lite.mesh.selection import spread
 from kratos_lite.model.attachments import MARKS, SHOWN
-from kratos_lite.model.loads.temperature import Temperature
 from kratos_lite.model.loads.base import Drawn, Load
+from kratos_lite.model.loads.temperature import Temperature
 from kratos_lite.model.loads.together import joined
 from kratos_lite.model.structure import Structure
 from kratos_lite.model.supports import AXES, DirichletCondition, axis_numbers
@@ -39,7 +39,7 @@ def materials_of(structure: Structure) -> Values | None:
     if not (of >= 0).any():
         return None
     numbers = np.zeros(len(of))
-    for i in distinct(of):
+    for i in sorted(distinct(of), key=lambda i: (i < 0, i)):
         name = in_units(str(structure._materials[i]), structure.units) if i >= 0 else "no material"
         numbers[of == i] = named.setdefault(_cut(name), len(named))
     return Values(numbers, names=tuple(named))
@@ -111,10 +111,15 @@ class _Surface:
 
     def outwards(self, X: Array, ways: Array) -> Array:
         """Return along ways (k, 3) at places (k, 3), > 0 where these lead out of the body."""
-        near = [int(((self._points - x) ** 2).sum(axis=1).argmin()) for x in X]
-        found = (self._normals[near] * ways).sum(axis=1)
-        sizes = np.linalg.norm(self._normals[near], axis=1) * np.linalg.norm(ways, axis=1)
+        normals = np.array([self._normal(x) for x in X]).reshape(-1, 3)
+        found = (normals * ways).sum(axis=1)
+        sizes = np.linalg.norm(normals, axis=1) * np.linalg.norm(ways, axis=1)
         return np.where(np.abs(found) > 1e-6 * sizes, found, 0.0)
+
+    def _normal(self, x: Array) -> Array:
+        """Return the sum (3,) of the normals of the nodes that are nearest to a place."""
+        away = ((self._points - x) ** 2).sum(axis=1)
+        return np.asarray(self._normals[away <= (1 + 1e-6) * away.min()].sum(axis=0))
 
     def arrows(self, kind: str, drawn: list[tuple[Array, Array]]) -> Array:
         """Return tails and heads (k, 2, 3) of some vectors at places, the longest as `SHOWN` says."""

@@ -69,10 +69,10 @@ def plot(
         elevation of the viewer in degrees; or the direction towards the viewer, (3,).  If not given, ``iso``,
         and more from the side for long and thin bodies.
     clim : lowest and highest value of the colors, in the unit of the values without a prefix (Pa, not MPa);
-        those of the body if not given.
+        if not given, those of the body but for half a percent at each end that takes much of the range.
     scale : factor on the displacement, 0 for the undeformed body; ``auto``: at least 1, the largest being a
         tenth of the body.
-    zoom : factor, a part or a box ((x, y, z), (x, y, z)) that fills the picture.
+    zoom : factor, a part, which is outlined, or a box ((x, y, z), (x, y, z)) that fills the picture.
     clip : plane that cuts the body open, ``("x", 0.5)`` or (normal, offset), in m, of the undeformed body;
         what lies between it and the viewer is taken away.
     title, titles : above the picture; above each of several.

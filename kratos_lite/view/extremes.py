@@ -15,6 +15,8 @@ from kratos_lite.view.scene import Scene, Subject, place_text
 
 SYMBOLS = (("▲", "^"), ("▼", "v"))
 """Of the largest and the smallest, in texts and in the picture."""
+ROUNDING = 1e-12
+"""Size of a value, beside the largest, up to which it is said as 0."""
 LETTER = 0.07
 """Inches, width of a letter."""
 
@@ -34,7 +36,8 @@ def texts(subject: Subject, width: float) -> list[str]:
     for row, (symbol, _) in zip(extremes(subject), SYMBOLS, strict=False):
         assert values is not None
         what, ids = ("node", mesh.node_ids) if subject.is_nodal else ("element", mesh.element_ids)
-        number = canvas.number_text(values.numbers[row], values.unit)
+        value, largest = values.numbers[row], np.abs(values.numbers).max()
+        number = canvas.number_text(value if abs(value) > ROUNDING * largest else 0.0, values.unit)
         where = f"{place_text(_place(subject, mesh.points, row))} {unit_name('m', mesh.units)}"
         long.append(f"{symbol} {number} {values.kind}".rstrip() + f" at {what} {ids[row]}, {where}")
         brief.append(f"{symbol} {number}, {what} {ids[row]}")

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
+from kratos_lite.analysis import model_picture
 from kratos_lite.analysis.subjects import nodal_values
 from kratos_lite.shapes import SHAPES
 from kratos_lite.view.camera import OBLIQUE, VIEWS, rows_of, window_of
@@ -70,6 +71,159 @@ def test_springs_masses_and_remote_points_of_a_model_are_marked():
     assert {(1.0, 1.0), (5.0, 0.5)} <= set(dots)
     spokes = [line for line in lines if line.shape == (2, 2) and (line[0] == (5.0, 0.5)).all()]
     assert {tuple(spoke[1]) for spoke in spokes} == {(4.0, 0.0), (4.0, 1.0)}
+
+
+def marked(model):
+    return model_picture.marks_of_model(model)
+
+
+def test_supports_point_at_held_nodes_from_outside_along_the_axes_that_hold_them():
+    model = kl.Model(kl.box((4, 1, 1), (4, 1, 1)), STEEL)
+    model.fix("x-", "x")
+    model.fix("z+", "z")
+    lines = marked(model).supports
+    size = 0.1 * np.sqrt(18) * model_picture.CONE
+    along = lines[:, 1] - lines[:, 0]
+    on_x = lines[:, 1, 0] == 0
+    clamp = np.abs(along - [size, 0, 0]).max(axis=1) < 1e-12
+    roller = np.abs(along - [0, 0, -size]).max(axis=1) < 1e-12
+    assert (clamp | roller).all()
+    assert clamp.sum() == 4
+    assert on_x[clamp].all()
+    assert (lines[roller, 1, 2] == 1).all()
+
+
+def test_a_support_that_is_released_has_no_mark():
+    model = kl.Model(kl.box((4, 1, 1), (4, 1, 1)), STEEL)
+    model.fix("x-")
+    model.release("x-", "yz")
+    along = np.diff(marked(model).supports, axis=1)
+    assert along.shape == (4, 1, 3)
+    assert not along[..., 1:].any()
+
+
+@pytest.mark.parametrize(
+    ("load", "places", "way", "tip"),
+    [
+        (kl.Pressure("z+", 1e5), 4, (0, 0, -1), True),
+        (kl.Pressure("z+", -1e5), 4, (0, 0, 1), False),
+        (kl.Traction("x+", (0, 0, 2.0)), 1, (0, 0, 1), False),
+        (kl.PointLoad((4.0, 1, 1), (-3.0, 0, 0)), 1, (-1, 0, 0), True),
+        (kl.Resultant("x+", (5.0, 0, 0)), 1, (1, 0, 0), False),
+        (kl.Gravity((0, 0, -9.81)), 1, (0, 0, -1), False),
+        (kl.Temperature(50.0), 0, (0, 0, 0), True),
+    ],
+)
+@pytest.mark.parametrize("element", ["8N", "20N"])
+def test_arrows_of_loads(load, places, way, tip, element):
+    """The longest is a tenth of the body; what pushes ends on the surface, what pulls starts there."""
+    model = kl.Model(kl.box((4, 1, 1), (4, 1, 1), f"KinematicLinear3D{element}"), STEEL)
+    model.add(load, amplitude=lambda t: t)  # shown, though it is 0 at the time 0
+    arrows = marked(model).loads
+    assert len(arrows) == places
+    along = arrows[:, 1] - arrows[:, 0]
+    assert np.abs(along - 0.1 * np.sqrt(18) * np.array(way)).max(initial=0.0) < 1e-12
+    places = np.sort(arrows[:, int(tip)], axis=0)
+    exact = {"z+": [(x, 0.5, 1) for x in (0.5, 1.5, 2.5, 3.5)], "x+": [(4, 0.5, 0.5)]}.get(
+        getattr(load, "where", None) if isinstance(getattr(load, "where", None), str) else "", [(2, 0.5, 0.5)]
+    )
+    if not isinstance(load, (kl.PointLoad, kl.Temperature)):
+        assert np.abs(places - exact).max() < 1e-9
+
+
+def test_moments_and_many_loads_have_arrows():
+    model = kl.Model(kl.box((4, 1, 1), (4, 4, 4)), STEEL)
+    model.add(kl.Resultant("x+", (0, 0, 0), moment=(0, 2.0, 0)))
+    moments = marked(model).moments
+    assert np.abs(moments - [[(4, 0.5, 0.5), (4, 0.5 + 0.1 * np.sqrt(18), 0.5)]]).max() < 1e-12
+    for x in model.mesh.points[model.mesh.nodes("z+")]:
+        for _ in range(3):
+            model.add(kl.PointLoad(x, (0, 0, -1.0)))
+    assert 0 < len(marked(model).loads) <= (model_picture.ALONE + 1) * 9
+
+
+def test_materials_have_colors_and_a_legend():
+    mesh = kl.box((4, 1, 1), (4, 1, 1))
+    model = kl.Model(mesh)
+    assert model_picture.materials_of(model) is None
+    soft = kl.Isotropic3D(E=1e9, nu=0.3)
+    model.assign(STEEL, [0, 1])
+    model.assign(soft, [2])
+    values = model_picture.materials_of(model)
+    assert [values.names[int(i)] for i in values.numbers] == [str(STEEL)] * 2 + [str(soft), "no material"]
+    model.fix("x-")
+    model.add(kl.Temperature(20.0), name="oven")
+    figure = model.plot()
+    said = [t.get_text() for t in figure.axes[-1].get_legend().get_texts()]
+    assert said[:4] == [str(STEEL), str(soft), "no material", "x-, xyz = 0 m"]
+    assert said[4].startswith("oven: Temperature(values=20")
+
+
+def test_extremes_are_marked_with_their_place_and_number():
+    mesh = kl.box((4, 1, 1), (4, 1, 1))
+    mesh = kl.Mesh(mesh.points, mesh.blocks, node_ids=100 + np.arange(20))
+    numbers = np.linspace(1.0, 2.0, 20) * 1e6
+    figure = kl.plot(mesh, values=numbers, unit="Pa", view="y-")
+    assert "▲ 2 MPa at node 119, (4, 1, 1) m\n▼ 1 MPa at node 100, (0, 0, 0) m" in words(figure)
+    found = {line.get_marker(): line.get_xydata()[0].tolist() for line in figure.axes[0].lines}
+    assert found["^"] == [4, 1]
+    assert found["v"] == [0, 0]
+    numbers[0] = 1e-9
+    assert any("▼ 0 Pa at node 100" in text for text in words(kl.plot(mesh, values=numbers, unit="Pa")))
+    of_elements = kl.plot(mesh, values=np.arange(4.0), view="y-")
+    assert any("at element 4, (3.5, 0.5, 0.5) m" in text for text in words(of_elements))
+    assert not [text for text in words(kl.plot(mesh, values=np.ones(20))) if "▲" in text]
+
+
+def test_recovered_values_say_so(result):
+    numbers = nodal_values(result, "von_mises").numbers
+    text = f"▲ {numbers.max() / 1e6:.4g} MPa recovered at node {result.mesh.node_ids[numbers.argmax()]}, "
+    assert any(text in found for found in words(result.plot()))
+
+
+def test_a_few_singular_nodes_do_not_own_the_colors():
+    mesh = kl.box((9, 9, 9), (9, 9, 9))
+    numbers = np.linspace(0, 100, 1000)
+    assert np.abs(bar(kl.plot(mesh, values=numbers))[0] - [0, 100]).max() == 0
+    peaked = numbers.copy()
+    peaked[-3:] = 4000.0, 4500.0, 5000.0
+    figure = kl.plot(mesh, values=peaked)
+    assert bar(figure)[0][1] < 100
+    assert any("▲ 5000 at node 1000, " in text for text in words(figure))
+    assert np.abs(bar(kl.plot(mesh, values=peaked, clim=(0, 5000)))[0] - [0, 5000]).max() == 0
+    rare = np.where(numbers > 99.9, 1.0, 0.0)  # all others are one value: nothing would be seen
+    assert np.abs(bar(kl.plot(mesh, values=rare))[0] - [0, 1]).max() == 0
+
+
+@pytest.mark.parametrize(("point", "strengths"), [(0.1, {0.75}), (1.0, set())])
+def test_lines_of_the_mesh_fade_where_they_are_dense_and_sharp_edges_stay(point, strengths):
+    """A point is that many m in the picture; cells are 1 m."""
+    mesh = kl.box((9, 9, 9), (9, 9, 9))
+    found = facets_of(mesh, mesh.points, None, rows_of("iso", mesh.points), point=point)
+    sharp = found.ink[:, 4] == 0.9
+    assert set(found.ink[~sharp, 3]) == strengths
+    assert np.abs(np.linalg.norm(np.diff(found.edges[sharp], axis=1), axis=2).sum() - 9 * 9) < 1e-9
+
+
+def test_a_part_that_is_zoomed_to_is_outlined():
+    mesh = kl.box((4, 1, 1), (4, 2, 2))
+    part = np.isin(np.arange(mesh.n_nodes), mesh.nodes("x+"))
+    found = facets_of(mesh, mesh.points, None, rows_of("iso", mesh.points), part=part)
+    red = found.edges[found.ink[:, 0] > 0.5]
+    assert (red[..., 0] == 4).all()
+    assert np.abs(np.linalg.norm(np.diff(red, axis=1), axis=2).sum() - 4) < 1e-9
+
+
+def test_lengths_are_in_the_units_of_the_mesh_and_modes_have_none():
+    model = kl.Model(
+        kl.box((400, 50, 50), (4, 1, 1)), kl.Isotropic3D(E=2e5, nu=0.3, density=8e-9), units="mm N MPa t"
+    )
+    model.fix("x-")
+    model.add(kl.Traction("x+", (0, 0, -1.0)))
+    assert bar(model.solve().plot(values="uz"))[1] == "mm"
+    shapes = model.modes(1)[1]
+    assert bar(model.plot(modes=shapes[0]))[1] == "(normalized)"
+    assert "(normalized)" in bar(model.plot(modes=shapes[0], values="uz"))[1]
 
 
 # ---- values ----------------------------------------------------------------------------------------

@@ -58,7 +58,8 @@ class _Cases(Building):
         while steps:
             kind, many = steps[0].kind, self._takes_time(steps[0])
             alike = list(takewhile(lambda step: step.kind == kind, steps)) if many else steps[:1]  # noqa: B023
-            cases.append((getattr(self, f"_{kind.lower()}")(*alike), alike))
+            with naming(f"{steps[0].card.place}: *STEP"):  # what is known of no other line
+                cases.append((getattr(self, f"_{kind.lower()}")(*alike), alike))
             steps = steps[len(alike) :]
         for case, _ in cases:
             case.files = [self.deck.path]
