@@ -39,8 +39,8 @@ class SolveError(KratosLiteError):
 def installing(extra: str) -> str:
     """Return the command that installs an extra: before a release from a clone of the source.
 
-    >>> installing("page")
-    'pip install -e ".[page]" in a clone of kratos_lite'
+    >>> installing("view")
+    'pip install -e ".[view]" in a clone of kratos_lite'
     """
     return f'pip install -e ".[{extra}]" in a clone of kratos_lite'
 

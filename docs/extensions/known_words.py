@@ -14,11 +14,10 @@ from kratos_lite.io.kratos import (
     eigenvalues,
     expected_values,
     expressions,
+    keys,
     motion,
     processes,
     properties,
-    run_file,
-    time_dependent,
 )
 from kratos_lite.io.kratos.outputs import OUTPUT_PROCESSES
 from kratos_lite.io.kratos.variables import LOADING
@@ -84,8 +83,8 @@ TABLES: dict[str, Callable[[], list[str]]] = {
     "loading": lambda: [_code(sorted(LOADING))],
     "processes": _processes,
     "functions": lambda: [_code(sorted(expressions._FUNCTIONS))],
-    "solver_settings": lambda: [_code(sorted(run_file.HARMLESS))],
-    "dynamic": lambda: [_code(time_dependent.DYNAMIC_KEYS)],
+    "solver_settings": lambda: [_code(sorted(keys.SOLVER.keys() - keys.ELSEWHERE.keys()))],
+    "dynamic": lambda: [_code(keys.IN_TIME)],
     "eigenvalues": lambda: [
         _code(eigenvalues.EIGEN_KEYS),
         "",
