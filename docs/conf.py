@@ -86,7 +86,7 @@ mathjax_path = "tex-svg-full.js"
 _mathjax = next(file for file in files("sphinx-mathjax-offline") or [] if file.name == mathjax_path)
 html_static_path = ["_static", str(_mathjax.locate())]
 html_css_files = ["site.css"]
-html_search_scorer = "extensions/scorer.js"
+html_search_scorer = str(DOCS / "extensions" / "scorer.js")
 
 # ---- links to other sites: python -m sphinx -b linkcheck docs build/links --------------------------
 
