@@ -91,6 +91,30 @@ def test_modes_are_those_of_the_supports_of_the_last_step(tmp_path, interval, st
     assert stretches.sum() == (2 if held else 3)
 
 
+@pytest.mark.parametrize("option", ["modes", "buckling"])
+def test_modes_and_buckling_of_several_steps_are_those_at_their_end(tmp_path, run, option):
+    """The same file in one step says at once what holds and loads the cube at its end."""
+    push = process(
+        "assign_vector_variable_process", "Structure.Top", "VOLUME_ACCELERATION",
+        constrained=False, value=[0.0, "t", "-3.0*t"],
+    )  # fmt: skip
+    told = []
+    for step in (0.5, 2.0):
+        path = cube(tmp_path, [("-0.001*t", [1.0, "End"])], **ELASTIC, step=step, end=2.0)
+        content = json.loads(path.read_text())
+        supports = content["processes"]["constraints_process_list"]
+        supports.append(json.loads(json.dumps(supports[0])))
+        supports[-1]["Parameters"] |= {"model_part_name": "Structure.Body", "interval": [0.5, 0.5]}
+        content["processes"]["loads_process_list"] = [push]
+        told.append(run("solve", write(tmp_path, content), f"--{option}", "2").out.splitlines())
+    steps, once = told
+    assert len(once) >= 3
+    assert steps[:3] == once[:3]
+    assert any("those at t = 2 s, the end of the steps" in line for line in steps)
+    rows = run("info", path).out + run("info", cube(tmp_path, [], **ELASTIC)).out
+    assert "function" not in rows
+
+
 def test_outputs_of_modes_are_omitted_with_a_note(tmp_path, run):
     path = cube(tmp_path, [], [output("vtk")], **ELASTIC, **MODES)
     text = "processes.checks[0]: vtk_output_process writes nothing: modes are written by -o OUT"
