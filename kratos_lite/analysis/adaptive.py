@@ -50,6 +50,8 @@ ROUGH, ROUGH_FRACTION = 1e-5, 1e-3
 """Relative residual of the meshes on the way at most, and as a fraction of the requested error."""
 FAIR = 1e-3  # fraction of the forces that such a mesh may miss to equilibrium; beyond it is solved in full
 STEPS = 25  # meshes after which the accuracy counts as out of reach
+LAST, HOPELESS = 4, 1e12
+"""Unknowns from which the accuracy counts as out of reach, by the rate of so many of the last meshes."""
 SCANT = 0.05  # of a step that there must be room for
 BYTES = 6000  # that an unknown may need; the largest mesh is one that fits into what is free
 
@@ -84,8 +86,7 @@ def solve_to(
     rough = max(tolerance, min(ROUGH, ROUGH_FRACTION * aim))
     warnings = [] if geometry else curved(model.mesh)
     while True:
-        begin = perf_counter()
-        analysis = StaticAnalysis(model, solver, tolerance, progress)
+        begin, analysis = perf_counter(), StaticAnalysis(model, solver, tolerance, progress)
         result = _solved(analysis, start, rough, seconds)
         before, known = level, (model, result, step, level)
         level = Level(*known) if quantity is None else QuantityLevel(*known, quantity)
@@ -96,7 +97,8 @@ def solve_to(
             break
         if keep is None and quantity is None and model.mesh.hanging is None and not _can_be_raised(model):
             keep = layer_direction(result, FLAT * aim * level.norm)
-        step = _next(level, aim, keep, geometry or {}, most) if len(history) < STEPS else None
+        go_on = len(history) < STEPS and _needed(history, aim, LAST) < HOPELESS
+        step = _next(level, aim, keep, geometry or {}, most) if go_on else None
         if step is None:
             missed = _missed(history, aim, most)
             break
@@ -194,13 +196,25 @@ def _marked(level: Level, aim: float, pieces: int) -> Ints:
 
 def _missed(history: Sequence[RefinementStep], aim: float, most: int) -> str:
     """Return why the error was not reached, and what it would take by the rate of the last meshes."""
+    if _needed(history, aim, LAST) > HOPELESS:
+        return (
+            "finer meshes hardly help, as under forces on points or edges, whose energy is infinite: spread "
+            "them over faces (Resultant, Traction), or ask for a quantity away from there"
+        )
     why = f"{STEPS} meshes did not suffice" if len(history) == STEPS else f"there is room for {most} unknowns"
+    needed = _needed(history, aim, 1)
+    return f"{why}; it would take about {needed:.2g}" if needed else why
+
+
+def _needed(history: Sequence[RefinementStep], aim: float, last: int) -> float:
+    """Return the unknowns that an error takes by the rate of the last meshes; 0 where that is not known."""
     alike = [step for step in history if step.kinds == history[-1].kinds]
-    if len(alike) > 1 and alike[-1].error < alike[-2].error:
-        rate = np.log(alike[-2].error / alike[-1].error) / np.log(alike[-1].unknowns / alike[-2].unknowns)
-        needed = alike[-1].unknowns * (alike[-1].error / aim) ** (1 / rate)
-        return f"{why}; it would take about {needed:.2g}"
-    return why
+    if len(alike) <= last or not alike[-1 - last].error > alike[-1].error > 0:
+        return 0.0
+    before, now = alike[-1 - last], alike[-1]
+    rate = np.log(before.error / now.error) / np.log(now.unknowns / before.unknowns)
+    with np.errstate(over="ignore"):
+        return float(now.unknowns * np.float64(now.error / aim) ** (1 / rate))
 
 
 def _affordable() -> int:

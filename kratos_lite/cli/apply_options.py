@@ -15,6 +15,7 @@ from kratos_lite.io.case import Case, Outputs, TimeIntegration
 from kratos_lite.io.files import read_case
 from kratos_lite.io.kratos.context import Omission
 from kratos_lite.materials import MATERIALS
+from kratos_lite.model.loads import Load, ScaledLoad
 from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.loads.nodal import PointLoad
 from kratos_lite.model.loads.surface import Pressure, Resultant, Traction
@@ -123,8 +124,22 @@ def _take_modes(case: Case, options: Namespace) -> None:
     other = ("state", *(["json"] if name == "harmonic" else []))
     refuse(options, other, "does not hold modes or responses; -o OUT does")
     refuse(options, ("error",), "is for statics; modes are those of the mesh as it is")
+    if case.is_of_model and case.time is not None and case.time.quasi_static is not None:
+        _hold_at(case.model, case.time.end)
     case.time, case.above, case.outputs, case.buckling = None, None, Outputs(), name == "buckling"
     case.modes, case.harmonic = (0, value) if name == "harmonic" else (value, None)
+
+
+def _hold_at(model: Model, time: float) -> None:
+    """Give a model the supports and loads that it has at a time in s, as constant ones."""
+    model.supports = model.supports.at(time)
+    acting = (pair for load in model.loads for pair in load.acting(time))
+    model.loads = [_times(size, load) for size, load in acting]
+    model.notes.append(f"supports and loads are those at t = {time:g} s, the end of the steps")
+
+
+def _times(size: float, load: Load) -> Load:
+    return load if size == 1 else ScaledLoad(load, lambda _: size)
 
 
 def _time(options: Namespace, of_file: TimeIntegration | None) -> TimeIntegration | None:

@@ -102,6 +102,12 @@ class TimeIntegration:
             return self
         return replace(self, displacement=np.where(supports.fixed, supports.values, displacement))
 
+    @property
+    def end(self) -> float:
+        """The time after all steps in s."""
+        own = self.sizes[: self.steps]
+        return self.start + sum(own) + (self.steps - len(own)) * (own[-1] if own else self.step)
+
     def __str__(self) -> str:
         by = f" by {self.integrator}" if self.integrator else ""
         by = by if self.quasi_static is None else ", quasi-static"

@@ -17,6 +17,7 @@ from kratos_lite.errors import KratosLiteError
 from kratos_lite.io.formats.document import Data, Document
 from kratos_lite.io.formats.mdpa.values import Table
 from kratos_lite.mesh import Block
+from kratos_lite.model.loads import TimeDependentLoad
 from kratos_lite.model.structure import Structure
 
 
@@ -56,18 +57,24 @@ def describe(document: Document) -> str:
     return "\n".join(lines)
 
 
-def amounts(model: Structure) -> list[tuple[str, str]]:
-    """Return loads in words and their sum, volume and mass, as far as a model says them."""
+def amounts(model: Structure, time: float = 0.0) -> list[tuple[str, str]]:
+    """Return loads at a time in s in words and their sum, volume and mass, as far as a model says them."""
     names = {id(load): f"{name}: " for name, load in model.named_loads.items()}
-    rows = [("load", f"{names.get(id(load), '')}{load}") for load in model.loads]
+    acting = [(names.get(id(load), ""), *pair) for load in model.loads for pair in load.acting(time)]
+    when = f" at t = {time:g} s" if any(isinstance(load, TimeDependentLoad) for load in model.loads) else ""
+    rows = [
+        ("load", name + (f"{size:g} × " if size != 1 else "") + f"{load}{when}")
+        for name, size, load in acting
+    ]
     with suppress(KratosLiteError):
         groups = model.element_groups()
         parts = [float(volumes(model.mesh.points, group).sum()) for group in groups]
         rows.append(("volume", f"{sum(parts):.6g} m³"))
         mass = sum(group.material.density * part for group, part in zip(groups, parts, strict=True))
         rows.append(("mass", f"{mass:.6g} kg"))
-        force = external_loads(model, groups, model.loads).sum(axis=0)
-        rows.append(("total load", f"({', '.join(_short(float(f)) for f in force)}) N"))
+        force = sum(size * external_loads(model, groups, [load]).sum(axis=0) for _, size, load in acting)
+        total = (force + np.zeros(3)).tolist()
+        rows.append(("total load", f"({', '.join(map(_short, total))}) N{when}"))
     return rows
 
 

@@ -149,5 +149,5 @@ def describe_case(case: Case) -> str:
     from kratos_lite.io.describe import amounts
 
     told = [row for row in case.model.table() if row[0] != "load"]
-    rows = [("file", name), *told, *amounts(case.model), *time]
+    rows = [("file", name), *told, *amounts(case.model, case.time.end if case.time else 0.0), *time]
     return in_units(aligned(rows), case.model.units)

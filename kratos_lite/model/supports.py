@@ -249,6 +249,18 @@ class Supports:
         other.changed()
         return other
 
+    def at(self, time: float) -> Supports:
+        """Return what is prescribed at a time in s as constant supports."""
+        other, values = copy(self.acting(time)), self.values.copy()
+        for function, moved in other.motions:
+            size = np.asarray(function(time))
+            values[moved] = np.broadcast_to(size[..., None], values.shape)[moved]
+        other._values = np.where(other._fixed, values, 0.0)
+        other._function = np.full_like(self._function, CONSTANT)
+        other.values = other._values
+        other.changed()
+        return other
+
     # ---- multi-point constraints ------------------------------------------------------------------------
 
     @property

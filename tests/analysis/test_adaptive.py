@@ -56,6 +56,16 @@ def bar(cells=(4, 1, 1), **options):
     return model
 
 
+def test_forces_on_points_end_with_the_reason_after_few_meshes():
+    model = kl.Model(kl.box(), kl.Isotropic3D(E=200e9, nu=0.3))
+    model.fix("z-", "xyz")
+    model.add(kl.PointLoad("z+", (0, 0, -1e3), each=True))
+    model.add(kl.ElasticSupport("x+", 1e9))
+    report = model.solve(error=0.2, most_unknowns=10_000).report
+    assert any("not reached" in text and "whose energy is infinite" in text for text in report.warnings)
+    assert report.history[-1].unknowns < 6_000
+
+
 def test_a_mesh_that_is_fine_enough_stays():
     model = bar()
     result = model.solve(error=0.99)

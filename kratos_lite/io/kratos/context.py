@@ -104,10 +104,12 @@ def steps_by_frequency(times: Sequence[float], frequency: float) -> list[int]:
     return steps
 
 
-def times_of(problem: Settings, solver: Settings) -> list[float]:
-    """Return the start time and the time of every step, as Kratos' loop makes them."""
+def times_of(problem: Settings, solver: Settings, alike: bool = False) -> list[float]:
+    """Return the start time and the time of every step, which may have to be alike, as Kratos' loop does."""
     stepping = solver.section("time_stepping", required=True)
     key = "time_step_table" if "time_step" not in stepping and "time_step_table" in stepping else "time_step"
+    text = "is for static steps; give 'time_step', as those of a motion are alike here"
+    stepping.expect(not alike or key == "time_step", key, text)
     step_at = _steps_of_table(stepping) if key == "time_step_table" else None
     step = 0.0 if step_at else stepping.number(key)
     time, end = problem.number("start_time"), problem.number("end_time")

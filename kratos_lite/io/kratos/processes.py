@@ -192,10 +192,12 @@ def _fixed(settings: Settings, process: Process) -> list[bool]:
 
 
 def run(actions: Sequence[Action], context: RunContext, notes: list[str], values: Variables) -> None:
-    """Bring the values and supports to what they are in the one step of a run; add notes."""
+    """Bring the values and supports to what they are in the last step of a run; add notes."""
     set_values(actions, context.times, values)
+    last = len(context.times) - 1
     for action in actions:
-        if action.fixed and action.steps:
+        # what is fixed before the first step is so through it
+        if action.fixed and action.steps and max(action.steps[-1], 1) == last:
             values.fix(action.component, action.indices)
     notes += notes_of(actions, context)
 

@@ -5,10 +5,10 @@ Solids at rest, in quasi-static steps or in time, or their modes, in the style o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from kratos_lite.analysis.model import Model
 from kratos_lite.errors import Problems, nearest
@@ -45,53 +45,66 @@ def read_kratos_project(
     part: int | None = None,
 ) -> Case:
     """Return the case of a Kratos run file; errors name what is wrong, or no linear solid."""
-    settings, folder = read_settings(path), path.parent
+    settings = _read_run_file(path)
+    solver, in_ale = settings.section("solver_settings", required=True), settings.section("ale")
+    dynamic, eigen = (solver.text("solver_type") in kinds for kinds in (DYNAMIC, (EIGEN,)))
+    times = times_of(settings.section("problem_data", required=True), solver, dynamic)
+    small = linear or solver.text("analysis_type", "non_linear") == "linear"
+    notes = _check_solver(solver) + _notes_on_keys(settings, dynamic, eigen, small)
+    modes, above = modes_of(solver, notes) if eigen else (0, None)
+    document = set_apart(_read_mesh(solver, path.parent, allow_outside, notes, part))
+    root, moved = solver.text("model_part_name", "Structure"), solver.flag("move_mesh_flag", True)
+    moved, dofs = moved and not eigen, _dofs(solver, dynamic)
+    context = RunContext(document.mesh, root, path.parent, times, moved, allow_outside, dofs)
+    _use_materials(solver, context, document, notes)
+    notes += _notes_on_laws(document, small, eigen)
+    time = None if dynamic or eigen else quasi_static_of(solver, times)
+    actions, expected, states, written = _read_processes(settings, context, notes, eigen)
+    for action in actions:
+        if action.component == TEMPERATURE:
+            action.settings.expect(expanding(document, True), "variable_name", NO_EXPANSION)
+    in_steps = dynamic or not (eigen or in_ale.values or len(times) == 2)
+    in_time = ProcessesInTime(actions, context, dynamic) if in_steps else None
+    processes = in_time.prepare if in_time else partial(run, actions, context, notes)
+    displaced = initial_displacement and in_time is None
+    model = model_from(document, initial_displacement=displaced, processes=processes)
+    for initial_state in states:
+        initial_state(model)
+    add_motion(model, settings, None if in_time else times[-1])
+    model.notes += notes
+    if in_time:
+        in_time.finish(model)
+        time = time_integration_of(settings, in_time) if dynamic else time
+    outputs, files = Outputs(in_steps=list(written)), settings.files
+    time = time if in_time else None
+    return Case(model, time, modes, above, outputs=outputs, expected=expected, files=files)
+
+
+def _read_run_file(path: Path) -> Settings:
+    """Return the settings of a run file; InputError for another JSON file."""
+    settings = read_settings(path)
     if "properties" in settings:
         raise settings.error("properties", "this is a materials file; read the run file that names it")
     if not {"solver_settings", "problem_data"} & settings.values.keys():
         text = "this is no run file of Kratos, which has 'solver_settings'"
         raise settings.error("", f"{text}; write a Python script with a 'case'")
-    solver = settings.section("solver_settings", required=True)
-    dynamic, eigen = (solver.text("solver_type") in kinds for kinds in (DYNAMIC, (EIGEN,)))
-    times = times_of(settings.section("problem_data", required=True), solver)
-    if eigen or (settings.section("ale").values and not dynamic):
-        times = [times[0], times[-1]]  # one solution, at the end
-    small = linear or solver.text("analysis_type", "non_linear") == "linear"
-    notes = _check_solver(solver)
-    if unused := unused_keys(settings, IN_TIME if dynamic else EIGEN_KEYS if eigen else {}, small or eigen):
-        are = "key {} is" if len(unused) == 1 else "keys {} are"
-        notes.append(f"{are.format(', '.join(unused))} not used")
-    modes, above = modes_of(solver, notes) if eigen else (0, None)
-    document = set_apart(_read_mesh(solver, folder, allow_outside, notes, part))
-    root, moved = solver.text("model_part_name", "Structure"), solver.flag("move_mesh_flag", True)
-    context = RunContext(document.mesh, root, folder, times, moved, allow_outside, _dofs(solver, dynamic))
-    _use_materials(solver, context, document, notes)
-    notes += make_linear(document) if small else []
-    nonlinear = is_nonlinear(document)
+    return settings
+
+
+def _notes_on_keys(settings: Settings, dynamic: bool, eigen: bool, small: bool) -> list[str]:
+    """Return a note on keys that change nothing; InputError for those that Kratos refuses."""
+    unused = unused_keys(settings, IN_TIME if dynamic else EIGEN_KEYS if eigen else {}, small or eigen)
+    are = "key {} is" if len(unused) == 1 else "keys {} are"
+    return [f"{are.format(', '.join(unused))} not used"] if unused else []
+
+
+def _notes_on_laws(document: Document, small: bool, eigen: bool) -> list[str]:
+    """Make a document linear where its solution is; return notes on what its laws mean here."""
+    notes = make_linear(document) if small else []
     notes += notes_on_stress(document)
-    if not (small or nonlinear or eigen):
+    if not (small or eigen or is_nonlinear(document)):
         notes.append("analysis_type is non_linear: the linear solution is computed, on the undeformed body")
-    steps = quasi_static_of(solver, times) if not (dynamic or eigen) else None
-    in_steps = steps is not None and len(times) > 2
-    compare = {CHECK: eigenvalue_comparisons} if eigen else COMPARISONS
-    actions, checks, states, written = _read_processes(settings, context, notes, compare)
-    outputs = Outputs(in_steps=list(written))
-    for action in actions:
-        if action.component == TEMPERATURE:
-            action.settings.expect(expanding(document, True), "variable_name", NO_EXPANSION)
-    in_time = ProcessesInTime(actions, context, dynamic) if dynamic or in_steps else None
-    processes = partial(run, actions, context, notes) if in_time is None else in_time.prepare
-    initial_displacement = initial_displacement and in_time is None
-    model = model_from(document, initial_displacement=initial_displacement, processes=processes)
-    for initial_state in states:
-        initial_state(model)
-    add_motion(model, settings, None if in_time else times[-1])
-    model.notes += notes
-    if in_time is None:
-        return Case(model, modes=modes, above=above, outputs=outputs, expected=checks, files=settings.files)
-    in_time.finish(model)
-    time = time_integration_of(settings, in_time) if dynamic else steps
-    return Case(model, time, outputs=outputs, expected=checks, files=settings.files)
+    return notes
 
 
 def _dofs(solver: Settings, dynamic: bool) -> tuple[str, ...]:
@@ -148,41 +161,54 @@ def _use_materials(solver: Settings, context: RunContext, document: Document, no
         use_materials(read_settings(path), context, document, notes)
 
 
-def _read_processes(
-    settings: Settings,
-    context: RunContext,
-    notes: list[str],
-    compare: Mapping[str, Callable[[Settings, RunContext], Iterable[Callable[[Any], str]]]],
-) -> tuple[list[Action], list[Callable[[Any], str]], list[Callable[[Model], None]], list[OutputProcess]]:
-    """Return what processes do, check, begin with and write; all that are unknown are reported together."""
-    actions: list[Action] = []
-    checks: list[Callable[[Any], str]] = []
-    states: list[Callable[[Model], None]] = []
-    written: list[OutputProcess] = []
-    problems = Problems()
+class _Processes(NamedTuple):
+    """What processes do, check, begin with and write."""
+
+    actions: list[Action]
+    checks: list[Callable[[Any], str]]
+    states: list[Callable[[Model], None]]
+    written: list[OutputProcess]
+
+
+def _read_processes(settings: Settings, context: RunContext, notes: list[str], eigen: bool) -> _Processes:
+    """Return what processes are for; all that are unknown are reported together."""
+    found, problems = _Processes([], [], [], []), Problems()
     for section in (settings.section("processes"), settings.section("output_processes")):
         # Kratos keeps the lists in alphabetical order; later processes replace earlier values.
         for key in sorted(section.values):
             for entry in section.sections(key):
-                module = module_of(entry)
-                if module in PROCESSES:
-                    actions += actions_of(entry, module, context)
-                elif module == MODULE:
-                    states.append(initial_state_of(entry.section("Parameters", required=True), context))
-                elif module in compare:
-                    checks += compare[module](entry.section("Parameters", required=True), context)
-                elif module in (CHECK, *COMPARISONS):
-                    text = f"{module} is not evaluated: there are no such values"
-                    notes.append(Omission(f"{entry.path}: {text}"))
-                elif module in OUTPUT_PROCESSES:
-                    output = OUTPUT_PROCESSES[module](entry.section("Parameters", required=True), context)
-                    written.append(output)
-                    notes += [Omission(f"{entry.path}: {output.note}")] if output.note else []
-                elif module in NOT_RUN:
-                    notes.append(Omission(f"{entry.path}: {module} is not run"))
-                else:
-                    known = [*PROCESSES, *COMPARISONS, CHECK, MODULE, *OUTPUT_PROCESSES]
-                    text = f"unknown process {module!r}.{nearest(module, known)} Known are {', '.join(known)}"
-                    problems.add(str(entry.error("", text)))
+                _read_process(entry, context, found, notes, problems, eigen)
     problems.raise_if_any()
-    return actions, checks, states, written
+    return found
+
+
+def _read_process(
+    entry: Settings,
+    context: RunContext,
+    found: _Processes,
+    notes: list[str],
+    problems: Problems,
+    eigen: bool,
+) -> None:
+    """Add what a process is for to what is found, or to the notes or the problems."""
+    module, compare = module_of(entry), {CHECK: eigenvalue_comparisons} if eigen else COMPARISONS
+    known = [*PROCESSES, *COMPARISONS, CHECK, MODULE, *OUTPUT_PROCESSES]
+    omitted = ""
+    if module in PROCESSES:
+        found.actions.extend(actions_of(entry, module, context))
+    elif module in NOT_RUN:
+        omitted = f"{module} is not run"
+    elif module not in known:
+        text = f"unknown process {module!r}.{nearest(module, known)} Known are {', '.join(known)}"
+        problems.add(str(entry.error("", text)))
+    elif module == MODULE:
+        found.states.append(initial_state_of(entry.section("Parameters", required=True), context))
+    elif module in compare:
+        found.checks.extend(compare[module](entry.section("Parameters", required=True), context))
+    elif module not in OUTPUT_PROCESSES:
+        omitted = f"{module} is not evaluated: there are no such values"
+    else:
+        output = OUTPUT_PROCESSES[module](entry.section("Parameters", required=True), context)
+        omitted = f"{module} writes nothing: modes are written by -o OUT" if eigen else output.note
+        found.written.extend([] if eigen else [output])
+    notes.extend([Omission(f"{entry.path}: {omitted}")] if omitted else [])

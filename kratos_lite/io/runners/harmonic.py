@@ -36,7 +36,8 @@ def run(case: Case, progress: Progress | None = None) -> Outcome:
         rows.append(f"{omega / (2 * pi):>14.8g}  {omega:>14.8g}  {size[at]:>14.6e}  {node:>9}")
     for path in case.outputs.results:
         write_table(path, _columns(response))
-    return Outcome(case, [], lines=rows, response=response)
+    notes = [("note", text) for text in case.model.notes]
+    return Outcome(case, notes, lines=rows, response=response)
 
 
 def _columns(response: HarmonicResponse) -> dict[str, Any]:

@@ -52,7 +52,8 @@ def run(case: Case, progress: Progress | None = None) -> Outcome:
             for i, z in enumerate(values.tolist(), 1)
         ]
     _write(case, values, shapes)
-    return Outcome(case, [], lines=[head, *rows], modes=(values, shapes))
+    notes = [("note", text) for text in model.notes]
+    return Outcome(case, notes, lines=[head, *rows], modes=(values, shapes))
 
 
 def _real_modes(case: Case, progress: Progress | None) -> tuple[Array, Array]:

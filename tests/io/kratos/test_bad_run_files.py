@@ -76,6 +76,7 @@ BAD = [
     (dynamic(scheme_type="bdf2"), "scheme_type 'bdf2' is not supported"),
     (dynamic(damp_factor_m=0.5), "the α of Bossak lies in -1/3 … 0"),
     (dynamic(newmark_beta=0.0), "newmark_beta must be 0.25"),
+    (dynamic(time_stepping={"time_step_table": [[0.0, 0.1]]}), "is for static steps; give 'time_step'"),
     (dynamic(rayleigh_beta=-1.0), "rayleigh_beta must be ≥ 0"),
     (dynamic() | {"problem_data": {"start_time": 0.5, "end_time": 1.0}}, "start_time must be 0"),
     (in_time(on_top("VELOCITY_X", value=1.0)), "VELOCITY_X cannot be fixed"),

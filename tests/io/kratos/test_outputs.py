@@ -250,6 +250,16 @@ BAD = {
         POINT | FILE | {"entity_type": "node", "position": [0.9, 1, 1]},
         "no node of the part is at [0.9, 1.0, 1.0] m",
     ),
+    "no elements": (
+        "point",
+        POINT | FILE | {"model_part_name": "Structure.Top"},
+        "the part has no elements;",
+    ),
+    "a variable twice": (
+        "json",
+        JSON | {"output_variables": ["DISPLACEMENT", "DISPLACEMENT_X"]},
+        "DISPLACEMENT_X would be written twice",
+    ),
     "faces": ("point", POINT | FILE | {"entity_type": "condition"}, "must be element or node"),
     "numbers": ("point", POINT | FILE | {"print_format": ".999999999f"}, "must be a format of numbers"),
     "cuts": ("gid", {"output_name": "a", "postprocess_parameters": CUT}, "plane_output is not supported"),

@@ -6,7 +6,7 @@ from math import pi
 
 import numpy as np
 import pytest
-from run_files import MATERIALS, box_mdpa, cube, process, run_file, run_kratos, write
+from run_files import MATERIALS, box_mdpa, cube, output, process, run_file, run_kratos, write
 from scenes import case, present
 
 import kratos_lite as kl
@@ -77,6 +77,49 @@ def test_modes_above_a_shift(tmp_path):
     settings["eigensolver_settings"] = {"number_of_eigenvalues": 2, "shift": float(1.01 * every[2])}
     above = kl.run(read_case(cube(tmp_path, [], **ELASTIC, **settings))).modes[0] ** 2
     assert np.abs(above / every[3:5] - 1).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("interval", "step", "held"),
+    [([0.0, 0.5], 0.5, False), ([1.5, 2.0], 0.5, True), ([0.0, 0.0], 0.5, False), ([0.0, 0.0], 3.0, True)],
+)
+def test_modes_are_those_of_the_supports_of_the_last_step(tmp_path, interval, step, held):
+    """As in Kratos, which takes supports back after each step, but for those set before the first one."""
+    settings = {**MODES, "step": step, "end": 2.0}
+    omega = kl.run(read_case(cube(tmp_path, [("0.0", interval)], **ELASTIC, **settings))).modes[0]
+    stretches = np.abs(omega**2 / (3 * E / DENSITY) - 1) < 1e-9
+    assert stretches.sum() == (2 if held else 3)
+
+
+@pytest.mark.parametrize("option", ["modes", "buckling"])
+def test_modes_and_buckling_of_several_steps_are_those_at_their_end(tmp_path, run, option):
+    """The same file in one step says at once what holds and loads the cube at its end."""
+    push = process(
+        "assign_vector_variable_process", "Structure.Top", "VOLUME_ACCELERATION",
+        constrained=False, value=[0.0, "t", "-3.0*t"],
+    )  # fmt: skip
+    told = []
+    for step in (0.5, 2.0):
+        path = cube(tmp_path, [("-0.001*t", [1.0, "End"])], **ELASTIC, step=step, end=2.0)
+        content = json.loads(path.read_text())
+        supports = content["processes"]["constraints_process_list"]
+        supports.append(json.loads(json.dumps(supports[0])))
+        supports[-1]["Parameters"] |= {"model_part_name": "Structure.Body", "interval": [0.5, 0.5]}
+        content["processes"]["loads_process_list"] = [push]
+        told.append(run("solve", write(tmp_path, content), f"--{option}", "2").out.splitlines())
+    steps, once = told
+    assert len(once) >= 3
+    assert steps[:3] == once[:3]
+    assert any("those at t = 2 s, the end of the steps" in line for line in steps)
+    rows = run("info", path).out + run("info", cube(tmp_path, [], **ELASTIC)).out
+    assert "function" not in rows
+
+
+def test_outputs_of_modes_are_omitted_with_a_note(tmp_path, run):
+    path = cube(tmp_path, [], [output("vtk")], **ELASTIC, **MODES)
+    text = "processes.checks[0]: vtk_output_process writes nothing: modes are written by -o OUT"
+    assert text in run("solve", path).out
+    assert text in run("solve", path, "--strict").err
 
 
 @pytest.mark.skipif(not present("eigen_cube_8N"), reason="the folder is absent")

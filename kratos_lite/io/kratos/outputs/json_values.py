@@ -52,6 +52,9 @@ class JsonOutput(OutputProcess):
     def check(self, case: Case) -> None:
         """Raise InputError for a variable that the results do not have, or for other Gauss points."""
         super().check(case)
+        names = self.settings.texts("output_variables")
+        twice = [name for name in names if names.count(name) > 1 or name.rpartition("_")[0] in names]
+        self.settings.expect(not twice, "output_variables", f"{', '.join(twice[:1])} would be written twice")
         for group in case.model.element_groups() if self.settings.texts(self.gauss[0]) else ():
             self.settings.placed(self.gauss[0], order_of_points, group)
 

@@ -92,6 +92,8 @@ class PointOutput(OutputProcess):
         part = self.part(mesh)
         if self.kind == "element":
             cells, nodes = cells_of(mesh, part)
+            if not cells.n_elements:
+                raise InputError("the part has no elements; name one that has, or take entity_type 'node'")
             located = cells.locate(self.points, required=True)
             return cells.element_ids[located.rows], lambda values: located.interpolate(values[nodes])
         far = self.settings.number("search_tolerance", 1e-6)
