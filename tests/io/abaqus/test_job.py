@@ -204,14 +204,12 @@ def test_steps_increments_and_times_are_those_of_ccx(text: str, tmp_path: Path) 
 
 PULL = "*STEP\n*STATIC\n*CLOAD\nTOP,1,1.\n*EL FILE\nS,ENER\n*END STEP\n"
 LINES = CUBE.count("\n")
-ALONE = f"{RIGID}*TRANSFORM,NSET=REF\n1.,1.,0.,-1.,1.,0.\n*BOUNDARY\nREF,1,1,.01\n"
 TROUBLE = {
     "in no section": (CUBE.replace("*MATERIAL", "*ELSET,ELSET=NO\n*MATERIAL").replace("=EALL, M", "=NO, M"),
                       "job.inp:13: element 1 is in no *SOLID SECTION"),
     "free": (CUBE.replace("Bottom,1,3", "Bottom,1,2"), f"job.inp:{LINES + 1}: *STEP: the supports leave"),
     "contradiction": (CUBE + "*EQUATION\n2\n5,1,1.,6,1,-1.\n*BOUNDARY\n5,1,1,.1\n6,1,1,.2\n",
                       f"job.inp:{LINES + 7}: *STEP: what is prescribed contradicts itself"),
-    "axes of a reference node": (CUBE + ALONE, "node 11 is a reference node"),
     "overflow": (CUBE.replace("1000, .25", "1e-290, .25"), "numbers exceed what a computer holds"),
 }  # fmt: skip
 """Models that are wrong, and the words of their errors."""
