@@ -87,10 +87,6 @@ class Building:
                 for number in np.flatnonzero(np.bincount(numbers)):
                     some, name = rows[numbers == number], held.names[number]
                     letter = "xyz"[axis] if frame is None else frame.letters[axis]
-                    if frame is not None and (alone := some[~self.mesh.used_nodes()[some]]).size:
-                        node = self.mesh.node_ids[alone[0]]
-                        text = "*BOUNDARY along axes of *TRANSFORM is supported at nodes of elements"
-                        raise ModelError(f"{text}; node {node} is a reference node; give its axes x y z")
                     value = moves[name] if name and moves else held.values[some, axis][:, None]
                     model.fix(some, letter, value, local=frame)
         self.deck.connections.connect(model)

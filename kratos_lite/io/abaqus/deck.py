@@ -60,12 +60,12 @@ PROCEDURES = {
     "STEADYSTATEDYNAMICS": ("SOLVER", "HARMONIC"),
 }
 """Kinds of steps, and their options."""
-_FILE, _PRINT = ("FREQUENCY", "FREQUENCYF", "GLOBAL"), ("FREQUENCY", "FREQUENCYF", "GLOBAL", "TOTALS")
+FILES = ("NODEFILE", "ELFILE", "NODEOUTPUT", "ELEMENTOUTPUT")
+_ALL = ("FREQUENCY", "FREQUENCYF")
 OUTPUTS = {
-    **dict.fromkeys(("NODEFILE", "ELFILE"), (*_FILE, "NSET", "OUTPUT", "LASTITERATIONS")),
-    **dict.fromkeys(("NODEOUTPUT", "ELEMENTOUTPUT"), (*_FILE, "NSET", "OUTPUT", "LASTITERATIONS")),
-    "OUTPUT": _FILE[:2], "NODEPRINT": (*_PRINT, "NSET"), "ELPRINT": (*_PRINT, "ELSET"),
-    **dict.fromkeys(("SECTIONPRINT", "FACEPRINT"), (*_FILE[:2], "SURFACE", "NAME")),
+    **dict.fromkeys(FILES, (*_ALL, "GLOBAL", "NSET", "OUTPUT", "POSITION", "LASTITERATIONS")),
+    "NODEPRINT": (*_ALL, "GLOBAL", "TOTALS", "NSET"), "ELPRINT": (*_ALL, "GLOBAL", "TOTALS", "ELSET"),
+    **dict.fromkeys(("SECTIONPRINT", "FACEPRINT"), (*_ALL, "SURFACE", "NAME")), "OUTPUT": _ALL,
 }  # fmt: skip
 """Cards that ask for results, and their options."""
 
@@ -177,6 +177,8 @@ class Deck:
         if self._material is None:
             card.wrong("it belongs after *MATERIAL")
         card.check_options(OF_MATERIAL[card.keyword])
+        if (old := self._material.cards.get(card.keyword)) is not None:
+            self.notes.append(f"{card.place}: *{card.keyword} replaces that of {old.place}")
         self._material.cards[card.keyword] = card
 
     # ---- the model ------------------------------------------------------------------------------------
@@ -292,14 +294,10 @@ class Deck:
     def output(self, card: Card) -> None:
         """Read a card that asks for results."""
         card.check_options(OUTPUTS[card.keyword])
-        if (
-            "NSET" in OUTPUTS[card.keyword]
-            and not card.keyword.endswith("PRINT")
-            and card.options.get("GLOBAL", "YES").upper() == "NO"
-        ):
-            card.wrong(
-                "GLOBAL=NO is not supported, files have global axes; *NODE PRINT and *EL PRINT have others"
-            )
+        if card.keyword in FILES and card.options.get("GLOBAL", "YES").upper() == "NO":
+            card.wrong("GLOBAL=NO is not supported in files; *NODE PRINT and *EL PRINT have local axes")
+        if (place := card.options.get("POSITION", "NODES").upper()) not in ("NODES", "AVERAGED AT NODES"):
+            card.wrong(f"POSITION={place} is not supported; files have values AVERAGED AT NODES")
         self._in_step(card).outputs.append(card)
 
     def end_step(self, card: Card) -> None:

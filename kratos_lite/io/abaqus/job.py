@@ -14,7 +14,7 @@ from kratos_lite.analysis.element_fields import ElementFields
 from kratos_lite.atomic import all_or_none, write_whole
 from kratos_lite.errors import naming
 from kratos_lite.io.abaqus.cards import Card, Row
-from kratos_lite.io.abaqus.deck import Deck, Step
+from kratos_lite.io.abaqus.deck import FILES, Deck, Step
 from kratos_lite.io.abaqus.steps import cases_of
 from kratos_lite.io.case import Case
 from kratos_lite.io.run import prepare, run
@@ -36,10 +36,9 @@ FILED = {
     "PEEQ": "PE", "ENER": "ENER", "ERR": "ERROR",
 }  # fmt: skip
 """Fields of `.frd` files by the words of *NODE FILE and *EL FILE, in order."""
-FILES = ("NODEFILE", "ELFILE", "NODEOUTPUT", "ELEMENTOUTPUT")
 OF_SET = {"NODEPRINT": "NSET", "ELPRINT": "ELSET"}
 OF_FACES = ("SECTIONPRINT", "FACEPRINT")
-"""Cards that ask for fields of the `.frd` file, and for tables of sets and of surfaces."""
+"""Cards that ask for tables of sets and of surfaces."""
 STATUS = (
     "SUMMARY OF JOB INFORMATION\n  STEP      INC     ATT  ITRS     TOT TIME     STEP TIME      INC TIME\n"
 )

@@ -143,9 +143,13 @@ def _mixed(document: Document) -> list[str]:
 
 def _left_out(kind: str, document: Document) -> list[str]:
     """Note what a format of meshes does not hold."""
-    data = ("properties", "nodal_data", "element_data", "condition_data", "constraints", "tables")
-    lost = [name.replace("_", " ") for name in data if getattr(document, name)]
-    lost += ["parts and conditions"] if document.mesh.parts or document.mesh.conditions else []
+    data = {
+        "properties": "properties (materials)", "nodal_data": "nodal data (supports, loads)",
+        "element_data": "element data", "condition_data": "condition data", "constraints": "constraints",
+        "tables": "tables", "attached": "springs and masses",
+    }  # fmt: skip
+    lost = [what for name, what in data.items() if getattr(document, name)]
+    lost += ["parts and conditions (loads)"] if document.mesh.parts or document.mesh.conditions else []
     notes = [f"{kind} files hold meshes only; left out: {', '.join(lost)}"] if lost else []
     unknown = [f"{len(b)} {b.name}" for b in document.mesh.blocks if b.shape is None and len(b)]
     return [*notes, f"left out, for their shape is unknown: {', '.join(unknown)}"] if unknown else notes

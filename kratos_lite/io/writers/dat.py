@@ -66,7 +66,8 @@ def prints(
     if not tables:
         return []
     numbers, table, places = (
-        np.vstack([part.reshape(len(part), -1) for part in parts]) for parts in zip(*tables, strict=True)
+        np.vstack([part[:, None] if part.ndim == 1 else part for part in parts])
+        for parts in zip(*tables, strict=True)
     )
     if not at_node:
         some = _in_turn(numbers, every[rows])

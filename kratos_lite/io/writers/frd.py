@@ -81,7 +81,7 @@ def write_frd(
                 rows = step.rows.get(name, every)
                 rows = rows[used[rows]]
                 file.write((_head(step, count, last, len(rows)) + _described(name, suffix)).encode())
-                file.write(_rows(mesh.node_ids[rows], values[rows].reshape(len(rows), -1)))
+                file.write(_rows(mesh.node_ids[rows], values.reshape(len(values), -1)[rows]))
         file.write(b" 9999\n")
 
 
@@ -142,7 +142,7 @@ def _text(values: Array) -> Numbers:
     near = np.abs(scaled - np.floor(scaled) - 0.5) < 1e-6  # where rounding takes all digits of a number
     for at in zip(*np.nonzero(near), strict=True):
         text[at] = np.frombuffer(b"%12.5E" % values[at], np.uint8)
-    return text.reshape(len(values), -1)
+    return text.reshape(len(values), 12 * values.shape[1])
 
 
 def _parts(path: str | Path, fields: Mapping[str, Numbers]) -> Iterator[tuple[str, str, Array]]:

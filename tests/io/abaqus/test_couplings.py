@@ -38,6 +38,11 @@ CASES = {
         RIGID + STATIC + "*CLOAD\n20,1,1.\n20,3,2.\n21,1,1.\n21,3,2.\n",
     ),
     "displacement of a rigid body": (REFS, RIGID + "*BOUNDARY\n21,1,3\n20,1,1,.01\n" + STATIC),
+    "a rigid body along axes": (
+        REFS,
+        RIGID + "*NSET,NSET=REF\n20,\n*TRANSFORM,NSET=REF\n1.,1.,0.,-1.,1.,.5\n"
+        "*BOUNDARY\n20,1,1,.01\n" + STATIC + "*CLOAD\n20,2,1.\n20,3,3.\n",
+    ),
     "rotation of a rigid body": (REFS, RIGID + "*BOUNDARY\n21,1,1,.01\n20,1,3\n" + STATIC),
     "kinematic": (REFS, COUPLED + "*KINEMATIC\n1,3\n" + STATIC + "*CLOAD\n20,1,1.\n20,5,.3\n"),
     "kinematic along x": (

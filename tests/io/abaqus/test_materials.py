@@ -42,6 +42,7 @@ ORTHO = "*ELASTIC, TYPE=ORTHO\n3e4,1e4,2.5e4,1.1e4,.9e4,2e4,.7e4,.6e4\n.5e4\n"
 ENGINEERING = "*ELASTIC, TYPE=ENGINEERING CONSTANTS\n3e4,2e4,1e4,.2,.3,.25,.7e4,.6e4,\n.5e4,293.\n"
 LAWS = {
     "isotropic": "*ELASTIC\n2e4,.3\n" + PLAIN + PULLED,
+    "given twice": "*ELASTIC\n1e4,.2\n*ELASTIC\n2e4,.3\n" + PLAIN + PULLED,
     "isotropic along axes": "*ELASTIC, TYPE=ISOTROPIC\n2e4,.3\n" + TURNED + PULLED,
     "orthotropic": ORTHO + PLAIN + PULLED,
     "orthotropic along axes": ORTHO + TURNED + PULLED,
@@ -94,6 +95,11 @@ def test_displacements_and_stresses_are_those_of_ccx(text: str, read: Read, ccx:
     (u, stress), (their_u, their_stress) = results(read(text, TETRAHEDRON)), printed(ccx(text, TETRAHEDRON))
     assert np.abs(u[-1] - their_u).max() < 1e-6 * np.abs(their_u).max()
     assert np.abs(stress[-1] - their_stress).max() < 1e-6 * np.abs(their_stress).max()
+
+
+def test_a_card_that_replaces_another_is_named(read: Read) -> None:
+    notes = read(LAWS["given twice"], TETRAHEDRON).model.notes
+    assert [note for note in notes if ":19: *ELASTIC replaces that of" in note]
 
 
 CURVES = {
