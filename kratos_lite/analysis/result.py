@@ -405,7 +405,8 @@ class Result(ElementFields, Tabular):
         report = self.report
         if report.error is None:
             return str(self._error)
-        return f"{report.error:.2%} of {report.error_of}, from {len(report.history)} meshes"
+        n = len(report.history)
+        return f"{report.error:.2%} of {report.error_of}, from {n} mesh{'es' * (n > 1)}"
 
     # ---- for other programs ----------------------------------------------------------------------
 

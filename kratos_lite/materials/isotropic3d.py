@@ -70,7 +70,7 @@ class Isotropic3D(LinearMaterial):
         if not self.nu < 0.5:
             cure = "for nearly incompressible bodies use 0.499 and quadratic elements"
             if self.nu > 1:
-                cure = "is it in percent?" if self.nu < 50 else "are nu and density swapped?"
+                cure = "is it in percent?" if self.nu < 50 else "are two of E, nu and density swapped?"
             raise MaterialError(
                 f"{self._name('nu')} {self.nu:g} must be < 0.5: the bulk modulus is infinite at 0.5; {cure}"
             )

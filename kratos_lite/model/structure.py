@@ -26,7 +26,7 @@ from kratos_lite.model.matching import BoltForce, Cut, Periodic
 from kratos_lite.model.remote_point import RemotePoint
 from kratos_lite.model.solid import Solid
 from kratos_lite.model.spurious_modes import check_rules, check_spurious_modes
-from kratos_lite.model.supports import DirichletCondition, Supports, axis_numbers
+from kratos_lite.model.supports import AXES, DirichletCondition, Supports, axis_numbers
 from kratos_lite.model.ties import Tie
 from kratos_lite.solvers.constraints import rigid_modes
 from kratos_lite.time_series import Factor
@@ -146,7 +146,10 @@ class Structure(Solid):
         (np.int64(4), np.False_)
         """
         normal = normal_of_plane(self.mesh.points[self.mesh.nodes(where)])
-        self.fix(where, "yz" if anti else "x", name=name, local=Cartesian(normal))
+        across, local = AXES[normal.argmax()], None
+        if np.count_nonzero(normal) > 1:
+            across, local = "x", Cartesian(normal)
+        self.fix(where, AXES.replace(across, "") if anti else across, name=name, local=local)
 
     def release(self, where: Where, axes: str = "xyz") -> None:
         """Take supports away: one by its name, or whatever holds some nodes along axes.

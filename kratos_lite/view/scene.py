@@ -176,8 +176,9 @@ def _range(numbers: Array) -> tuple[float, float]:
 
 
 def place_text(point: Array) -> str:
-    """Return coordinates in brackets."""
-    return f"({', '.join(f'{x:.5g}' for x in point)})"
+    """Return coordinates in brackets; what rounding leaves is 0."""
+    exact = np.where(np.abs(point) > 1e-12 * np.abs(point).max(), point, 0.0)
+    return f"({', '.join(f'{x:.5g}' for x in exact)})"
 
 
 def _zoomed(scene: Scene, zoom: Any) -> tuple[Array, Array]:

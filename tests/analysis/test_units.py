@@ -268,10 +268,6 @@ def test_gravity_in_mm(gravity, warned):
 # ---- refused -----------------------------------------------------------------------------------------------
 
 
-def _page(model, folder):
-    kl.write(folder / "r.html", model.solve())
-
-
 def _body(model, folder):
     kl.FiniteElementBody(model.mesh, kl.Isotropic3D(E=1e3, nu=0.3, density=1e-9))
 
@@ -279,7 +275,6 @@ def _body(model, folder):
 @pytest.mark.parametrize(
     ("act", "words"),
     [
-        (_page, "pages are in SI, and this mesh is in mm N MPa t"),
         (_body, "bodies in motion are in SI, and this mesh is in mm N MPa t"),
         (
             lambda model, _: kl.compare(model.solve(), bracket().solve()),

@@ -64,6 +64,9 @@ def test_percents_and_swapped_constants_are_understood_or_said():
     assert model.solve(error="30%").report.error_asked == 0.3
     with pytest.raises(kl.InputError, match="error must be"):
         model.solve(error="few%")
-    for nu, hint in ((30.0, "in percent"), (7850.0, "nu and density swapped")):
+    for E, nu, hint in ((210e9, 30.0, "in percent"), (0.3, 210e9, "two of E, nu and density swapped")):
         with pytest.raises(kl.MaterialError, match=hint):
-            kl.Isotropic3D(210e9, nu, 0.3)
+            kl.Isotropic3D(E, nu, 0.3)
+    model.add(kl.Pressure("z+", (0, 0, -1e4)))
+    with pytest.raises(kl.InputError, match="a vector is a Traction"):
+        model.solve()

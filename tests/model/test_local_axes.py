@@ -68,6 +68,7 @@ def test_planes_of_symmetry_and_antisymmetry():
     assert np.abs(other - one @ R.T).max() < 1e-9 * np.abs(one).max()
     plain = kl.Model(straight.mesh, STEEL)
     plain.symmetry("x-")
+    assert str(plain.supports) == "x-, x = 0 m"
     assert len(plain.supports.constraints) == 0
     assert plain.supports.fixed[:, 0].sum() == len(plain.mesh.nodes("x-"))
 

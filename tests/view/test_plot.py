@@ -16,6 +16,7 @@ from kratos_lite.view.curves import response_figure
 from kratos_lite.view.facets import facets_of
 from kratos_lite.view.plane import clip_facets, cut_cells, plane_of
 from kratos_lite.view.rulers import extent
+from kratos_lite.view.scene import place_text
 
 matplotlib = pytest.importorskip("matplotlib")
 STEEL = kl.Isotropic3D(E=210e9, nu=0.3, density=7800.0)
@@ -157,6 +158,11 @@ def test_materials_have_colors_and_a_legend():
     said = [t.get_text() for t in figure.axes[-1].get_legend().get_texts()]
     assert said[:4] == [str(STEEL), str(soft), "no material", "x-, xyz = 0 m"]
     assert said[4].startswith("oven: Temperature(values=20")
+
+
+def test_rounding_in_places_is_said_as_0():
+    assert place_text(np.array([11.265, 6.9e-16, 0.5])) == "(11.265, 0, 0.5)"
+    assert place_text(np.zeros(3)) == "(0, 0, 0)"
 
 
 def test_extremes_are_marked_with_their_place_and_number():

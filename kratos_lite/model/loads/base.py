@@ -368,7 +368,8 @@ def at_places(function: OfPlace, what: str, width: tuple[int, ...]) -> Callable[
     def checked(X: Array) -> Array:
         values, m = finite(function(X.reshape(-1, 3).copy()), what), X[..., 0].size
         if values.shape not in ((m, *width), width):
-            raise InputError(f"{what} at places (m, 3) must have shape {('m', *width)}; got {values.shape}")
+            shape = "(m, 3)" if width else "(m,)"
+            raise InputError(f"{what} at places (m, 3) must have shape {shape}; got {values.shape}")
         return np.broadcast_to(values, (m, *width)).reshape(*X.shape[:-1], *width)
 
     return checked

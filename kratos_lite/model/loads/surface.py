@@ -427,7 +427,8 @@ def _on(block: Block, value: Any, mesh: Mesh, what: str, width: tuple[int, ...])
     if np.ndim(value) == len(width):
         return value
     if len(value) != mesh.n_nodes:
-        raise InputError(f"{what} at nodes needs {mesh.n_nodes} of them; got {len(value)}")
+        cure = "" if width else ", whereas a vector is a Traction"
+        raise InputError(f"{what} at nodes needs {mesh.n_nodes} of them; got {len(value)}{cure}")
     return value[block.nodes]
 
 

@@ -55,6 +55,18 @@ def unpacked(value, raw):
     return array * value["step"] if "step" in value else array
 
 
+def test_a_page_has_the_units_of_the_mesh(tmp_path):
+    model = kl.Model(kl.box((200, 100, 50)), kl.Isotropic3D(E=210e3, nu=0.3), units="mm kN GPa kg ms")
+    model.fix("x-")
+    kl.write(tmp_path / "part.html", model.solve())
+    head = content_of(tmp_path / "part.html")
+    assert dict(head["about"])["size"] == "200 × 100 × 50 mm"
+    assert not head["prefixed"]
+    assert {"mm", "kN", "GPa"} <= {field["unit"] for field in head["fields"]}
+    kl.write_modes(tmp_path / "modes.html", model.mesh, [2 * np.pi], np.ones((1, 8, 3)))
+    assert content_of(tmp_path / "modes.html")["frames"][0]["name"] == "1: 1 kHz"
+
+
 @pytest.mark.parametrize("name", CELLS)
 def test_tetrahedra_fill_a_cell(name):
     shape = SHAPES[name]

@@ -212,6 +212,17 @@ def test_the_legend_has_unit_and_range(page, result):
     assert page("return [low.value, ticks.children[0].textContent]") == ["0", "0"]
 
 
+def test_units_of_other_sets_take_no_prefix(browser, tmp_path):
+    model = kl.Model(kl.box((20, 10, 10)), kl.Isotropic3D(E=210e3, nu=0.3), units="mm N MPa t")
+    model.fix("x-")
+    model.add(kl.Traction("x+", (0, 0, 5e3)))
+    kl.write(tmp_path / "part.html", result := model.solve())
+    browser.open(tmp_path / "part.html")
+    browser.set("field", "2:xx")
+    assert browser("return unit.textContent") == "MPa"
+    assert abs(float(browser("return high.value")) / result.stress("node")[:, 0].max() - 1) < 1e-3
+
+
 def test_deformation_moves_the_surface(page, result):
     base = page("return page.data.scale")
     for share in (0, 0.5, 2):

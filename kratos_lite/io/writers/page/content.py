@@ -15,6 +15,7 @@ import numpy as np
 from kratos_lite.analysis.fields import Field
 from kratos_lite.io.writers.page.lattices import fineness, lattice_of_cell, lattice_of_face
 from kratos_lite.mesh.blocks import with_rows
+from kratos_lite.tabular import in_units, unit_name
 from kratos_lite.typing import Array, Ints
 from kratos_lite.view.facets import sharp_edges
 from kratos_lite.view.rulers import rounded
@@ -57,12 +58,15 @@ class Content:
         """Return all of it as one text."""
         data = _Packer(is_short=len(self.frames) > 1)
         kept = self._kept()
+        units, size = self.mesh.units, " × ".join(f"{side:.5g}" for side in self._size())
+        about = [("size", f"{size} m"), *self.about]
         head = {
             "title": self.title,
             "kind": self.kind,
             "shown": self.shown,
-            "about": [("size", " × ".join(f"{side:.5g}" for side in self._size()) + " m"), *self.about],
-            "fields": [_described(field) for field in self.fields],
+            "about": [(name, in_units(text, units)) for name, text in about],
+            "prefixed": units == "SI",
+            "fields": [_described(field, units) for field in self.fields],
             **self._frame(),
             **_mesh(data, self.mesh, kept, self._center()),
             "frames": [self._packed_frame(data, frame, kept) for frame in self.frames],
@@ -78,7 +82,7 @@ class Content:
     def _packed_frame(self, data: _Packer, frame: Frame, kept: Ints) -> dict[str, Any]:
         both = zip(self.fields, frame.values, strict=True)
         values = [data.field(v if field.nodal_place == "element" else v[kept]) for field, v in both]
-        return {"name": frame.name, "values": values}
+        return {"name": in_units(frame.name, self.mesh.units), "values": values}
 
     def scale(self) -> float:
         """Return the factor on displacements at the start."""
@@ -112,8 +116,9 @@ class Content:
         }
 
 
-def _described(field: Field) -> dict[str, str]:
-    return {"name": field.name, "unit": field.unit, "kind": field.kind, "at": field.nodal_place}
+def _described(field: Field, units: str) -> dict[str, str]:
+    unit = unit_name(field.unit, units)
+    return {"name": field.name, "unit": unit, "kind": field.kind, "at": field.nodal_place}
 
 
 def _mesh(data: _Packer, mesh: Mesh, kept: Ints, center: Array) -> dict[str, Any]:

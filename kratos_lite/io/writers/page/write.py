@@ -30,9 +30,6 @@ SCRIPTS = ("data.js", "fields.js", "body.js", "stage.js", "legend.js", "app.js")
 
 def write_page(path: str | Path, content: Content) -> None:
     """Write a page, as a whole or not at all; InputError for a mesh without a surface."""
-    if content.mesh.units != "SI":
-        text = f"pages are in SI, and this mesh is in {content.mesh.units}"
-        raise InputError(f"{path}: {text}; write .vtu or a picture")
     if not content.mesh.boundary:
         raise InputError(f"{path}: there is nothing to show: the mesh has no element of a known shape")
     _refuse_large(path, "coordinates", content.mesh.points)

@@ -6,6 +6,7 @@ const FRAMES_PER_SECOND = 20, SECONDS_PER_CYCLE = 3;
 class Page {
   constructor(data) {
     this.data = data;
+    prefixed = data.prefixed;
     this.frame = 0;
     [this.phase, this.quarter] = [1, 0];
     this.surface = surfaceOf(data.faces);

@@ -1,5 +1,7 @@
 // Numbers that can be shown: components of vectors and stresses, and how they are written.
 
+// Units of SI take prefixes, those of other sets have theirs.
+let prefixed = true;
 const PREFIXES = { "-12": "p", "-9": "n", "-6": "µ", "-3": "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T" };
 
 const COMPONENTS = {
@@ -40,7 +42,7 @@ function component(values, kind, name) {
 }
 
 function prefixOf(size) {
-  const power = size > 0 ? 3 * Math.floor(Math.log10(size * (1 + 1e-9)) / 3) : 0;
+  const power = prefixed && size > 0 ? 3 * Math.floor(Math.log10(size * (1 + 1e-9)) / 3) : 0;
   return Math.min(12, Math.max(-12, power));
 }
 
