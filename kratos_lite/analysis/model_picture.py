@@ -50,8 +50,7 @@ def legend_of(structure: Structure) -> list[Entry]:
     rows = [("^", SUPPORT, str(condition)) for condition in structure.supports.conditions]
     rows += [("x", DARK, str(point)) for point in structure.remote_points]
     rows += [("o" if one.is_mass else "s", DARK, repr(one)) for one in structure.attachments]
-    names = {id(load): f"{name}: " for name, load in structure.named_loads.items()}
-    rows += [(_marker(load), LOAD, f"{names.get(id(load), '')}{load!r}") for load in structure.loads]
+    rows += [(_marker(load), LOAD, f"{structure._label(load)}{load!r}") for load in structure.loads]
     entries = [(marker, color, _cut(in_units(text, structure.units))) for marker, color, text in rows]
     more = len(entries) - LINES
     return entries if more <= 0 else [*entries[:LINES], ("", DARK, f"and {more} more: print(model)")]

@@ -12,6 +12,7 @@ from kratos_lite.analysis.state import State, at, check_state_of_body
 from kratos_lite.analysis.subjects import evenly
 from kratos_lite.bodies import Body, RigidLink
 from kratos_lite.errors import InputError, ModelError
+from kratos_lite.mesh.selection import spread
 from kratos_lite.typing import Array
 from kratos_lite.validation import short, whole_number
 from kratos_lite.view.marks import Marks
@@ -100,15 +101,7 @@ def telling(body: Body, kept: list[Array], shown: int) -> list[int]:
     X = body.mesh.points
     corners = np.unique([np.argmax(X @ side) for side in product((-1, 1), repeat=3)])
     rows = np.unique(np.linspace(0, len(kept) - 1, CANDIDATES).round().astype(int))
-    places = np.array([body.position(X, kept[row])[corners] for row in rows])
-
-    def away(i: int) -> Array:
-        return np.asarray(((places - places[i]) ** 2).sum(axis=(1, 2)))
-
-    chosen = [len(rows) - 1, 0][: max(shown, 1)]
-    distance = np.min([away(i) for i in chosen], axis=0)
-    alike = (ALIKE * np.ptp(X, axis=0).max()) ** 2 * len(corners)
-    while len(chosen) < shown and distance.max() > alike:
-        chosen.append(int(distance.argmax()))
-        distance = np.minimum(distance, away(chosen[-1]))
+    places = np.array([body.position(X, kept[row])[corners].ravel() for row in rows])
+    alike = ALIKE * np.ptp(X, axis=0).max() * len(corners) ** 0.5
+    chosen = spread(places, max(shown, 1), [len(rows) - 1, 0], alike)
     return sorted({int(rows[i]) for i in chosen})

@@ -59,8 +59,7 @@ def describe(document: Document) -> str:
 
 def amounts(model: Structure, time: float = 0.0) -> list[tuple[str, str]]:
     """Return loads at a time in s in words and their sum, volume and mass, as far as a model says them."""
-    names = {id(load): f"{name}: " for name, load in model.named_loads.items()}
-    acting = [(names.get(id(load), ""), *pair) for load in model.loads for pair in load.acting(time)]
+    acting = [(model._label(load), *pair) for load in model.loads for pair in load.acting(time)]
     when = f" at t = {time:g} s" if any(isinstance(load, TimeDependentLoad) for load in model.loads) else ""
     rows = [
         ("load", name + (f"{size:g} × " if size != 1 else "") + f"{load}{when}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -28,14 +28,19 @@ SIDES = {letter + sign: (axis, end) for axis, letter in enumerate("xyz") for end
 """Names of the sides of the bounding box: axis and end."""
 
 
-def spread(X: Array, count: int) -> Ints:
-    """Return at most so many of the rows of points (n, 3): the outermost, then those farthest from these."""
-    chosen, away = list[int](), np.linalg.norm(X - X.mean(axis=0), axis=1) if len(X) else np.zeros(0)
-    while len(chosen) < min(count, len(X)) and (away.max() > 0 or not chosen):
+def spread(X: Array, count: int, first: Sequence[int] = (), least: float = 0.0) -> list[int]:
+    """Return at most so many rows of points (n, d), spread: first ones, or the outermost, then the farthest.
+
+    What follows is farther than `least` from all before it.
+    """
+    if not len(X):
+        return []
+    chosen = list(first) or [int(np.linalg.norm(X - X.mean(axis=0), axis=1).argmax())]
+    away = np.min([np.linalg.norm(X - X[row], axis=1) for row in chosen], axis=0)
+    while len(chosen) < count and away.max() > least:
         chosen.append(int(away.argmax()))
-        distance = np.linalg.norm(X - X[chosen[-1]], axis=1)
-        away = distance if len(chosen) == 1 else np.minimum(away, distance)
-    return np.array(chosen, dtype=np.int64)
+        away = np.minimum(away, np.linalg.norm(X - X[chosen[-1]], axis=1))
+    return chosen[:count]
 
 
 def find_part(name: Any, parts: Mapping[str, Part], mesh: Cells) -> Part:

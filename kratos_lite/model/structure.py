@@ -573,6 +573,10 @@ class Structure(Solid):
         there = set(map(id, self.loads))
         return {name: load for name, load in self._named.items() if id(load) in there}
 
+    def _label(self, load: Load) -> str:
+        """Return what stands before a load: its name and a colon, or nothing."""
+        return next((f"{name}: " for name, named in self._named.items() if named is load), "")
+
     def remove(self, load: str | Load) -> None:
         """Take a load away.
 
@@ -667,8 +671,7 @@ class Structure(Solid):
         rows += [("attached", repr(attachment)) for attachment in self.attachments]
         if len(self.supports.constraints):
             rows.append(("constraints", str(len(self.supports.constraints))))
-        names = {id(load): f"{name}: " for name, load in self.named_loads.items()}
-        rows += [("load", f"{names.get(id(load), '')}{load!r}") for load in self.loads]
+        rows += [("load", f"{self._label(load)}{load!r}") for load in self.loads]
         rows += [] if self.motion is None else [("motion", str(self.motion))]
         return rows + [("note", note) for note in self.remarks()]
 

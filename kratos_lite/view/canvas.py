@@ -144,11 +144,6 @@ def title_widths(panels: list[Any]) -> list[float]:
     return [float(text.get_window_extent().width) / DPI for text in texts]
 
 
-def text_in_inches(figure: Any, place: tuple[float, float], text: str) -> None:
-    """Write a title, centered, its foot at a place."""
-    figure.text(*place, text, transform=figure.dpi_scale_trans, ha="center", va="bottom", size=11)
-
-
 def bounds(figure: Any) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return lower left and upper right in inches of all that a figure shows."""
     box = figure.get_tightbbox(figure.canvas.get_renderer())

@@ -138,7 +138,8 @@ def _place_title(figure: Any, title: str) -> None:
     """Write the title above what is there."""
     if title:
         (x0, _), (x1, y1) = canvas.bounds(figure)
-        canvas.text_in_inches(figure, ((x0 + x1) / 2, y1 + 0.12), title)
+        style = {"transform": figure.dpi_scale_trans, "ha": "center", "va": "bottom", "size": 11}
+        figure.text((x0 + x1) / 2, y1 + 0.12, title, **style)
 
 
 def draw_body(axes: Any, scene: Scene, subject: Subject, inch: float, most: int = MANY) -> list[Any]:

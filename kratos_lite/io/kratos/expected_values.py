@@ -15,15 +15,16 @@ from kratos_lite.errors import InputError
 from kratos_lite.io.case import Comparison
 from kratos_lite.io.kratos.context import RunContext, interval_of, steps_by_frequency
 from kratos_lite.io.kratos.expressions import evaluate
-from kratos_lite.io.kratos.outputs.values import names_of_nodes, values_of_elements
+from kratos_lite.io.kratos.outputs.values import at_nodes, names_of_nodes, values_of_elements
 from kratos_lite.io.kratos.processes import refuse_local_axes
 from kratos_lite.io.settings import Settings, find_file, is_number, read_settings, shown
 from kratos_lite.mesh import Part
 from kratos_lite.typing import Array, Ints
 from kratos_lite.validation import finite
 
-VECTORS = {field.kratos: name for name, field in listed("node").items() if field.kind == "vector"}
-"""Nodal fields that are compared."""
+VECTORS = [field.kratos for field in listed("node").values() if field.kind == "vector"]
+COMPONENTS = [f"{name}_{axis}" for name in VECTORS for axis in "XYZ"]
+"""Nodal variables that are compared, and their components."""
 NODE_KEYS = (
     "help", "mesh_id", "model_part_name", "variable_name", "interval", "value", "tolerance_rank",
     "reference_conf", "local_axes",
@@ -45,12 +46,11 @@ def _at_nodes(
     """Return the comparison of a component on nodes."""
 
     def compare(result: Result, time: float) -> tuple[float, str]:
-        name, _, axis = component.rpartition("_")
-        if name not in VECTORS or axis not in ("X", "Y", "Z"):
+        if component not in COMPONENTS:
             raise ValueError(f"kratos_lite has no nodal {component}")
         if not len(indices):
             raise ValueError("its part has no nodes")
-        values = result.field(VECTORS[name], "node")[indices, "XYZ".index(axis)]
+        values = at_nodes(component, result)[indices]
         nodes = result.mesh.node_ids[indices]
         return _worst(values, *expected(result, time), lambda i: f"node {nodes[i[0]]}")
 

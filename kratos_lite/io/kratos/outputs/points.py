@@ -22,6 +22,10 @@ from kratos_lite.typing import Array, Ints
 from kratos_lite.validation import finite
 
 FILE_KEYS = ("file_name", "output_path", "folder_name", "write_buffer_size", "file_extension")
+KEYS = (
+    "entity_type", "search_configuration", "interval", "historical_value", "search_tolerance", "print_format",
+    "output_file_settings",
+)  # fmt: skip
 FORMAT = re.compile(r"[<>=^]?[-+ ]?#?0?\d{0,2}(\.\d{1,2})?[eEfFgG]?")
 HEAD = (
     '# Results for "{}" with Id # {} for search config "initial" at position: '
@@ -32,16 +36,7 @@ HEAD = (
 class PointOutput(OutputProcess):
     """The file of a point, with the values of a node or interpolated in the element that holds it."""
 
-    keys = (
-        "entity_type", "search_configuration", "interval", "historical_value", "search_tolerance",
-        "print_format", "output_file_settings",
-    )  # fmt: skip
-    place: tuple[str, ...] = ("position",)  # keys of where the points are
-
-    @classmethod
-    def words(cls) -> list[str]:
-        """Return the keys of its parameters."""
-        return [*super().words(), *cls.place]
+    keys: tuple[str, ...] = ("position", *KEYS)
 
     def __init__(self, settings: Settings, context: RunContext) -> None:
         super().__init__(settings, context)
@@ -73,7 +68,7 @@ class PointOutput(OutputProcess):
         folder = settings.text("output_path", folder)
         settings.expect(Path(name).name, "file_name", "must be the name of a file")
         names = [name]
-        if self.place != PointOutput.place:
+        if "position" not in self.keys:
             names = [f"{name.removesuffix('.dat')}_{i}" for i in range(1, len(self.points) + 1)]
         key = "output_file_settings"
         return [self.path(str(Path(folder, each).with_suffix(ending)), key) for each in names]
@@ -85,7 +80,7 @@ class PointOutput(OutputProcess):
     def check(self, case: Case) -> None:
         """Raise InputError for a variable that the results do not have, or a point outside the part."""
         super().check(case)
-        self.settings.placed(self.place[0], self.find, case.model.mesh)
+        self.settings.placed(self.keys[0], self.find, case.model.mesh)
 
     def find(self, mesh: Mesh) -> tuple[Ints, Callable[[Array], Array]]:
         """Return the ids of what holds the points, and what takes nodal values there."""
@@ -130,7 +125,7 @@ class PointOutput(OutputProcess):
 class PointsOutput(PointOutput):
     """The files of several points."""
 
-    place = ("positions",)
+    keys = ("positions", *KEYS)
 
     def places(self) -> Array:
         """Return the points (p, 3) in m."""
@@ -141,12 +136,12 @@ class PointsOutput(PointOutput):
 class LineOutput(PointOutput):
     """The files of points on a line, at equal distances; one point is that in the middle."""
 
-    place = ("start_point", "end_point", "sampling_points")
+    keys = ("start_point", "end_point", "sampling_points", *KEYS)
 
     def places(self) -> Array:
         """Return the points (p, 3) in m."""
         settings, count = self.settings, self.settings.integer("sampling_points", 3)
         settings.expect(0 < count <= 10_000, "sampling_points", f"must be 1 … 10000; got {count}")
-        a, b = (np.array(settings.vector(key)) for key in self.place[:2])
+        a, b = (np.array(settings.vector(key)) for key in self.keys[:2])
         t = np.linspace(0.0, 1.0, count) if count > 1 else np.array([0.5])
         return np.asarray(a + t[:, None] * (b - a))

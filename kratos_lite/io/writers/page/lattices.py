@@ -10,6 +10,7 @@ from kratos_lite.mesh import Block
 from kratos_lite.mesh.subdivision import Child, child_cells, unchanged
 from kratos_lite.shapes import LINEAR, Shape
 from kratos_lite.typing import Array, Mask
+from kratos_lite.view import facets
 from kratos_lite.view.facets import grid, rim
 
 TETRAHEDRA = {
@@ -19,15 +20,12 @@ TETRAHEDRA = {
     "hexahedron": ((0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6)),
 }
 """Corners of tetrahedra that fill a cell."""
-FINE = 20000
-"""Facets of the surface to aim at where faces are subdivided."""
 
 
 def fineness(faces: list[Block]) -> int:
     """Return into how many parts an edge of each face is cut: curved ones into two or more."""
-    count = sum(map(len, faces))
     curved = any(block.shape is not None and block.shape.degree > 1 for block in faces)
-    most = int(np.clip(np.sqrt(FINE / max(count, 1)), 1, 6 if curved else 4))
+    most = min(facets.fineness(sum(map(len, faces))), 6 if curved else 4)
     return max(most, 2) if curved else most
 
 
