@@ -55,7 +55,7 @@ def folds(mesh: Mesh) -> Folds:
         edges.append((block.nodes, sides))
         ends += [block.nodes[:, side] for side in sides]
         faces.append(np.tile(count + np.arange(len(block)), c))
-        normals.append(_normals(mesh.points[block.nodes[:, :c]]))
+        normals.append(unit_normals(mesh.points[block.nodes[:, :c]]))
         centers.append(mesh.points[block.nodes[:, :c]].mean(axis=1))
     pairs = np.stack(equal_sets(edges), axis=1)
     meet = np.concatenate(faces)[pairs]
@@ -80,9 +80,7 @@ def _straight(mesh: Mesh, block: Block) -> Mask:
     return straight
 
 
-def _normals(X: Array) -> Array:
-    """Return the unit normals (m, 3) of faces with corners (m, c, 3)."""
-    n = np.cross(X[:, 1] - X[:, 0], X[:, 2] - X[:, 0])
-    if X.shape[1] == 4:
-        n = np.cross(X[:, 2] - X[:, 0], X[:, 3] - X[:, 1])
+def unit_normals(X: Array) -> Array:
+    """Return the unit normals (m, 3) of faces with 3 or 4 corners (m, c, 3)."""
+    n = np.cross(X[:, 2] - X[:, 0], X[:, -1] - X[:, 1])
     return n / np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-300)

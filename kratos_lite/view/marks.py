@@ -7,6 +7,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from kratos_lite.mesh.facets import unit_normals
 from kratos_lite.typing import Array
 from kratos_lite.view.canvas import polygons, shaded
 from kratos_lite.view.facets import lit
@@ -93,8 +94,7 @@ def _cones(axes: Any, rows: Array, lines: Array, color: str) -> Any:
     tips = np.broadcast_to(lines[:, 1], rim.shape)
     sides = np.stack([rim, np.roll(rim, 1, axis=0), tips], axis=2).reshape(-1, 3, 3)
     order = np.argsort(sides.mean(axis=1) @ rows[2], kind="stable")
-    normal = np.cross(sides[:, 1] - sides[:, 0], sides[:, 2] - sides[:, 0])
-    light = lit(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300), rows)[order]
+    light = lit(unit_normals(sides), rows)[order]
     return polygons(axes, sides[order] @ rows[:2].T, shaded(color, light), zorder=4)
 
 
