@@ -90,6 +90,20 @@ def facets_of(
     return Facets(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
 
+def behind(facets: Facets, places: Array, rows: Array) -> Mask:
+    """Return which places (k, 3) m a body hides."""
+    corners, hidden = facets.corners @ rows.T, np.zeros(len(places), dtype=bool)
+    low, high = corners[..., :2].min(axis=1), corners[..., :2].max(axis=1)
+    for k, place in enumerate(places @ rows.T):
+        near = corners[((low <= place[:2]) & (place[:2] <= high)).all(axis=1)] - place
+        following = np.roll(near, -1, axis=1)
+        turns = near[..., 0] * following[..., 1] - near[..., 1] * following[..., 0]
+        near = near[(turns >= 0).all(axis=1) | (turns <= 0).all(axis=1)]
+        normal = np.cross(near[:, 2] - near[:, 0], near[:, 3] - near[:, 1])
+        hidden[k] = ((normal * near.mean(axis=1)).sum(axis=1) * normal[:, 2] > 0).any()
+    return hidden
+
+
 def _inside(block: Block, x: Array, rows: Array, window: tuple[Array, Array] | None) -> Mask:
     """Return which faces may be seen in a window."""
     if window is None:

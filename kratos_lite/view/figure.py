@@ -159,7 +159,7 @@ def draw_body(axes: Any, scene: Scene, subject: Subject, inch: float, most: int 
     colors = colored(facets, None if values is None else scene.colors)
     drawn.append(draw_facets(axes, scene.rows, facets, colors))
     if subject.marks is not None:
-        drawn += draw_marks(axes, scene.rows, subject.marks, inch)
+        drawn += draw_marks(axes, scene.rows, subject.marks, inch, facets=facets)
     for artist in drawn:
         artist.set_clip_on(scene.zoom is not None)
     return drawn

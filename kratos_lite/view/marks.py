@@ -8,9 +8,9 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from kratos_lite.mesh.facets import unit_normals
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Mask
 from kratos_lite.view.canvas import polygons, shaded
-from kratos_lite.view.facets import lit
+from kratos_lite.view.facets import Facets, behind, lit
 
 DARK = "#3a3a44"
 COILS = 7
@@ -20,6 +20,8 @@ COILS = 7
 SUPPORT, LOAD = "#2b6ca8", "#c8442b"
 HEAD, ROUND, BASE = 0.3, 12, 0.3
 """Head of an arrow, of its length; corners of the base of a cone, and its radius, of its height."""
+PALE = 0.35
+"""Strength of what the body hides."""
 Entry: TypeAlias = "tuple[str, Any, str]"
 """Of a legend: marker, color and text."""
 
@@ -48,8 +50,13 @@ class Marks:
         return np.concatenate([np.concatenate(lines).reshape(-1, 3), self.pivots, self.masses])
 
 
-def draw_marks(axes: Any, rows: Array, marks: Marks, inch: float, strength: float = 1.0) -> list[Any]:
-    """Draw marks over the bodies; return what was drawn.  `inch` is that many m in the picture."""
+def draw_marks(
+    axes: Any, rows: Array, marks: Marks, inch: float, strength: float = 1.0, facets: Facets | None = None
+) -> list[Any]:
+    """Draw marks over the bodies; return what was drawn.  `inch` is that many m in the picture.
+
+    Supports behind facets are pale.
+    """
     flat = rows[:2].T
     curves = [(ends, 2.0, DARK) for ends in marks.rods @ flat]
     coils = np.concatenate([marks.springs, marks.between]) @ flat
@@ -61,7 +68,9 @@ def draw_marks(axes: Any, rows: Array, marks: Marks, inch: float, strength: floa
     drawn = [
         line for points, lw, color in curves for line in axes.plot(*points.T, lw=lw, color=color, **style)
     ]
-    drawn += [_cones(axes, rows, marks.supports, SUPPORT), _cones(axes, rows, _heads(arrows, 0.0), LOAD)]
+    hidden = None if facets is None else behind(facets, marks.supports.mean(axis=1), rows)
+    drawn.append(_cones(axes, rows, marks.supports, SUPPORT, hidden))
+    drawn.append(_cones(axes, rows, _heads(arrows, 0.0), LOAD))
     drawn.append(_cones(axes, rows, _heads(marks.moments, HEAD), LOAD))
     anchors = np.concatenate([marks.rods[:, 1], marks.springs[:, 1]]) @ flat
     ends = [marks.rods[:, 0], marks.springs[:, 0], *marks.between.transpose(1, 0, 2), marks.pivots]
@@ -82,7 +91,7 @@ def _heads(arrows: Array, back: float) -> Array:
     return np.stack([tips - size, tips], axis=1)
 
 
-def _cones(axes: Any, rows: Array, lines: Array, color: str) -> Any:
+def _cones(axes: Any, rows: Array, lines: Array, color: str, hidden: Mask | None = None) -> Any:
     """Draw cones with axes (k, 2, 3) from the middles of their bases to their tips."""
     base, along = lines[:, 0], lines[:, 1] - lines[:, 0]
     across = np.cross(along, np.eye(3)[np.abs(along).argmin(axis=1)])
@@ -94,8 +103,11 @@ def _cones(axes: Any, rows: Array, lines: Array, color: str) -> Any:
     tips = np.broadcast_to(lines[:, 1], rim.shape)
     sides = np.stack([rim, np.roll(rim, 1, axis=0), tips], axis=2).reshape(-1, 3, 3)
     order = np.argsort(sides.mean(axis=1) @ rows[2], kind="stable")
-    light = lit(unit_normals(sides), rows)[order]
-    return polygons(axes, sides[order] @ rows[:2].T, shaded(color, light), zorder=4)
+    colors = shaded(color, lit(unit_normals(sides), rows)[order])
+    if hidden is not None:
+        pale = np.tile(hidden, ROUND)[order]
+        colors[pale, :3] = 1 - PALE * (1 - colors[pale, :3])
+    return polygons(axes, sides[order] @ rows[:2].T, colors, zorder=4)
 
 
 def dots(axes: Any, places: Array, marker: str, size: float, face: str, strength: float) -> list[Any]:

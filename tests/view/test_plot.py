@@ -13,7 +13,7 @@ from kratos_lite.analysis.subjects import nodal_values
 from kratos_lite.shapes import SHAPES
 from kratos_lite.view.camera import OBLIQUE, VIEWS, rows_of, window_of
 from kratos_lite.view.curves import response_figure
-from kratos_lite.view.facets import facets_of
+from kratos_lite.view.facets import behind, facets_of
 from kratos_lite.view.plane import clip_facets, cut_cells, plane_of
 from kratos_lite.view.rulers import extent
 from kratos_lite.view.scene import place_text
@@ -158,6 +158,19 @@ def test_materials_have_colors_and_a_legend():
     said = [t.get_text() for t in figure.axes[-1].get_legend().get_texts()]
     assert said[:4] == [str(STEEL), str(soft), "no material", "x-, xyz = 0 m"]
     assert said[4].startswith("oven: Temperature(values=20")
+
+
+@pytest.mark.parametrize("element", ["8N", "10N"])
+def test_what_the_body_hides(element):
+    mesh = kl.box((1, 1, 1), (2, 2, 2), element)
+    towards = (1.0, -2.0, 3.0)  # also edges and corners of facets are hit
+    rows = rows_of(towards, mesh.points)
+    facets = facets_of(mesh, mesh.points, None, rows)
+    inside = np.array([(x, y, z) for x in (0.1, 0.5, 0.9) for y in (0.25, 0.5) for z in (0.05, 0.95)])
+    assert behind(facets, inside, rows).all()
+    assert behind(facets, inside - 2 * np.array(towards), rows).all()
+    assert not behind(facets, inside + 2 * np.array(towards), rows).any()
+    assert not behind(facets, inside + 2 * rows[0], rows).any()
 
 
 def test_rounding_in_places_is_said_as_0():
