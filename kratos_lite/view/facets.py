@@ -223,6 +223,19 @@ def draw_facets(axes: Any, rows: Array, facets: Facets, colors: Array, strength:
     return polygons(axes, np.concatenate([P, E])[order] @ rows[:2].T, both, widths)
 
 
+def depth_at(facets: Facets, rows: Array, place: Array) -> float:
+    """Return the coordinate to the viewer of the nearest facet at a place (2,) of the picture, or -inf."""
+    P = facets.corners @ rows.T - [*place, 0.0]
+    a, b = P[..., :2], np.roll(P[..., :2], -1, axis=1)
+    side = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    touching = 1e-9 * np.abs(np.ptp(P, axis=1)).max(axis=1, keepdims=True) ** 2
+    P = P[(side >= -touching).all(axis=1) | (side <= touching).all(axis=1)]
+    normal = np.cross(P[:, 2] - P[:, 0], P[:, 3] - P[:, 1])
+    flat = np.abs(normal[:, 2]) > EDGE_ON * np.linalg.norm(normal, axis=1)
+    P, normal = P[flat], normal[flat]
+    return float(((normal * P.mean(axis=1)).sum(axis=1) / normal[:, 2]).max(initial=-np.inf))
+
+
 def colored(facets: Facets, colors: Any = None, strength: float = 1.0) -> Array:
     """Return colors (m, 4) of facets under light, of their values or plain, mixed with white if weak."""
     rgba = np.tile([*PLAIN, 1.0], (len(facets.light), 1)) if colors is None else colors.to_rgba(facets.values)
