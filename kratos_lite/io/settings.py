@@ -191,17 +191,20 @@ def find_file(
     settings: Settings, key: str, folder: Path, *, outside: bool = False, ending: str = ""
 ) -> tuple[Path, str]:
     """Return the path of the file that a key names, and a note if it stands somewhere else."""
-    # The path counts from the folder of the run file; older files of Kratos count from another folder, so the
-    # last word of the path is looked for beside the run file too.
+    # The path counts from the folder of the run file.  Kratos counts from where it is started, such as a
+    # folder above, through which the path leads; so the file is looked for there, and beside the run file.
     name = settings.text(key) + ending
     if isdir(name) or isdir(folder / name):  # where the methods of Path refuse names that are too long
         raise settings.error(key, f"{name} is a folder; name a file in it")
     path = settings.placed(key, inside, folder, name, outside)
-    beside = folder / path.name
     if path.is_file():
         settings.files.append(path)
         return path, ""
-    if beside.is_file():
-        settings.files.append(beside)
-        return beside, f"{name} is not there; {path.name} beside the run file is read"
+    whole, first = folder.resolve(), Path(name).parts[0]
+    above = (up / name for up in whole.parents if whole.is_relative_to(up / first))
+    for other in (folder / path.name, *above):
+        if other.is_file():
+            settings.files.append(other)
+            where = f"{path.name} beside the run file" if other.parent == folder else str(other)
+            return other, f"{name} is not there; {where} is read"
     raise settings.error(key, f"there is no file {folder / name}; correct the name")

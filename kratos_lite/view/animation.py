@@ -58,7 +58,7 @@ def frames(series: Sequence[Sequence[Subject]], options: Options) -> Iterator[Nu
         drawn = []
         for axes, subject in zip(panels, subjects, strict=True):
             axes.title.set_text(subject.title)
-            drawn += draw_body(axes, scene, subject, inch, FACETS // len(panels))
+            drawn += draw_body(axes, scene, subject, inch, FACETS // len(panels))[0]
         yield canvas.pixels(figure)
         for artist in drawn:
             artist.remove()

@@ -90,20 +90,6 @@ def facets_of(
     return Facets(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
 
-def behind(facets: Facets, places: Array, rows: Array) -> Mask:
-    """Return which places (k, 3) m a body hides."""
-    corners, hidden = facets.corners @ rows.T, np.zeros(len(places), dtype=bool)
-    low, high = corners[..., :2].min(axis=1), corners[..., :2].max(axis=1)
-    for k, place in enumerate(places @ rows.T):
-        near = corners[((low <= place[:2]) & (place[:2] <= high)).all(axis=1)] - place
-        following = np.roll(near, -1, axis=1)
-        turns = near[..., 0] * following[..., 1] - near[..., 1] * following[..., 0]
-        near = near[(turns >= 0).all(axis=1) | (turns <= 0).all(axis=1)]
-        normal = np.cross(near[:, 2] - near[:, 0], near[:, 3] - near[:, 1])
-        hidden[k] = ((normal * near.mean(axis=1)).sum(axis=1) * normal[:, 2] > 0).any()
-    return hidden
-
-
 def _inside(block: Block, x: Array, rows: Array, window: tuple[Array, Array] | None) -> Mask:
     """Return which faces may be seen in a window."""
     if window is None:
@@ -235,6 +221,24 @@ def draw_facets(axes: Any, rows: Array, facets: Facets, colors: Array, strength:
     both = np.vstack([colors, facets.ink[:, :4] * (1, 1, 1, strength)])[order]
     widths = np.concatenate([np.full(len(P), INK[LINE, 4]), facets.ink[:, 4]])[order]
     return polygons(axes, np.concatenate([P, E])[order] @ rows[:2].T, both, widths)
+
+
+def depth_at(facets: Facets, rows: Array, place: Array) -> float:
+    """Return the coordinate to the viewer of the nearest facet at a place (2,) of the picture, or -inf."""
+    P = facets.corners @ rows.T - [*place, 0.0]
+    a, b = P[..., :2], np.roll(P[..., :2], -1, axis=1)
+    side = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    touching = 1e-9 * np.abs(np.ptp(P, axis=1)).max(axis=1, keepdims=True) ** 2
+    P = P[(side >= -touching).all(axis=1) | (side <= touching).all(axis=1)]
+    normal = np.cross(P[:, 2] - P[:, 0], P[:, 3] - P[:, 1])
+    flat = np.abs(normal[:, 2]) > EDGE_ON * np.linalg.norm(normal, axis=1)
+    P, normal = P[flat], normal[flat]
+    return float(((normal * P.mean(axis=1)).sum(axis=1) / normal[:, 2]).max(initial=-np.inf))
+
+
+def behind(facets: Facets, places: Array, rows: Array) -> Mask:
+    """Return which places (k, 3) m a body hides."""
+    return np.array([depth_at(facets, rows, x[:2]) > x[2] for x in places @ rows.T], dtype=bool)
 
 
 def colored(facets: Facets, colors: Any = None, strength: float = 1.0) -> Array:

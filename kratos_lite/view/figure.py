@@ -10,7 +10,7 @@ import numpy as np
 from kratos_lite.typing import Array
 from kratos_lite.view import canvas
 from kratos_lite.view.extremes import draw_extremes, texts
-from kratos_lite.view.facets import MANY, colored, draw_facets, facets_of, outline
+from kratos_lite.view.facets import MANY, Facets, colored, draw_facets, facets_of, outline
 from kratos_lite.view.marks import draw_marks
 from kratos_lite.view.rulers import draw_rulers, draw_triad
 from kratos_lite.view.scene import Options, Scene, Subject, drawn_points, scene_of
@@ -26,8 +26,8 @@ def figure_of(subjects: Sequence[Subject], options: Options) -> Any:
     scene = scene_of(subjects, options)
     figure, panels, inch = compose(scene, options)
     for axes, subject in zip(panels, subjects, strict=True):
-        draw_body(axes, scene, subject, inch)
-        draw_extremes(axes, scene, subject)
+        _, facets = draw_body(axes, scene, subject, inch)
+        draw_extremes(axes, scene, subject, facets)
     return figure
 
 
@@ -142,8 +142,10 @@ def _place_title(figure: Any, title: str) -> None:
         figure.text((x0 + x1) / 2, y1 + 0.12, title, **style)
 
 
-def draw_body(axes: Any, scene: Scene, subject: Subject, inch: float, most: int = MANY) -> list[Any]:
-    """Draw one subject; return what was drawn."""
+def draw_body(
+    axes: Any, scene: Scene, subject: Subject, inch: float, most: int = MANY
+) -> tuple[list[Any], Facets]:
+    """Draw one subject; return what was drawn, and its surface."""
     drawn = []
     deformed = subject.u is not None and subject.u.any() and not subject.moving
     if deformed or scene.plane is not None:
@@ -162,4 +164,4 @@ def draw_body(axes: Any, scene: Scene, subject: Subject, inch: float, most: int 
         drawn += draw_marks(axes, scene.rows, subject.marks, inch, facets=facets)
     for artist in drawn:
         artist.set_clip_on(scene.zoom is not None)
-    return drawn
+    return drawn, facets

@@ -194,6 +194,16 @@ def test_extremes_are_marked_with_their_place_and_number():
     assert not [text for text in words(kl.plot(mesh, values=np.ones(20))) if "▲" in text]
 
 
+@pytest.mark.parametrize(("view", "seen"), [("iso", "v"), ((150, 20), "^"), ("y-", "")])
+def test_marks_of_extremes_are_pale_where_the_body_hides_them(view, seen):
+    """They are in the middle of the sides x- and x+ of a cube."""
+    mesh = kl.box((1, 1, 1), (2, 2, 2))
+    on_axis = (np.abs(mesh.points[:, 1:] - 0.5) < 0.1).all(axis=1)
+    numbers = np.where(on_axis, 0.5 - mesh.points[:, 0], 0.0)
+    lines = kl.plot(mesh, values=numbers, view=view).axes[0].lines
+    assert "".join(line.get_marker() for line in lines if line.get_alpha() == 1) == seen
+
+
 def test_recovered_values_say_so(result):
     numbers = nodal_values(result, "von_mises").numbers
     text = f"▲ {numbers.max() / 1e6:.4g} MPa recovered at node {result.mesh.node_ids[numbers.argmax()]}, "

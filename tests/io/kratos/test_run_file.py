@@ -24,7 +24,7 @@ from run_files import (
 from scenes import case, present
 
 import kratos_lite as kl
-from kratos_lite.errors import ModelError
+from kratos_lite.errors import InputError, ModelError
 from kratos_lite.io.files import read_case
 from kratos_lite.io.run import prepare
 
@@ -124,6 +124,19 @@ def test_2019_folder_runs_and_its_own_check_passes(name, part, component, expect
     assert re.search(rf"passed \(node \d+: found {expected:g}, expected {expected:g}", line)
     for text in ("beside the run file is read", "analysis_type is non_linear"):
         assert any(text in note for note in project.model.notes)
+
+
+def test_files_are_found_from_a_folder_above_where_kratos_is_started(folder):
+    (folder / "small").mkdir()
+    text = json.dumps(ONE_STEP).replace('"box"}', f'"{folder.name}/box"}}')
+    text = text.replace("materials.json", f"{folder.name}/materials.json")
+    path = write(folder / "small", text)
+    notes = read_case(path).model.notes
+    for name in ("box.mdpa", "materials.json"):
+        assert f"{folder.name}/{name} is not there; {folder / name} is read" in notes
+    path.write_text(text.replace(folder.name, "elsewhere"))
+    with pytest.raises(InputError, match="there is no file"):
+        read_case(path)
 
 
 def test_cantilever_beam_runs_as_kratos_computed_it(shared):
