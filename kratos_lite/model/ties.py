@@ -26,7 +26,8 @@ COVERED = 0.5
 """Least fraction of each dependent face that the other part must cover."""
 HOPS = 3
 """Cells from a dependent node that is known to one that is free, at most."""
-WHOLE = 1 - 1e-6
+WHOLE, SAME = 1 - 1e-6, 1e-6
+"""Fraction that counts as all of a part; difference of sizes of faces that counts as none."""
 
 
 class Coupling(ABC):
@@ -129,7 +130,7 @@ def _checked(tie: Tie) -> Mortar:
     if mesh.hanging is not None and np.isin(mesh.hanging.nodes, np.concatenate(tie.nodes_of)).any():
         raise ModelError(f"cannot tie {names}: nodes hang there; tie them on a mesh without, and no error=")
     radius = [np.mean([Cells(block, mesh.points).radius.mean() for block in some]) for some in faces]
-    order = [0, 1] if radius[0] <= radius[1] else [1, 0]
+    order = [0, 1] if radius[0] <= (1 + SAME) * radius[1] else [1, 0]
     found: list[Mortar] = []
     for one in order:
         found.append(mortar(mesh.points, faces[one], faces[1 - one], tie.tolerance))

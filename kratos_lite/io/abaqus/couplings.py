@@ -99,7 +99,7 @@ class Connections:
         tolerance = Row(card.place, (word,)).number(0) if word else None
         for row in card.rows():
             slave, master = (self.geometry.surface_nodes(row.text(i), row) for i in (0, 1))
-            self.ties.append((master, slave, tolerance))
+            self.ties.append((slave, master, tolerance))  # of faces alike in size the slave depends
 
     def spring(self, card: Card) -> None:
         """Read *SPRING: a line of directions, which SPRINGA lacks, and a stiffness."""
@@ -245,8 +245,8 @@ class Connections:
                 card.wrong("with NLGEOM its rotation must be held at 0, as large rotations are not supported")
         if self.rows:
             model.supports.add_constraints(self._equations())
-        for master, slave, tolerance in self.ties:
-            model.tie(master, slave, tolerance=tolerance)
+        for slave, master, tolerance in self.ties:
+            model.tie(slave, master, tolerance=tolerance)
         if self.ties:
             model.notes.append("*TIE holds in the mean over faces (mortar), in CalculiX node by node")
         model.supports.check_used()

@@ -146,7 +146,7 @@ def _left_out(kind: str, document: Document) -> list[str]:
     data = {
         "properties": "properties (materials)", "nodal_data": "nodal data (supports, loads)",
         "element_data": "element data", "condition_data": "condition data", "constraints": "constraints",
-        "tables": "tables", "attached": "springs and masses",
+        "tables": "tables",
     }  # fmt: skip
     lost = [what for name, what in data.items() if getattr(document, name)]
     lost += ["parts and conditions (loads)"] if document.mesh.parts or document.mesh.conditions else []
