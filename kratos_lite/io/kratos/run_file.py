@@ -59,25 +59,38 @@ def read_kratos_project(
     _use_materials(solver, context, document, notes)
     notes += _notes_on_laws(document, small, eigen)
     time = None if dynamic or eigen else quasi_static_of(solver, times)
-    actions, expected, states, written = _read_processes(settings, context, notes, eigen)
-    for action in actions:
+    processes = _read_processes(settings, context, notes, eigen)
+    for action in processes.actions:
         if action.component == TEMPERATURE:
             action.settings.expect(expanding(document, True), "variable_name", NO_EXPANSION)
     in_steps = dynamic or not (eigen or in_ale.values or len(times) == 2)
-    in_time = ProcessesInTime(actions, context, dynamic) if in_steps else None
-    processes = in_time.prepare if in_time else partial(run, actions, context, notes)
+    in_time = ProcessesInTime(processes.actions, context, dynamic) if in_steps else None
+    act = in_time.prepare if in_time else partial(run, processes.actions, context, notes)
     displaced = initial_displacement and in_time is None
-    model = model_from(document, initial_displacement=displaced, processes=processes)
-    for initial_state in states:
+    model = model_from(document, initial_displacement=displaced, processes=act)
+    _finish(model, settings, processes, in_time, times[-1], notes)
+    if in_time and dynamic:
+        time = time_integration_of(settings, in_time)
+    outputs, files = Outputs(in_steps=list(processes.written)), settings.files
+    time = time if in_time else None
+    return Case(model, time, modes, above, outputs=outputs, expected=processes.checks, files=files)
+
+
+def _finish(
+    model: Model,
+    settings: Settings,
+    processes: _Processes,
+    in_time: ProcessesInTime | None,
+    end: float,
+    notes: list[str],
+) -> None:
+    """Give a model its initial states, its motion, what changes in time, and the notes."""
+    for initial_state in processes.states:
         initial_state(model)
-    add_motion(model, settings, None if in_time else times[-1])
+    add_motion(model, settings, None if in_time else end)
     model.notes += notes
     if in_time:
         in_time.finish(model)
-        time = time_integration_of(settings, in_time) if dynamic else time
-    outputs, files = Outputs(in_steps=list(written)), settings.files
-    time = time if in_time else None
-    return Case(model, time, modes, above, outputs=outputs, expected=expected, files=files)
 
 
 def _read_run_file(path: Path) -> Settings:

@@ -248,7 +248,7 @@ def test_a_rate_table_is_taken_at_the_time_of_the_solution(folder):
 def test_modes_are_those_of_python(folder, capsys):
     held = ("--material", "E=1e6,nu=0.3,density=1000", "--fix", "inner:xyz", "--modes", "4")
     assert run("wheel.mdpa", *held) == 0
-    rows = [line.split() for line in capsys.readouterr().out.splitlines()]
+    rows = [line.split() for line in capsys.readouterr().out.splitlines()[:5]]
     assert rows[0] == ["mode", "frequency", "Hz", "rad/s"]
     model = kl.Model(kl.read("wheel.mdpa").mesh, kl.Isotropic3D(**RUBBER))
     model.fix("inner")
@@ -257,7 +257,7 @@ def test_modes_are_those_of_python(folder, capsys):
     np.testing.assert_allclose(found[:, 1], omega, rtol=1e-7)
     np.testing.assert_allclose(found[:, 0] * 2 * np.pi, omega, rtol=1e-7)
     assert run("wheel.mdpa", *held, "--rotation", "z:5") == 0
-    rows = [line.split() for line in capsys.readouterr().out.splitlines()]
+    rows = [line.split() for line in capsys.readouterr().out.splitlines()[:5]]
     model.add(kl.ale.Rotation("z", rate=5.0))
     values = np.array([value for value in model.complex_modes(8)[0] if value.imag > 0])
     assert len(values) == 4 == len(rows) - 1
