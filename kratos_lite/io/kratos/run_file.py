@@ -31,6 +31,7 @@ from kratos_lite.io.kratos.time_dependent import DYNAMIC, ProcessesInTime, time_
 from kratos_lite.io.kratos.to_model import model_from
 from kratos_lite.io.kratos.variables import TEMPERATURE
 from kratos_lite.io.settings import Settings, find_file, read_settings
+from kratos_lite.model.loads.surface import ConditionLoads
 
 CHECK = "check_eigenvalues_process"
 NOT_RUN = ("save_restart_process", "timer_process", "print_info_in_file_process")
@@ -116,7 +117,10 @@ def _notes_on_laws(document: Document, small: bool, eigen: bool) -> list[str]:
     notes = make_linear(document) if small else []
     notes += notes_on_stress(document)
     if not (small or eigen or is_nonlinear(document)):
-        notes.append("analysis_type is non_linear: the linear solution is computed, on the undeformed body")
+        text = "analysis_type is non_linear: the linear solution is computed, on the undeformed body"
+        carriers = [block.name for block in document.mesh.conditions if len(block)]
+        follow = any(name.startswith(ConditionLoads.following) for name in carriers)
+        notes.append(Omission(text) if follow else text)
     return notes
 
 

@@ -131,7 +131,8 @@ def test_steps_are_those_of_the_intervals_and_parts_have_their_own_files(folder)
     by_time = output(
         "vtk", "Structure.Top", output_control_type="time", output_interval=0.25, output_precision=2
     )
-    asked = {"output_interval": 5, "nodal_results": ["REACTION"], "gauss_point_results": ["VON_MISES_STRESS"]}
+    tensors = ["CAUCHY_STRESS_TENSOR", "DAMAGE"]
+    asked = {"output_interval": 5, "nodal_results": ["REACTION"], "gauss_point_results": tensors}
     gid = output("gid", output_name="gid/box", postprocess_parameters={"result_file_configuration": asked})
     lists = [
         output("json", output_variables=["REACTION"], output_file_name=f"{f}.json", time_frequency=f)
@@ -151,6 +152,8 @@ def test_steps_are_those_of_the_intervals_and_parts_have_their_own_files(folder)
         *(f"gid/box_{step}.vtu" for step in (5, 10)),
     }
     assert any(line.endswith("Structure_Tips_0_8.vtk (12 files)") for line in lines)
+    assert any(note.endswith(": DAMAGE not written") for note in outcome.case.model.notes)
+    assert b'Name="CAUCHY_STRESS_VECTOR"' in folder.joinpath("gid/box_5.vtu").read_bytes()
     side = folder.joinpath("steps/Structure_Side_0_4.vtk").read_bytes()
     assert b"KRATOS_CONDITION_ID 1 4  int\n" + np.array([5, 6, 7, 8], ">i4").tobytes() in side
     for frequency, times in ((0.0, 10), (0.2, 3)):

@@ -8,9 +8,10 @@ import numpy as np
 
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.state import State
+from kratos_lite.io.case import Case
 from kratos_lite.io.formats.legacy_vtk import write_legacy_vtk
 from kratos_lite.io.formats.vtu import write_vtu
-from kratos_lite.io.kratos.context import RunContext
+from kratos_lite.io.kratos.context import Omission, RunContext
 from kratos_lite.io.kratos.outputs.process import OutputProcess
 from kratos_lite.io.kratos.outputs.values import at_nodes, cells_of, means, nodal_means
 from kratos_lite.io.settings import Settings
@@ -146,6 +147,14 @@ class GidOutput(VtkOutput):
         own = own.section("result_file_configuration")
         values = {"model_part_name": settings.text("model_part_name"), **own.values}
         super().__init__(Settings(values, own.source, own.path), context)
+
+    def check(self, case: Case) -> None:
+        """Leave out, with a note, the variables that the results do not have."""
+        for key, have in self.known(case).items():
+            names = [name.replace("_TENSOR", "_VECTOR") for name in self.settings.texts(key)]
+            self.settings.values[key] = [name for name in names if name in have]
+            if lost := [name for name in names if name not in have]:
+                case.model.notes.append(Omission(f"{self.settings.path}: {', '.join(lost)} not written"))
 
     def file(self, label: str, when: str) -> str:
         """Return the path of the file of a step."""

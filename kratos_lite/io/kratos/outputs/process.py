@@ -45,11 +45,15 @@ class OutputProcess(StepOutput):
     def due(self) -> list[int]:
         """Return the steps after which it writes."""
 
+    def known(self, case: Case) -> dict[str, list[str]]:
+        """Return the variables that results have for each list of them."""
+        at_points = [*gauss_variables(case.model.element_groups())]
+        return dict.fromkeys(self.nodal, nodal_variables(case)) | dict.fromkeys(self.gauss, at_points)
+
     def check(self, case: Case) -> None:
         """Raise InputError for a variable that the results do not have, with the nearest name."""
-        known = {True: nodal_variables(case), False: [*gauss_variables(case.model.element_groups())]}
-        for key in (*self.nodal, *self.gauss):
-            have, place = known[key in self.nodal], "nodes" if key in self.nodal else "Gauss points"
+        for key, have in self.known(case).items():
+            place = "nodes" if key in self.nodal else "Gauss points"
             for name in self.settings.texts(key):
                 text = f"kratos_lite has no {name} at {place} here.{nearest(name, have)} There are "
                 self.settings.expect(name in have, key, text + ", ".join(have))
