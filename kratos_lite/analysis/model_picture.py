@@ -9,6 +9,7 @@ import numpy as np
 from kratos_lite.assembly.element_groups import add_nodal
 from kratos_lite.errors import ModelError
 from kratos_lite.mesh import Mesh, distinct
+from kratos_lite.mesh.facets import unit_normals
 from kratos_lite.mesh.selection import spread
 from kratos_lite.model.attachments import MARKS, SHOWN
 from kratos_lite.model.loads.base import Drawn, Load
@@ -101,9 +102,7 @@ class _Surface:
         self.size = SHOWN * float(np.linalg.norm(np.ptp(mesh.points[mesh.used_nodes()], axis=0)))
         normals = np.zeros_like(mesh.points)
         for block in mesh.boundary:
-            X = mesh.points[block.nodes]
-            last = block.known_shape.corners - 1
-            normal = np.cross(X[:, 2] - X[:, 0], X[:, last] - X[:, 1])
+            normal = unit_normals(mesh.points[block.nodes[:, : block.known_shape.corners]])
             np.add.at(normals, block.nodes, normal[:, None])
         outer = np.flatnonzero(normals.any(axis=1))
         self._points, self._normals = mesh.points[outer], normals[outer]

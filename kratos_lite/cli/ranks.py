@@ -119,9 +119,6 @@ def _solve_part(ranks: Alone, options: Namespace) -> tuple[list[str], list[str]]
 
     with ranks.agree_on_errors():
         case = case_of(options, part=ranks.rank)
-        if case.outputs.in_steps:
-            case.model.notes.append("output processes are not run on part files; -o OUT.pvtu writes results")
-            case.outputs.in_steps = []
         check_case(case)
         check_outputs(case)
         for path in case.outputs.paths():

@@ -423,10 +423,7 @@ class Supports:
         """Return displacements (n, 3) at a time with those of reference nodes."""
         if self.mesh.used_nodes().all():
             return u
-        values = self.values.copy()
-        for function, mask in self.motions:
-            values[mask] = function(time)
-        P, c = self.followed(values)
+        P, c = self.followed(self.at(time).values)
         return np.asarray(P @ u.ravel() + c).reshape(-1, 3)
 
     def carried(self, forces: Array) -> Array:

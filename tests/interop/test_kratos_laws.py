@@ -5,7 +5,18 @@ from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
 import pytest
-from run_files import CLAMP, box_mdpa, materials, process, run_file, run_kratos, write
+from run_files import (
+    CLAMP,
+    PLASTIC,
+    SOFTENING,
+    VON_MISES,
+    box_mdpa,
+    materials,
+    process,
+    run_file,
+    run_kratos,
+    write,
+)
 
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.io.files import read_case
@@ -18,28 +29,6 @@ for wheel in ("Multiphysics", "StructuralMechanicsApplication", "ConstitutiveLaw
     except PackageNotFoundError:
         pytest.skip(f"Kratos{wheel} is not installed", allow_module_level=True)
 
-PLASTIC = {
-    "YIELD_STRESS": 4e6,
-    "ISOTROPIC_HARDENING_MODULUS": 1e8,
-    "EXPONENTIAL_SATURATION_YIELD_STRESS": 4e6,  # with a higher one Kratos does not converge
-    "HARDENING_EXPONENT": 50.0,
-}
-VON_MISES = {
-    "name": "SmallStrainIsotropicPlasticityFactory",
-    "yield_surface": "VonMises",
-    "plastic_potential": "VonMises",
-}
-SOFTENING = {
-    "YIELD_STRESS_TENSION": 4e6,
-    "YIELD_STRESS_COMPRESSION": 4e6,
-    "FRACTURE_ENERGY": 2e5,
-    "HARDENING_CURVE": 1,
-    "MAXIMUM_STRESS": 5e6,
-    "MAXIMUM_STRESS_POSITION": 0.1,
-    "FRICTION_ANGLE": 32.0,
-    "DILATANCY_ANGLE": 32.0,
-    "SOFTENING_TYPE": 1,
-}
 PERFECT = SOFTENING | {"HARDENING_CURVE": 3}
 CASES = {
     "J2": ("SmallDisplacementElement", "SmallStrainJ2Plasticity3DLaw", PLASTIC, 0.01),

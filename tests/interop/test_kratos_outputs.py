@@ -11,6 +11,9 @@ from run_files import (
     CLAMP,
     GRAVITY,
     MATERIALS,
+    PLASTIC,
+    SOFTENING,
+    VON_MISES,
     box_mdpa,
     materials,
     output,
@@ -36,28 +39,6 @@ EXACT = {
     "residual_relative_tolerance": 1e-12,
     "residual_absolute_tolerance": 1e-9,
     "max_iteration": 50,
-}
-J2 = {
-    "YIELD_STRESS": 4e6,
-    "ISOTROPIC_HARDENING_MODULUS": 1e8,
-    "EXPONENTIAL_SATURATION_YIELD_STRESS": 4e6,
-    "HARDENING_EXPONENT": 50.0,
-}
-FACTORY = {
-    "name": "SmallStrainIsotropicPlasticityFactory",
-    "yield_surface": "VonMises",
-    "plastic_potential": "VonMises",
-}
-SOFTENING = {
-    "YIELD_STRESS_TENSION": 4e6,
-    "YIELD_STRESS_COMPRESSION": 4e6,
-    "FRACTURE_ENERGY": 2e5,
-    "HARDENING_CURVE": 1,
-    "MAXIMUM_STRESS": 5e6,
-    "MAXIMUM_STRESS_POSITION": 0.1,
-    "FRICTION_ANGLE": 32.0,
-    "DILATANCY_ANGLE": 32.0,
-    "SOFTENING_TYPE": 1,
 }
 STRESSES = ["VON_MISES_STRESS", "CAUCHY_STRESS_VECTOR", "GREEN_LAGRANGE_STRAIN_VECTOR"]
 
@@ -115,8 +96,8 @@ def solid(law, **constants):
 
 CASES = {
     "one step": (SMALL, MATERIALS, [CLAMP], [GRAVITY, push("1e4*t")], {}, STATIC, STRESSES),
-    "J2": (SMALL, solid("SmallStrainJ2Plasticity3DLaw", **J2), PULLED, [], EXACT, STATIC, STRESSES),
-    "plasticity": (SMALL, solid(FACTORY, **SOFTENING), PULLED, [], EXACT, STATIC, ["PLASTIC_DISSIPATION"]),
+    "J2": (SMALL, solid("SmallStrainJ2Plasticity3DLaw", **PLASTIC), PULLED, [], EXACT, STATIC, STRESSES),
+    "plasticity": (SMALL, solid(VON_MISES, **SOFTENING), PULLED, [], EXACT, STATIC, ["PLASTIC_DISSIPATION"]),
     "large": (LARGE, solid("HyperElastic3DLaw"), PULLED_FAR, [], EXACT, STATIC, STRESSES[:2]),
     "in time": (SMALL, MATERIALS, [CLAMP], [GRAVITY, push("1e4*t")], IN_TIME, MOVING, STRESSES[:2]),
 }

@@ -35,6 +35,7 @@ from kratos_lite.model.loads.surface import ConditionLoads
 
 CHECK = "check_eigenvalues_process"
 NOT_RUN = ("save_restart_process", "timer_process", "print_info_in_file_process")
+PARTS = "results over part files are written by -o OUT.pvtu"
 
 
 def read_kratos_project(
@@ -60,7 +61,8 @@ def read_kratos_project(
     _use_materials(solver, context, document, notes)
     notes += _notes_on_laws(document, small, eigen)
     time = None if dynamic or eigen else quasi_static_of(solver, times)
-    processes = _read_processes(settings, context, notes, eigen)
+    instead = "modes are written by -o OUT" if eigen else "" if part is None else PARTS
+    processes = _read_processes(settings, context, notes, eigen, instead)
     for action in processes.actions:
         if action.component == TEMPERATURE:
             action.settings.expect(expanding(document, True), "variable_name", NO_EXPANSION)
@@ -187,14 +189,19 @@ class _Processes(NamedTuple):
     written: list[OutputProcess]
 
 
-def _read_processes(settings: Settings, context: RunContext, notes: list[str], eigen: bool) -> _Processes:
-    """Return what processes are for; all that are unknown are reported together."""
+def _read_processes(
+    settings: Settings, context: RunContext, notes: list[str], eigen: bool, instead: str
+) -> _Processes:
+    """Return what processes are for; all that are unknown are reported together.
+
+    Output processes are left out where something is said `instead`.
+    """
     found, problems = _Processes([], [], [], []), Problems()
     for section in (settings.section("processes"), settings.section("output_processes")):
         # Kratos keeps the lists in alphabetical order; later processes replace earlier values.
         for key in sorted(section.values):
             for entry in section.sections(key):
-                _read_process(entry, context, found, notes, problems, eigen)
+                _read_process(entry, context, found, notes, problems, eigen, instead)
     problems.raise_if_any()
     return found
 
@@ -206,6 +213,7 @@ def _read_process(
     notes: list[str],
     problems: Problems,
     eigen: bool,
+    instead: str,
 ) -> None:
     """Add what a process is for to what is found, or to the notes or the problems."""
     module, compare = module_of(entry), {CHECK: eigenvalue_comparisons} if eigen else COMPARISONS
@@ -226,6 +234,6 @@ def _read_process(
         omitted = f"{module} is not evaluated: there are no such values"
     else:
         output = OUTPUT_PROCESSES[module](entry.section("Parameters", required=True), context)
-        omitted = f"{module} writes nothing: modes are written by -o OUT" if eigen else output.note
-        found.written.extend([] if eigen else [output])
+        omitted = f"{module} writes nothing: {instead}" if instead else output.note
+        found.written.extend([] if instead else [output])
     notes.extend([Omission(f"{entry.path}: {omitted}")] if omitted else [])

@@ -6,10 +6,13 @@ import re
 import meshio
 import numpy as np
 import pytest
+from kratos_part_files import write_part_files
 from run_files import CLAMP, GRAVITY, MATERIALS, box_mdpa, materials, output, process, run_file, write
 
 import kratos_lite as kl
 from kratos_lite.io.files import read_case
+from kratos_lite.io.kratos.context import Omission
+from kratos_lite.io.kratos.run_file import read_kratos_project
 from kratos_lite.io.run import check, run
 
 STRESS, STRAIN = "CAUCHY_STRESS_VECTOR", "GREEN_LAGRANGE_STRAIN_VECTOR"
@@ -295,3 +298,16 @@ def test_other_gauss_points_than_those_of_kratos_are_refused(folder):
 def test_no_step_at_the_times_of_an_output_is_said(folder):
     _, (line,) = solved(folder, output("vtk", output_interval=2))
     assert line == f"nothing for {VTK}: no step at its times was taken"
+
+
+def test_outputs_of_part_files_are_left_out_with_a_note(folder):
+    """`--strict` counts it, as Kratos writes a file for each part."""
+    vtk = output("vtk", "Structure")
+    run_path = write(folder, run_file([CLAMP], [GRAVITY], outputs={"all": [vtk]}))
+    mesh = next(folder.glob("*.mdpa"))
+    write_part_files(mesh, folder, 2, [0, 0, 0, 0, 1, 1, 1, 1])
+    mesh.unlink()
+    case = read_kratos_project(run_path, part=1)
+    (note,) = [text for text in case.model.notes if isinstance(text, Omission)]
+    assert "vtk_output_process writes nothing: results over part files are written by -o OUT.pvtu" in note
+    assert not case.outputs.in_steps

@@ -80,7 +80,8 @@ class PointOutput(OutputProcess):
     def check(self, case: Case) -> None:
         """Raise InputError for a variable that the results do not have, or a point outside the part."""
         super().check(case)
-        self.settings.placed(self.keys[0], self.find, case.model.mesh)
+        self.mesh = case.model.mesh
+        self.found = self.settings.placed(self.keys[0], self.find, self.mesh)
 
     def find(self, mesh: Mesh) -> tuple[Ints, Callable[[Array], Array]]:
         """Return the ids of what holds the points, and what takes nodal values there."""
@@ -101,7 +102,7 @@ class PointOutput(OutputProcess):
 
     def add(self, result: Result, time: float, state: State | None = None) -> None:
         """Take the values of a step."""
-        ids, at_points = self.find(result.mesh)
+        ids, at_points = self.found if result.mesh is self.mesh else self.find(result.mesh)
         variables = self.settings.texts("output_variables")
         placed = [split(name, at_points(at_nodes(name, result, state))) for name in variables]
         rows = np.column_stack([values for columns in placed for values in columns.values()])
