@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from kratos_lite.mesh import Block, Mesh
+from kratos_lite.mesh import Block, Mesh, distinct
 from kratos_lite.typing import Array, Ints, Mask
 
 
@@ -87,3 +87,8 @@ class Document:
     model_data: dict[str, Any] = field(default_factory=dict)
     notes: list[Note] = field(default_factory=list)
     attached: list[Any] = field(default_factory=list)  # springs and masses, which are no elements here
+
+    def used_properties(self) -> list[Properties]:
+        """Return the Properties of elements, by number."""
+        used = {int(number) for block in self.mesh.blocks for number in distinct(block.properties)}
+        return [self.properties[number] for number in sorted(used & self.properties.keys())]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
 
@@ -14,20 +15,11 @@ from kratos_lite.io.kratos.context import Omission
 from kratos_lite.io.kratos.properties import material_from, names_material
 from kratos_lite.io.settings import Settings
 from kratos_lite.materials import Material
-from kratos_lite.mesh import distinct
 
 LOOSEST, TIGHTEST = 1e-8, 1e-10
 """Relative residuals between which that of a file is taken: a looser one would miss what it stands for."""
 ITERATIONS = 25
 """Corrections of a step that are allowed at least, as residuals are smaller than those of files."""
-
-
-def is_nonlinear(document: Document) -> bool:
-    """Return whether an element of a document has large displacements, or a law that is not linear."""
-    blocks = (block.name for block in document.mesh.blocks if len(block))
-    if any(name in ELEMENTS and ELEMENTS[name].finite for name in blocks):
-        return True
-    return any(not _is_linear(material) for _, material in _materials(document))
 
 
 def notes_on_stress(document: Document) -> list[str]:
@@ -53,7 +45,7 @@ def make_linear(document: Document) -> list[str]:
             notes.append(f"{block.name} is solved as {name} with small displacements")
     document.mesh = document.mesh.replace(blocks=blocks)
     for properties, material in _materials(document):
-        if not _is_linear(material):
+        if not (material.is_linear and material.strain_measure == "small"):
             law, number = properties.values["CONSTITUTIVE_LAW"], properties.id
             if not getattr(material, "isotropic", False) or "YOUNG_MODULUS" not in properties.values:
                 raise ModelError(f"Properties {number}: {law} has no linear solution; set 'non_linear'")
@@ -64,20 +56,10 @@ def make_linear(document: Document) -> list[str]:
 
 def _materials(document: Document) -> Iterator[tuple[Properties, Material]]:
     """Yield the properties of elements that state a material, with it."""
-    used = {int(number) for block in document.mesh.blocks for number in distinct(block.properties)}
-    for number in sorted(used & document.properties.keys()):
-        properties = document.properties[number]
-        if not names_material(properties.values):
-            continue
-        try:
-            material = material_from(properties.values)
-        except KratosLiteError:
-            continue  # `model_from` says where
-        yield properties, material
-
-
-def _is_linear(material: Material) -> bool:
-    return material.is_linear and material.strain_measure == "small"
+    for properties in document.used_properties():
+        if names_material(properties.values):
+            with suppress(KratosLiteError):  # `model_from` says where
+                yield properties, material_from(properties.values)
 
 
 def quasi_static_of(solver: Settings, times: Sequence[float]) -> TimeIntegration:

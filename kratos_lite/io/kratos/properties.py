@@ -82,12 +82,10 @@ def _apply_prestress(model: Model, properties: Properties) -> None:
 
 def expanding(document: Document, materials: bool) -> list[Properties]:
     """Return the properties of elements that a temperature strains; all if their materials come later."""
-    used = sorted({int(number) for block in document.mesh.blocks for number in np.unique(block.properties)})
+    used = document.used_properties()
     if not materials:
-        own = (document.properties.get(number, Properties(number)) for number in used)
-        return [replace(p, values={**p.values, "CONSTITUTIVE_LAW": None}) for p in own]
-    stated = [p for number in used if (p := document.properties.get(number)) and names_material(p.values)]
-    return [properties for properties in stated if material_from(properties.values).expansion.any()]
+        return [replace(p, values={**p.values, "CONSTITUTIVE_LAW": None}) for p in used]
+    return [p for p in used if names_material(p.values) and material_from(p.values).expansion.any()]
 
 
 def reference_temperature(properties: Properties, source: str) -> float:

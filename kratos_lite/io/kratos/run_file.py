@@ -21,7 +21,7 @@ from kratos_lite.io.kratos.eigenvalues import EIGEN, EIGEN_KEYS, eigenvalue_comp
 from kratos_lite.io.kratos.expected_values import COMPARISONS
 from kratos_lite.io.kratos.initial_state import MODULE, initial_state_of
 from kratos_lite.io.kratos.keys import IN_TIME, unused_keys
-from kratos_lite.io.kratos.laws import is_nonlinear, make_linear, notes_on_stress, quasi_static_of
+from kratos_lite.io.kratos.laws import make_linear, notes_on_stress, quasi_static_of
 from kratos_lite.io.kratos.motion import add_motion
 from kratos_lite.io.kratos.outputs import OUTPUT_PROCESSES, OutputProcess
 from kratos_lite.io.kratos.point_elements import set_apart
@@ -59,7 +59,7 @@ def read_kratos_project(
     moved, dofs = moved and not eigen, _dofs(solver, dynamic)
     context = RunContext(document.mesh, root, path.parent, times, moved, allow_outside, dofs)
     _use_materials(solver, context, document, notes)
-    notes += _notes_on_laws(document, small, eigen)
+    notes += (make_linear(document) if small else []) + notes_on_stress(document)
     time = None if dynamic or eigen else quasi_static_of(solver, times)
     instead = "modes are written by -o OUT" if eigen else "" if part is None else PARTS
     processes = _read_processes(settings, context, notes, eigen, instead)
@@ -71,6 +71,7 @@ def read_kratos_project(
     act = in_time.prepare if in_time else partial(run, processes.actions, context, notes)
     displaced = initial_displacement and in_time is None
     model = model_from(document, initial_displacement=displaced, processes=act)
+    notes += [] if small or eigen or model.is_nonlinear else [_note_on_linearity(document)]
     _finish(model, settings, processes, in_time, times[-1], notes)
     if in_time and dynamic:
         time = time_integration_of(settings, in_time)
@@ -114,16 +115,11 @@ def _notes_on_keys(settings: Settings, dynamic: bool, eigen: bool, small: bool) 
     return [f"{are.format(', '.join(unused))} not used"] if unused else []
 
 
-def _notes_on_laws(document: Document, small: bool, eigen: bool) -> list[str]:
-    """Make a document linear where its solution is; return notes on what its laws mean here."""
-    notes = make_linear(document) if small else []
-    notes += notes_on_stress(document)
-    if not (small or eigen or is_nonlinear(document)):
-        text = "analysis_type is non_linear: the linear solution is computed, on the undeformed body"
-        carriers = [block.name for block in document.mesh.conditions if len(block)]
-        follow = any(name.startswith(ConditionLoads.following) for name in carriers)
-        notes.append(Omission(text) if follow else text)
-    return notes
+def _note_on_linearity(document: Document) -> str:
+    """Return a note on a solution that is linear here, and not in Kratos where loads follow faces."""
+    text = "analysis_type is non_linear: the linear solution is computed, on the undeformed body"
+    carriers = [block.name for block in document.mesh.conditions if len(block)]
+    return Omission(text) if any(name.startswith(ConditionLoads.following) for name in carriers) else text
 
 
 def _dofs(solver: Settings, dynamic: bool) -> tuple[str, ...]:

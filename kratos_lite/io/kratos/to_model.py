@@ -17,7 +17,7 @@ from kratos_lite.io.kratos.point_elements import set_apart
 from kratos_lite.io.kratos.properties import NO_EXPANSION, USED, apply_properties, expanding
 from kratos_lite.io.kratos.variables import LOADING, SPLIT, TEMPERATURE, VECTORS, Variables, components
 from kratos_lite.io.names import misspelt
-from kratos_lite.mesh import Mesh, distinct, ids_of, rows_of_ids
+from kratos_lite.mesh import Mesh, ids_of, rows_of_ids
 from kratos_lite.solvers.constraints import Constraints
 from kratos_lite.typing import Array, Ints
 
@@ -49,11 +49,10 @@ def model_from(
     model = Model(document.mesh)
     model.notes += [str(note) for note in document.notes]
     model.notes += _renamed(document.mesh)
-    used = {int(p) for block in document.mesh.blocks for p in distinct(block.properties)}
     sources = (block.source for block in document.properties.values() if block.source)
     problems = Problems(next(sources, document.mesh.source))
-    for number in sorted(used & document.properties.keys()):
-        apply_properties(model, document.properties[number], materials, problems)
+    for properties in document.used_properties():
+        apply_properties(model, properties, materials, problems)
     problems.raise_if_any()
     values = Variables(document.mesh, expanding(document, materials), model.is_nonlinear)
     _fill(values, document, model)
