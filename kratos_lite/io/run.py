@@ -16,24 +16,15 @@ from kratos_lite.typing import Progress
 from kratos_lite.view.progress import watched
 
 ANALYSES = {
-    "static": "at_rest",
-    "steady": "at_rest",
-    "modal": "modal",
-    "harmonic": "harmonic",
-    "transient": "transient",
-    "quasi_static": "quasi_static",
-    "bodies": "bodies",
+    "static": ("at_rest", ""),
+    "steady": ("at_rest", "a motion of the material"),
+    "modal": ("modal", "natural frequencies"),
+    "harmonic": ("harmonic", "a harmonic response"),
+    "transient": ("transient", "an integration in time"),
+    "quasi_static": ("quasi_static", "quasi-static steps"),
+    "bodies": ("bodies", "a body"),
 }
-"""The module of `kratos_lite.io.runners` that runs each analysis."""
-NOT_OF_PETSC = {
-    "bodies": "a body",
-    "steady": "a motion of the material",
-    "transient": "an integration in time",
-    "quasi_static": "quasi-static steps",
-    "modal": "natural frequencies",
-    "harmonic": "a harmonic response",
-}
-"""What cases are that the backend PETSc does not solve."""
+"""The module of `kratos_lite.io.runners` that runs each analysis, and what it is if PETSc does not do it."""
 
 
 def run(case: Case, progress: Progress | None = None) -> Outcome:
@@ -89,8 +80,7 @@ def check_case(case: Case) -> None:
         raise InputError(f"the results of a case are a list of paths; got {case.outputs.results!r}")
     _check_analysis(case)
     if case.backend == "petsc":
-        if case.analysis in NOT_OF_PETSC:
-            what = NOT_OF_PETSC[case.analysis]
+        if what := ANALYSES[case.analysis][1]:
             raise InputError(f"backend='petsc' solves statics; this case has {what}; leave it out")
         if case.error is not None:
             raise InputError("backend='petsc' solves on the mesh as it is; leave the requested error out")
@@ -137,7 +127,7 @@ def prepare(case: Case, progress: Progress | None = None) -> tuple[Any, Iterator
 
 def runner_of(case: Case) -> Any:
     """Return the module that runs the analysis of a case."""
-    return import_module(f"kratos_lite.io.runners.{ANALYSES[case.analysis]}")
+    return import_module(f"kratos_lite.io.runners.{ANALYSES[case.analysis][0]}")
 
 
 def describe_case(case: Case) -> str:
@@ -148,6 +138,6 @@ def describe_case(case: Case) -> str:
     time = [("time", str(case.time))] if case.time else []
     from kratos_lite.io.describe import amounts
 
-    told = [row for row in case.model.table() if row[0] != "load"]
-    rows = [("file", name), *told, *amounts(case.model, case.time.end if case.time else 0.0), *time]
+    known = [row for row in case.model.table() if row[0] != "load"]
+    rows = [("file", name), *known, *amounts(case.model, case.time.end if case.time else 0.0), *time]
     return in_units(aligned(rows), case.model.units)

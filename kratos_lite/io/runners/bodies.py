@@ -13,7 +13,7 @@ from kratos_lite.analysis.stepping import integrate
 from kratos_lite.bodies import Body
 from kratos_lite.bodies.body import Deformable
 from kratos_lite.io.case import Case
-from kratos_lite.io.runners.in_time import follow, placed, restart
+from kratos_lite.io.runners.in_time import Kept, begun, follow
 from kratos_lite.io.runners.outcome import Outcome
 from kratos_lite.io.writers.pictures import write_picture
 from kratos_lite.io.writers.series import SeriesWriter
@@ -24,8 +24,6 @@ def prepare(case: Case, progress: Progress | None = None) -> tuple[Body, Iterato
     """Return the body of a case and its states, checked, without a step."""
     body, time = case.body, case.time
     assert time is not None
-    if time.restart is not None:
-        restart(time.restart, body)
     for path in case.outputs.results:
         SeriesWriter(path, body)
 
@@ -33,7 +31,7 @@ def prepare(case: Case, progress: Progress | None = None) -> tuple[Body, Iterato
         options: dict[str, Any] = {"every": time.every, "substeps": time.substeps, "progress": progress}
         return integrate(body, time.step, time.steps, **options)
 
-    return body, placed(time, steps)
+    return body, begun(time, body, steps)
 
 
 def check(case: Case) -> list[str]:
@@ -49,23 +47,23 @@ def run(case: Case, progress: Progress | None = None) -> Outcome:
     seconds = perf_counter() - clock
     if case.outputs.picture is not None:
         title = case.files[0].stem.replace("_", " ") if case.files else ""
-        write_picture(case.outputs.picture, body, states=summary.kept, title=title)
+        write_picture(case.outputs.picture, body, states=summary.states, title=title)
     return Outcome(case, [*rows_of(body), *summary.rows(seconds)])
 
 
-class _Summary:
+class _Summary(Kept):
     """What the summary says of a motion: energies at its start and end, and the largest between."""
 
     def __init__(self, body: Body, keep: bool) -> None:
-        self.body, self.keep, self.kept, self.largest = body, keep, list[State](), 0.0
+        super().__init__(keep)
+        self.body, self.largest = body, 0.0
         self.start = self.end = _Totals(body)
 
     def add(self, state: State) -> None:
         """Take a state."""
+        super().add(state)
         energy = float(np.sum(self.body.kinetic_energy() + self.body.internal_energy()))
         self.largest = max(self.largest, energy)
-        if self.keep:
-            self.kept.append(state)
 
     def rows(self, seconds: float) -> list[tuple[str, str]]:
         """Return the rows of the table."""

@@ -4,42 +4,39 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
-from kratos_lite.errors import InputError
+from kratos_lite.errors import naming
 from kratos_lite.io.case import Case, Comparison, TimeIntegration
 from kratos_lite.io.writers.series import SeriesWriter, make_folder
 from kratos_lite.io.writers.state import read_state, write_state
 
 
-class Monitor(Protocol):
-    """Takes each state for the summary."""
+class Kept:
+    """The states of a film or of a path, or none; what a summary says of all states builds on it."""
+
+    def __init__(self, keep: bool) -> None:
+        self.keep, self.states = keep, list[Any]()
 
     def add(self, state: Any) -> None:
         """Take a state."""
+        if self.keep:
+            self.states.append(state)
 
 
-def placed(time: TimeIntegration, action: Callable[[], Iterator[Any]]) -> Iterator[Any]:
-    """Return what an action returns; an InputError, as of a step that is too long, gets its place."""
-    try:
-        return action()
-    except InputError as error:
-        raise InputError(f"{time.place}: {error}" if time.place else str(error)) from None
-
-
-def restart(path: str, subject: Any) -> None:
-    """Let a body or a model go on from the state in a file; InputError, with its name, if it does not fit."""
-    state = read_state(path)
-    try:
-        state.restore(subject)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+def begun(time: TimeIntegration, subject: Any, steps: Callable[[], Iterator[Any]]) -> Iterator[Any]:
+    """Return the states of the steps of a body or model, which goes on from one in a file if it is given."""
+    with naming(time.restart or ""):
+        if time.restart is not None:
+            read_state(time.restart).restore(subject)
+    with naming(time.place):
+        return steps()
 
 
 def follow(
-    case: Case, subject: Any, start: Any, states: Iterator[Any], monitor: Monitor
+    case: Case, subject: Any, start: Any, states: Iterator[Any], monitor: Kept
 ) -> dict[int, list[tuple[float, str]]]:
     """Take all steps of a case, and write its series and its last state; return what comparisons found.
 
@@ -50,7 +47,7 @@ def follow(
         make_folder(path)
     with ExitStack() as stack:
         if outputs.state is not None:
-            stack.callback(_save, last, outputs.state)
+            stack.callback(lambda path: write_state(path, last[0]), outputs.state)
         series = [
             stack.enter_context(SeriesWriter(path, subject, mode=outputs.mode or "binary"))
             for path in outputs.results
@@ -58,10 +55,11 @@ def follow(
         for output in outputs.in_steps:
             stack.callback(output.close)
         stack.enter_context(np.errstate(over="ignore", invalid="ignore"))
-        for recorder in (*series, monitor):
+        recorders: list[SeriesWriter | Kept] = [*series, monitor]
+        for recorder in recorders:
             recorder.add(start)
         for last[0] in states:
-            for recorder in (*series, monitor):
+            for recorder in recorders:
                 recorder.add(last[0])
             _at_step(case, subject, last[0], found)
     return found
@@ -79,7 +77,3 @@ def _at_step(case: Case, subject: Any, state: Any, found: dict[int, list[tuple[f
         output.add(result, state.time, state)
     for i, comparison in due.items():
         found.setdefault(i, []).append(comparison.found(result, state.time))
-
-
-def _save(last: list[Any], path: str) -> None:
-    write_state(path, last[0])

@@ -9,7 +9,7 @@ from kratos_lite.analysis.quasi_static import QuasiStaticAnalysis
 from kratos_lite.analysis.state import State
 from kratos_lite.analysis.stepping import integrate
 from kratos_lite.io.case import Case
-from kratos_lite.io.runners.in_time import follow, placed, restart
+from kratos_lite.io.runners.in_time import Kept, begun, follow
 from kratos_lite.io.runners.outcome import Outcome
 from kratos_lite.io.writers.pictures import is_film, write_picture
 from kratos_lite.typing import Progress
@@ -21,8 +21,6 @@ def prepare(case: Case, progress: Progress | None = None) -> tuple[QuasiStaticAn
     assert time is not None
     analysis = case.model.quasi_static(**time.quasi_static or {})
     analysis.time = time.start
-    if time.restart is not None:
-        restart(time.restart, analysis)
 
     def steps() -> Iterator[State]:
         if not time.sizes:
@@ -35,7 +33,7 @@ def prepare(case: Case, progress: Progress | None = None) -> tuple[QuasiStaticAn
             h = time.sizes[min(analysis.step, len(time.sizes) - 1)]
             yield from integrate(analysis, h, 1, progress=progress)
 
-    return analysis, placed(time, steps)
+    return analysis, begun(time, analysis, steps)
 
 
 def check(case: Case) -> list[str]:
@@ -46,28 +44,16 @@ def check(case: Case) -> list[str]:
 def run(case: Case, progress: Progress | None = None) -> Outcome:
     """Take the steps of a model; its result is that of the end."""
     analysis, states = prepare(case, progress)
-    kept, clock, picture = _Kept(is_film(case.outputs.picture)), perf_counter(), case.outputs.picture
+    kept, clock, picture = Kept(is_film(case.outputs.picture)), perf_counter(), case.outputs.picture
     start = analysis.state()
     found = follow(case, analysis, start, states, kept)
     seconds, result = perf_counter() - clock, analysis.result()
     if picture is not None:
-        film = {"states": kept.states} if kept.all else {"values": "displacement"}
-        write_picture(picture, analysis if kept.all else result, **film)
+        film = {"states": kept.states} if kept.keep else {"values": "displacement"}
+        write_picture(picture, analysis if kept.keep else result, **film)
     steps, parts = analysis.step - start.step, len(analysis.reports)
     rows = [
         ("time", f"{start.time:.6g} … {analysis.time:.6g} s, {steps} steps in {parts} parts"),
         ("time per step", f"{seconds / max(steps, 1):.3g} s, {seconds:.3g} s in all"),
     ]
     return Outcome(case, [*rows, *result.table()], result, found=found)
-
-
-class _Kept:
-    """The states of a film, or none."""
-
-    def __init__(self, all: bool) -> None:
-        self.all, self.states = all, list[State]()
-
-    def add(self, state: State) -> None:
-        """Take a state."""
-        if self.all:
-            self.states.append(state)

@@ -14,7 +14,7 @@ from kratos_lite.analysis.state import State
 from kratos_lite.analysis.stepping import integrate
 from kratos_lite.analysis.transient import TransientAnalysis
 from kratos_lite.io.case import Case
-from kratos_lite.io.runners.in_time import follow, placed, restart
+from kratos_lite.io.runners.in_time import Kept, begun, follow
 from kratos_lite.io.runners.outcome import Outcome
 from kratos_lite.io.writers.pictures import is_film, write_picture
 from kratos_lite.model.loads import TimeDependentLoad
@@ -32,13 +32,11 @@ def prepare(case: Case, progress: Progress | None = None) -> tuple[TransientAnal
     transient = case.model.transient(**settings)
     if not time.balanced and not (time.displacement is None and time.velocity is None):
         transient = TransientAnalysis(_held_at_first(transient), **settings)
-    if time.restart is not None:
-        restart(time.restart, transient)
 
     def steps() -> Iterator[State]:
         return integrate(transient, time.step, time.steps, every=time.every, progress=progress)
 
-    return transient, placed(time, steps)
+    return transient, begun(time, transient, steps)
 
 
 def check(case: Case) -> list[str]:
@@ -72,20 +70,19 @@ def run(case: Case, progress: Progress | None = None) -> Outcome:
     return Outcome(case, rows, result, found=found)
 
 
-class _Summary:
+class _Summary(Kept):
     """What the summary says of a transient: its start, its last state and the one that moved farthest."""
 
     def __init__(self, transient: TransientAnalysis, keep: bool) -> None:
+        super().__init__(keep)
         self.transient, self.energy = transient, transient.energy()
-        self.kept, self.keep, self.states = 0, keep, list[State]()
-        self.largest, self.row = 0.0, 0
+        self.count, self.largest, self.row = 0, 0.0, 0
         self.start = self.last = self.farthest = transient.state()
 
     def add(self, state: State) -> None:
         """Take a state."""
-        self.last, self.kept = state, self.kept + 1
-        if self.keep:
-            self.states.append(state)
+        super().add(state)
+        self.last, self.count = state, self.count + 1
         length = np.linalg.norm(state.u, axis=1)
         row = int(length.argmax())
         if length[row] > self.largest:
@@ -99,7 +96,7 @@ class _Summary:
         steps = self.last.step - self.start.step
         span = f"{self.start.time:.6g} … {self.last.time:.6g} s, {steps} steps of {time.step:g} s"
         force, scale = self.last.reactions.sum(axis=0), float(np.abs(self.last.reactions).sum())
-        where = f"at node {mesh.node_ids[self.row]}, t = {self.farthest.time:.6g} s, of {self.kept} kept"
+        where = f"at node {mesh.node_ids[self.row]}, t = {self.farthest.time:.6g} s, of {self.count} kept"
         rows = [
             ("nodes", str(mesh.n_nodes)),
             ("elements", kinds),
