@@ -15,21 +15,6 @@ from kratos_lite.quadrature import gauss
 from kratos_lite.typing import Array
 from kratos_lite.validation import whole_number
 
-__all__ = [
-    "CELLS",
-    "Rule",
-    "by_order",
-    "hexahedron",
-    "line",
-    "point",
-    "pyramid",
-    "quadrilateral",
-    "rule_for",
-    "tetrahedron",
-    "triangle",
-    "wedge",
-]
-
 MAX_DEGREE = 40
 """Of the rules that there are."""
 

@@ -74,14 +74,14 @@ def read_document(path: str | Path, *, strict: bool = True) -> Document:
 
             return read_mdpa(path, strict=strict)
         if kind in ELEM_SET or (not path.is_file() and _is_stem(path)):
-            from kratos_lite.io.formats.elem import read_elem
+            from kratos_lite.io.formats.elem.reader import read_elem
 
             return read_elem(path)
         if not path.exists():
             raise InputError(f"{path}: there is no such file")
         if path.is_dir():
             raise InputError(f"{path}: is a folder without {PROJECT}; name a file in it")
-        from kratos_lite.io.formats.gmsh import GEOMETRY, meshing
+        from kratos_lite.io.formats.foreign import GEOMETRY, meshing
 
         if kind in GEOMETRY:
             raise InputError(
@@ -112,7 +112,7 @@ def write_document(path: str | Path, document: Document) -> list[str]:
 
             return [*map(str, write_mdpa(path, document)), *_mixed(document)]
         if kind in ELEM_SET:
-            from kratos_lite.io.formats.elem import write_elem
+            from kratos_lite.io.formats.elem.writer import write_elem
 
             return write_elem(path, document)
         if kind in ("", ".json"):

@@ -16,8 +16,14 @@ import numpy as np
 from kratos_lite.atomic import refuse_nan, replacing
 from kratos_lite.errors import InputError
 from kratos_lite.io.formats.document import Document, Note, Properties
-from kratos_lite.io.formats.foreign import cell_counts, check_ending, guarded, listed, read_foreign
-from kratos_lite.io.formats.gmsh import check_solids
+from kratos_lite.io.formats.foreign import (
+    cell_counts,
+    check_ending,
+    check_solids,
+    guarded,
+    listed,
+    read_foreign,
+)
 from kratos_lite.mesh import NO_ROWS, Block, Mesh, Part, with_rows
 from kratos_lite.shapes import SHAPES
 from kratos_lite.typing import Ints, Numbers

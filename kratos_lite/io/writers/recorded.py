@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
@@ -39,7 +39,7 @@ class RecordedBody:
     names: tuple[str, ...] = ("time", "step", "q", "u", "external_work")
 
     def __init__(self, body: Body, path: str | Path) -> None:
-        self.body, self.path = body, path
+        self.body, self.path, self.extra = body, path, {"kind": np.array(body.kind)}
 
     def now(self) -> State:
         """Return the state of the body as it is now."""
@@ -80,10 +80,6 @@ class RecordedBody:
             work = float(state.external_work)
             return np.concatenate([[state.time, *energies, sum(energies), work], *vectors])
 
-    def extra(self) -> dict[str, Array]:
-        """Return the kind of the body."""
-        return {"kind": np.array(self.body.kind)}
-
 
 class RecordedModel:
     """A transient of a model."""
@@ -91,6 +87,7 @@ class RecordedModel:
     columns: tuple[str, ...] = OF_MODELS
     kind = "time"
     names: tuple[str, ...] = ("time", "step", "u", "v", "a", "reactions")
+    extra: ClassVar[dict[str, Array]] = {}
 
     def __init__(self, transient: Any) -> None:
         self.transient = transient
@@ -107,7 +104,7 @@ class RecordedModel:
 
     def mesh(self) -> Mesh:
         """Return the mesh of the model."""
-        mesh: Mesh = self.transient.equations.model.mesh
+        mesh: Mesh = self.transient.model.mesh
         return mesh
 
     def fields(self, state: Any) -> tuple[dict[str, Array], dict[str, Array]]:
@@ -133,10 +130,6 @@ class RecordedModel:
         reaction = state.reactions.sum(axis=0)
         return np.array([state.time, self.transient.energy(state), largest, *reaction])
 
-    def extra(self) -> dict[str, Array]:
-        """Return nothing."""
-        return {}
-
 
 class RecordedSteps(RecordedModel):
     """Quasi-static steps of a model."""
@@ -144,11 +137,6 @@ class RecordedSteps(RecordedModel):
     columns: tuple[str, ...] = ("time [s]", "work [J]", *OF_MODELS[2:])
     kind = "static"
     names: tuple[str, ...] = ("time", "step", "u", "reactions", "work")
-
-    def mesh(self) -> Mesh:
-        """Return the mesh of the model."""
-        mesh: Mesh = self.transient.model.mesh
-        return mesh
 
     def fields(self, state: Any) -> tuple[dict[str, Array], dict[str, Array]]:
         """Return DISPLACEMENT, REACTION and stresses."""
@@ -187,4 +175,4 @@ def check_single(body: Body, path: str | Path) -> None:
 def arrays_of(subject: Recorded, states: Sequence[Any]) -> dict[str, Array]:
     """Return the numbers of states as arrays, one row for each state."""
     arrays = {name: np.array([getattr(state, name) for state in states]) for name in subject.names}
-    return {**subject.extra(), **arrays}
+    return {**subject.extra, **arrays}

@@ -89,7 +89,7 @@ class Page(Arrays):
 
     def write(self) -> None:
         """Write the page."""
-        from kratos_lite.io.writers.page.states import write_states_page  # rarely needed
+        from kratos_lite.io.writers.page.write import write_states_page  # rarely needed
 
         write_states_page(self.path, self.subject, self.states)
 

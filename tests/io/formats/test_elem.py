@@ -11,7 +11,8 @@ from scenes import case, present
 
 from kratos_lite.errors import MAX_PROBLEMS, InputError
 from kratos_lite.io.formats.document import Constraint, Data, Document, Properties
-from kratos_lite.io.formats.elem import read_elem, write_elem
+from kratos_lite.io.formats.elem.reader import read_elem
+from kratos_lite.io.formats.elem.writer import write_elem
 from kratos_lite.io.formats.mdpa.reader import read_mdpa
 from kratos_lite.mesh import Block, Mesh, Part
 from kratos_lite.shapes.faces import Quadrilateral4, Triangle3

@@ -10,7 +10,8 @@ from run_files import CUBE_NODES
 
 import kratos_lite as kl
 from kratos_lite.io.formats.document import Constraint, Document
-from kratos_lite.io.formats.elem import read_elem, write_elem
+from kratos_lite.io.formats.elem.reader import read_elem
+from kratos_lite.io.formats.elem.writer import write_elem
 from kratos_lite.io.formats.mdpa.reader import read_mdpa
 from kratos_lite.io.formats.mdpa.writer import write_mdpa
 from kratos_lite.io.text import blank_comments, read_bytes

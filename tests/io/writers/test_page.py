@@ -193,7 +193,7 @@ def test_a_mesh_without_solids_is_refused(tmp_path):
 
 
 def test_of_very_many_states_some_are_kept(tmp_path, monkeypatch):
-    monkeypatch.setattr("kratos_lite.io.writers.page.states.MOST_FRAMES", 4)
+    monkeypatch.setattr("kratos_lite.io.writers.page.write.MOST_FRAMES", 4)
     body = kl.RigidBody(kl.box(), kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0))
     with kl.SeriesWriter(tmp_path / "a.html", body) as series:
         for state in kl.integrate(body, dt=0.01, steps=10):

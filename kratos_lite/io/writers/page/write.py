@@ -7,11 +7,12 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kratos_lite.analysis.fields import FIELDS, PARTS, listed
+from kratos_lite.analysis.fields import FIELDS, PARTS, Field, listed, variable
+from kratos_lite.analysis.subjects import evenly
 from kratos_lite.atomic import refuse_nan, write_whole
 from kratos_lite.errors import InputError, SolveError
 from kratos_lite.io.writers.page.content import Content, Frame
@@ -19,6 +20,7 @@ from kratos_lite.typing import Array, Complexes
 
 if TYPE_CHECKING:
     from kratos_lite.analysis.result import Result
+    from kratos_lite.io.writers.recorded import Recorded
     from kratos_lite.mesh import Mesh
 
 BROWSER = Path(__file__).with_name("browser")
@@ -26,6 +28,15 @@ BROWSER = Path(__file__).with_name("browser")
 LARGEST = 1e38
 """Largest number in a page, which has single precision."""
 SCRIPTS = ("data.js", "fields.js", "body.js", "stage.js", "legend.js", "app.js")
+MOST_FRAMES = 120
+"""States in a page."""
+MOST_VALUES = 1_000_000
+"""Nodes of all states together, about 10 MB."""
+OF_STATES = [
+    *(FIELDS[name] for name in ("displacement", "von_mises", "velocity")),
+    *(variable(name, 1) for name in ("accumulated_plastic_strain", "damage")),
+]
+"""Fields of states, those that there are."""
 
 
 def write_page(path: str | Path, content: Content) -> None:
@@ -85,3 +96,17 @@ def write_modes_page(path: str | Path, mesh: Mesh, names: Sequence[str], shapes:
     fields = [shape, replace(shape, name=f"{shape.name} a quarter period later")]
     frames = [Frame(name, values) for name, *values in zip(names, *parts, strict=True)]
     write_page(path, Content(Path(path).stem, "modes", mesh, fields[: len(parts)], frames))
+
+
+def write_states_page(path: str | Path, subject: Recorded, states: list[Any]) -> None:
+    """Write the page of states of a body or a transient: displacements, von Mises stresses, velocities."""
+    mesh, all_of_them = subject.mesh(), len(states)
+    most = max(2, min(MOST_FRAMES, MOST_VALUES // mesh.n_nodes))
+    states = [states[row] for row in evenly(len(states), most)]
+    kept, frames = list[Field](), []
+    for state in states:
+        points, _ = subject.fields(state)
+        kept = [field for field in OF_STATES if field.kratos in points]
+        frames.append(Frame(f"t = {state.time:.5g} s", [points[field.kratos] for field in kept]))
+    about = [("states", f"{len(states)} of {all_of_them}")]
+    write_page(path, Content(Path(path).stem, "states", mesh, kept, frames, about=about))
