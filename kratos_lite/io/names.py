@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from difflib import get_close_matches
 
 from kratos_lite.errors import nearest
 from kratos_lite.shapes import SHAPES, Shape
@@ -20,6 +21,8 @@ CARRIERS = ("Load", "Face3D", "FacePressure", "SurfaceCondition", "PointConditio
 """Words in the names of conditions that carry loads."""
 PRESTRESS = ("PRESTRESS", "INSITU_STRESS")
 """Names of the initial stress in files, which Kratos subtracts: σ = C ε - PRESTRESS_FACTOR · PRESTRESS."""
+LIKELY, SURE = 0.8, 0.9
+"""Likeness, as of difflib, from which on a word may be, or surely is, a slip of another."""
 THIN = ("Shell", "Membrane", "Truss", "Beam", "Cable", "Spring", "Plate")
 """Words in the names of elements that are no solids."""
 
@@ -55,9 +58,7 @@ def nearest_variable(name: str, known: Iterable[str]) -> str:
     >>> nearest_variable("YOUNGS_MODULUS", ["YOUNG_MODULUS"]), nearest_variable("EMISSIVITY", ["VISCOSITY"])
     (' Did you mean YOUNG_MODULUS?', '')
     """
-    from difflib import get_close_matches
-
-    return nearest(name, get_close_matches(name, list(known), cutoff=0.8))
+    return nearest(name, get_close_matches(name, list(known), cutoff=LIKELY))
 
 
 def misspelt(name: str, known: Iterable[str]) -> str | None:
@@ -68,21 +69,10 @@ def misspelt(name: str, known: Iterable[str]) -> str | None:
     """
     if any(letter.isdigit() for letter in name):
         return None
-    slips = {word: _slips(name.upper(), word) for word in known if abs(len(name) - len(word)) <= 2}
-    best = min(slips, key=lambda word: (slips[word], -len(word)), default="")
-    return best if best and slips[best] <= (2 if len(best) > 8 else 1) else None
-
-
-def _slips(a: str, b: str) -> int:
-    """Return how many letters are missing, too many, wrong or exchanged between two words."""
-    above, row = [0] * (len(b) + 1), list(range(len(b) + 1))
-    for i, letter in enumerate(a, 1):
-        last, above, row = above, row, [i]
-        for j, other in enumerate(b, 1):
-            row.append(min(above[j] + 1, row[-1] + 1, above[j - 1] + (letter != other)))
-            if i > 1 and j > 1 and (letter, a[i - 2]) == (b[j - 2], other):
-                row[j] = min(row[j], last[j - 2] + 1)
-    return row[-1]
+    word, words = name.upper(), list(known)
+    exchanged = [other for other in words if sorted(other) == sorted(word)]
+    close = get_close_matches(word, exchanged, 1, LIKELY) or get_close_matches(word, words, 1, SURE)
+    return close[0] if close else None
 
 
 def element_shape(name: str) -> type[Shape] | None:

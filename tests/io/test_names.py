@@ -34,6 +34,7 @@ def test_a_letter_or_two_missing_wrong_or_exchanged_are_a_slip(slip, meant):
         *(name for name in KINDS if name not in WORDS and not name[:-2].endswith("STRESS")),
         *("MESH_DISPLACEMENT_X", "FACE_PRESSURE", "STEP_DISPLACEMENT_X", "POROSITY", "SHEAR_MODULUS_GAMMA12"),
         *("POINT_LOADS_VECTOR", "EQUIVALENT_YOUNG_MODULUS", "DENSITY_WATER", "YOUNG_MODULUS_SENSITIVITY"),
+        *("PRESTRESS_VECTOR", "COEFFICIENT_THERMAL_EXPANSION"),
         *("YOUNG_MODULUS_1", "CONSTITUTIVE_MATRIX", "AIR_PRESSURE", "INITIAL_STRAIN", "CAVITY"),
     ],
 )
