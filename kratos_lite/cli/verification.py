@@ -57,7 +57,7 @@ def _elements_of(path: Path) -> list[str]:
 def _printed(names: list[str], elements: list[str]) -> list[Row]:
     """Print failures as they come and the other rows at the end, also after Ctrl-C."""
     rows: list[Row] = []
-    told: set[str] = set()
+    reported: set[str] = set()
     width = max([9, *(len(short(name)) + 1 for name in elements or ELEMENTS)])
     print(page.header(width))
     try:
@@ -66,13 +66,13 @@ def _printed(names: list[str], elements: list[str]) -> list[Row]:
                 rows.append(row)
                 if row.failed:
                     with progress.hidden() if progress else nullcontext():
-                        print(page.line(row, width, row.note in told), flush=True)
-                    told.add(row.note)
+                        print(page.line(row, width, row.note in reported), flush=True)
+                    reported.add(row.note)
     finally:
         for row in rows:
             if not row.failed:
-                print(page.line(row, width, row.note in told))
-                told.add(row.note)
+                print(page.line(row, width, row.note in reported))
+                reported.add(row.note)
     return rows
 
 

@@ -33,8 +33,8 @@ class Rows:
 
     def local(self, own: int, first: int, ghosts: Ints) -> Rows:
         """Return them with columns by place: own nodes from 0, then ghosts; ascending within a row."""
-        mine = (self.columns >= first) & (self.columns < first + own)
-        place = np.where(mine, self.columns - first, own + np.searchsorted(ghosts, self.columns))
+        is_own = (self.columns >= first) & (self.columns < first + own)
+        place = np.where(is_own, self.columns - first, own + np.searchsorted(ghosts, self.columns))
         row = np.repeat(np.arange(len(self)), np.diff(self.indptr))
         order = np.lexsort((place, row))
         return Rows(self.indptr.astype(np.int32), place[order].astype(np.int32), self.data[order])
@@ -79,9 +79,9 @@ def coarsened(kernel: Any, ghosts: Ghosts, all_nodes: int, b: int, modes: Array)
 
 def _prolongator(kernel: Any, aggregate: Ints, T: Array, count: int, first: int) -> Rows:
     """Return own rows of T - omega D^-1 A T."""
-    mine = (aggregate >= first) & (aggregate < first + count)
-    others = np.unique(aggregate[(aggregate >= 0) & ~mine])
-    of = np.where(mine, aggregate - first, count + np.searchsorted(others, aggregate))
+    is_own = (aggregate >= first) & (aggregate < first + count)
+    others = np.unique(aggregate[(aggregate >= 0) & ~is_own])
+    of = np.where(is_own, aggregate - first, count + np.searchsorted(others, aggregate))
     of[aggregate < 0] = -1
     indptr, indices, data = kernel.prolongator(of.astype(np.int32), np.ascontiguousarray(T))
     numbers = np.concatenate([first + np.arange(count), others])

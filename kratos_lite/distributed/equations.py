@@ -57,8 +57,8 @@ class Outcome(NamedTuple):
         if self.failure:
             raise SolveError(f"{self.failure}; {CURE if plan.iterates else CURE_OF_FACTORS}")
         words = " ".join(f"-{option}" for option in self.unused)
-        told = [f"PETSc has not used these options: {words}; they may be misspelt"] if words else []
-        return Solution(x, self.name, plan.reason, self.iterations, self.error), told
+        notes = [f"PETSc has not used these options: {words}; they may be misspelt"] if words else []
+        return Solution(x, self.name, plan.reason, self.iterations, self.error), notes
 
 
 class Equations:

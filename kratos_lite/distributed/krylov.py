@@ -116,12 +116,12 @@ class Krylov:
         """Prepare what does not depend on the right side, once."""
         if self._is_ready:
             return
-        told = progress or (lambda phase, fraction: None)
-        told("set up", 0.0)
+        report = progress or (lambda phase, fraction: None)
+        report("set up", 0.0)
         with plain_errors():
             self.ksp.setUp()
             self.ksp.setUpOnBlocks()
-        told("set up", 1.0)
+        report("set up", 1.0)
         self._is_ready = True
 
     def solve(

@@ -141,20 +141,20 @@ class SharedStiffness:
             nodes, none = np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int32)
             weights = np.zeros(n + 1, dtype=np.int32), none, np.zeros(0)
             K = BlockMatrix(np.zeros((0, 3, 3)), none, np.zeros(1, dtype=np.int32))
-        mine = int(np.searchsorted(nodes, own))
-        offsets = np.concatenate([[0], np.cumsum(self.ranks.gather(mine))])
+        own_corners = int(np.searchsorted(nodes, own))
+        offsets = np.concatenate([[0], np.cumsum(self.ranks.gather(own_corners))])
         number = np.full((n, 1), -1, dtype=np.int64)
-        number[nodes[:mine], 0] = offsets[self.ranks.rank] + np.arange(mine)
+        number[nodes[:own_corners], 0] = offsets[self.ranks.rank] + np.arange(own_corners)
         self.ghosts.update(number)
-        beyond = int(np.searchsorted(nodes, own + len(self.ghosts)))
-        ghosts = Ghosts(self.ranks, offsets, number[nodes[mine:beyond], 0])
+        known = int(np.searchsorted(nodes, own + len(self.ghosts)))
+        ghosts = Ghosts(self.ranks, offsets, number[nodes[own_corners:known], 0])
         indptr, indices, values = weights
-        stop, rows = int(indptr[own]), int(K.indptr[mine])
-        A = K.indptr[: mine + 1], K.indices[:rows], K.data[:rows]
+        stop, rows = int(indptr[own]), int(K.indptr[own_corners])
+        A = K.indptr[: own_corners + 1], K.indices[:rows], K.data[:rows]
         P = (
             indptr[: own + 1].astype(np.int32),
             indices[:stop].astype(np.int32),
             values[:stop].astype(np.float32),
         )
         multigrid.add(A, ghosts, fixed[nodes], P)
-        return nodes, mine
+        return nodes, own_corners

@@ -29,18 +29,6 @@ MOST_STEPS = 1_000_000_000
 """Steps of one run; more take weeks; the step is probably mistyped."""
 
 
-def number_of_steps(value: Any) -> int:
-    """Return a number of steps; InputError for none, and for an absurd one.
-
-    >>> number_of_steps(100)
-    100
-    """
-    steps = whole_number(value, "steps")
-    if steps > MOST_STEPS:
-        raise InputError(f"{steps} steps are more than {MOST_STEPS}; take longer ones, or go on with restart")
-    return steps
-
-
 @dataclass(frozen=True, eq=False)
 class TimeIntegration:
     """How a model or body moves through time.
@@ -62,6 +50,11 @@ class TimeIntegration:
     quasi_static : of models: options of `Model.quasi_static`, whose steps are taken; None for a transient.
     start : s, of quasi-static steps.
     sizes : s, of quasi-static steps that are not alike, in place of `step`; further ones are as the last.
+
+    Raises
+    ------
+    InputError
+        A step is not > 0 s, or there are no steps or absurdly many.
     """
 
     step: float
@@ -82,7 +75,10 @@ class TimeIntegration:
 
     def __post_init__(self) -> None:
         positive_step(self.step)
-        number_of_steps(self.steps)
+        if whole_number(self.steps, "steps") > MOST_STEPS:
+            raise InputError(
+                f"{self.steps} steps are more than {MOST_STEPS}; take longer ones, or go on with restart"
+            )
         whole_number(self.every, "every")
         flag(self.lumped, "lumped")
 

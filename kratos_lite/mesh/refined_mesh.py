@@ -91,7 +91,7 @@ class RefinedMesh:
 
 
 def _keys_among(mesh: Mesh, rows: Ints) -> Keys:
-    """Return the keys of the edges, faces and cells that a set of nodes means; see `RefinedMesh.grown`."""
+    """Return the keys of the edges, faces and cells of a set of nodes; see `RefinedMesh.refined_nodes`."""
     inside = mask_of(rows, mesh.n_nodes)
     keys: list[Keys] = []
     alone = inside.copy()

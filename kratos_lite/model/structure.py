@@ -28,7 +28,6 @@ from kratos_lite.model.solid import Solid
 from kratos_lite.model.spurious_modes import check_rules, check_spurious_modes
 from kratos_lite.model.supports import AXES, DirichletCondition, Supports, axis_numbers
 from kratos_lite.model.ties import Tie
-from kratos_lite.solvers.constraints import rigid_modes
 from kratos_lite.time_series import Factor
 from kratos_lite.typing import Array, ArrayLike
 from kratos_lite.validation import finite, function_or_none, instance, number, short
@@ -471,10 +470,6 @@ class Structure(Solid):
         15000.0
         """
         self.add(AddedMass(where, mass, inertia))
-
-    def rigid_modes(self) -> Array:
-        """Return the rigid-body modes (3n, 6): translations in x, y and z, rotations about x, y and z."""
-        return rigid_modes(self.mesh.points)
 
     def reactions(self, residual: Array, u: Array) -> Array:
         """Return the forces of supports, constraints and springs on the body.

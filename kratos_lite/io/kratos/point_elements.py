@@ -31,10 +31,10 @@ def set_apart(document: Document) -> Document:
             problems.add(text, block.line)
     for given in document.element_data:
         at = rows_of_ids(ids, given.ids)
-        mine = at >= 0
+        is_point = at >= 0
         if given.variable in values:
-            values[given.variable][at[mine]] = given.values[mine].reshape(mine.sum(), -1)
-        elif mine.any():
+            values[given.variable][at[is_point]] = given.values[is_point].reshape(is_point.sum(), -1)
+        elif is_point.any():
             problems.add(f"{given.variable} of {POINT_ELEMENT} is not supported: {known}", given.line)
         else:
             data.append(given)

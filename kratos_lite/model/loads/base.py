@@ -415,10 +415,10 @@ def equal_loads(loads: Sequence[Load], named: Mapping[str, Load]) -> list[str]:
         for same in alike.values()
         if len(same) > 1 and any(id(load) not in meant for load in same)
     ]
-    return told_once((text, text) for text in found)
+    return reported_once((text, text) for text in found)
 
 
-def told_once(warnings: Iterable[tuple[Hashable, str]]) -> list[str]:
+def reported_once(warnings: Iterable[tuple[Hashable, str]]) -> list[str]:
     """Return the first of all warnings with the same key, and the number of the others."""
     texts: dict[Hashable, list[str]] = {}
     for key, text in warnings:
@@ -430,4 +430,4 @@ def told_once(warnings: Iterable[tuple[Hashable, str]]) -> list[str]:
 def warnings_of(loads: Sequence[Load], mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
     """Return the warnings of loads; those that differ in the load and in numbers alone are one."""
     found = ((load, text) for load in loads for text in load.warnings(mesh, groups))
-    return told_once((re.sub(r"[\d.]+", "", text.replace(repr(load), "")), text) for load, text in found)
+    return reported_once((re.sub(r"[\d.]+", "", text.replace(repr(load), "")), text) for load, text in found)
