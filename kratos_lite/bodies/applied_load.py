@@ -16,6 +16,7 @@ from kratos_lite.mesh import Mesh
 from kratos_lite.model.loads import Load, TimeDependentLoad
 from kratos_lite.model.loads.base import InTime
 from kratos_lite.model.loads.body import Gravity
+from kratos_lite.model.loads.surface import Pressure
 from kratos_lite.model.loads.temperature import Temperature
 from kratos_lite.time_series import Factor, function_of
 from kratos_lite.typing import Array
@@ -82,6 +83,8 @@ def apply_load(load: BodyLoad | Load, body: FreeBody, amplitude: Factor | None) 
         raise InputError(f"a load such as Gravity or Force is needed; got {type(load).__name__}")
     elif isinstance(load, Temperature):
         raise ModelError("a Temperature strains models; bodies in motion have none: leave it out")
+    elif isinstance(load, Pressure) and load.follower:
+        raise ModelError("a Pressure that follows a body in motion is a FollowerPressure; take that")
     elif isinstance(load, Gravity) and load.where is None and np.ndim(load.force) == 1:
         applied = _gravity(load.force, body)
     elif body.mesh is None:

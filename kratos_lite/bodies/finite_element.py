@@ -202,7 +202,7 @@ class FiniteElementBody(Deformable):
             self._known[point.tobytes()] = nodes, weights.data[start:end]
 
     def _in_mesh(self, points: Array) -> tuple[Located, Csr]:
-        """Return where points (m, 3) lie in the mesh, and N (m, n); the last sets asked for are kept."""
+        """Return where points (m, 3) lie in the mesh, and N (m, n); the last sets are kept."""
         key = points.tobytes()
         if key not in self._located:
             if len(self._located) >= LOCATED_MAX:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from kratos_lite.io.runners.outcome import Outcome
     from kratos_lite.mesh import Mesh
 
-EXIT_UNSOLVABLE, EXIT_OMITTED, EXIT_VALUE_MISSED = 2, 2, 3
+EXIT_UNSOLVABLE, EXIT_OMITTED, EXIT_NOT_REACHED = 2, 2, 3
 ROOT = Path(__file__).resolve().parents[2]
 """The source checkout, if the package is used from one."""
 
@@ -114,13 +114,13 @@ def _write(outcome: Outcome, options: Namespace) -> int:
         written, expected = outcome.write(), outcome.compare()
     _print([] if options.quiet else list(map(_written, written)))
     _print(expected)
-    missed = any(" failed " in line for line in expected)
+    not_reached = any(" failed " in line for line in expected)
     if options.strict and any(" not evaluated" in line for line in expected):
         return EXIT_OMITTED
     report = None if outcome.result is None else outcome.result.report
     if report is not None and report.error is not None and report.error_asked is not None:
-        missed |= report.error > report.error_asked
-    return EXIT_VALUE_MISSED if missed else 0
+        not_reached |= report.error > report.error_asked
+    return EXIT_NOT_REACHED if not_reached else 0
 
 
 def _written(path: str) -> str:

@@ -50,7 +50,7 @@ class Outcome(NamedTuple):
     iterations: int
     error: float
     failure: str
-    unused: list[str]  # options that PETSc has not asked for
+    unused: list[str]  # options that PETSc has not used
 
     def solution(self, x: Array, plan: Plan) -> tuple[Solution, list[str]]:
         """Return the solution x and what is to be said of it; SolveError if it was not found."""

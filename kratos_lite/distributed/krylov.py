@@ -195,11 +195,11 @@ class Krylov:
             self._monitor(residual / self._size)
 
     def unused(self) -> list[str]:
-        """Return the user's options that PETSc has not asked for."""
+        """Return the user's options that PETSc has not used."""
         return unused(self.prefix, self.given)
 
     def destroy(self) -> None:
-        """Let go of all; all ranks call it."""
+        """Release matrix and solver; all ranks call it."""
         for name in self.options:
             self._options.delValue(name)
         self.ksp.destroy()

@@ -105,7 +105,7 @@ def parsed(options: str | None) -> dict[str, str | None]:
 
 
 def unused(prefix: str, options: Mapping[str, str | None]) -> list[str]:
-    """Return the names of those options that PETSc has not asked for, such as misspelt ones."""
+    """Return the names of those options that PETSc has not used, such as misspelt ones."""
     asked = getattr(ctypes.CDLL(petsc().__file__), "PetscOptionsUsed", None)  # petsc4py lacks it
     if asked is None:
         return []

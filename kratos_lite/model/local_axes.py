@@ -140,7 +140,23 @@ class Cartesian(LocalAxes):
         return np.broadcast_to(np.stack([x, y, np.cross(x, y)]), (*_places(points).shape[:-1], 3, 3))
 
 
-class Cylindrical(LocalAxes):
+class AroundAxis(LocalAxes):
+    """Axes around a line through a center (3,) in m, along an axis (3,)."""
+
+    def __init__(self, center: ArrayLike = (0, 0, 0), axis: ArrayLike = (0, 0, 1)) -> None:
+        self.center, self.axis = finite(center, "the center", (3,)), finite(axis, "the axis", (3,))
+        _unit(self.axis)
+
+    def _beside(self, points: ArrayLike) -> Array:
+        """Return places (..., 3), those on the axis moved along the coordinate axis farthest from it."""
+        places, z = _places(points), _unit(self.axis)
+        out, across = places - self.center, np.eye(3)[int(np.abs(z).argmin())]
+        size = float(np.abs(out).max(initial=0.0)) or 1.0
+        there = np.linalg.norm(np.cross(z, out), axis=-1, keepdims=True) <= 1e-3 * BESIDE * size
+        return np.where(there, places + BESIDE * size * across, places)
+
+
+class Cylindrical(AroundAxis):
     """Axes r, t (around the axis) and z.
 
     Parameters
@@ -173,22 +189,14 @@ class Cylindrical(LocalAxes):
 
     letters = "rtz"
 
-    def __init__(self, center: ArrayLike = (0, 0, 0), axis: ArrayLike = (0, 0, 1)) -> None:
-        self.center, self.axis = finite(center, "the center", (3,)), finite(axis, "the axis", (3,))
-        _unit(self.axis)
-
     def directions(self, points: ArrayLike) -> Array:
         """Return r, t, z (..., 3, 3) at places (..., 3)."""
         z, out = _unit(self.axis), _places(points) - self.center
         r = _unit(out - (out @ z)[..., None] * z)
         return np.stack([r, np.cross(z, r), np.broadcast_to(z, r.shape)], axis=-2)
 
-    def _beside(self, points: ArrayLike) -> Array:
-        """Return places (..., 3), those on the axis moved off it."""
-        return _off_axis(_places(points), self.center, self.axis)
 
-
-class Spherical(LocalAxes):
+class Spherical(AroundAxis):
     """Axes r, t (away from the axis) and p (around it).
 
     Parameters
@@ -204,33 +212,16 @@ class Spherical(LocalAxes):
 
     letters = "rtp"
 
-    def __init__(self, center: ArrayLike = (0, 0, 0), axis: ArrayLike = (0, 0, 1)) -> None:
-        self.center, self.axis = finite(center, "the center", (3,)), finite(axis, "the axis", (3,))
-        _unit(self.axis)
-
     def directions(self, points: ArrayLike) -> Array:
         """Return r, t, p (..., 3, 3) at places (..., 3)."""
         r = _unit(_places(points) - self.center)
         p = _unit(np.cross(self.axis, r))
         return np.stack([r, np.cross(p, r), p], axis=-2)
 
-    def _beside(self, points: ArrayLike) -> Array:
-        """Return places (..., 3), those on the axis moved off it."""
-        return _off_axis(_places(points), self.center, self.axis)
-
 
 def _places(points: ArrayLike) -> Array:
     """Return places (..., 3) in m."""
     return finite(points, "places of local axes", ("...", 3))
-
-
-def _off_axis(points: Array, center: Array, axis: Array) -> Array:
-    """Return places (..., 3), those on an axis moved off it along the coordinate axis farthest from it."""
-    z, out = _unit(axis), points - center
-    across = np.eye(3)[int(np.abs(z).argmin())]
-    size = float(np.abs(out).max(initial=0.0)) or 1.0
-    there = np.linalg.norm(np.cross(z, out), axis=-1, keepdims=True) <= 1e-3 * BESIDE * size
-    return np.where(there, points + BESIDE * size * across, points)
 
 
 def _unit(v: Array) -> Array:

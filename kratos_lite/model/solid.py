@@ -251,7 +251,7 @@ class Solid(Tabular):
         unnamed = any(is_unnamed(block.name) for block in self.mesh.blocks if len(block))
         if self.formulation is None and not unnamed:
             return ""
-        why = "as the mesh names none" if self.formulation is None else "as asked for"
+        why = "as the mesh names none" if self.formulation is None else "as requested"
         elements = f": {', '.join(names)}" if names else ""
         return f"{self.formulation or NON_LOCKING}, {why}{elements}"
 

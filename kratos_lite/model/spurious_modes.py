@@ -56,7 +56,7 @@ def hourglass_modes(element: type[KinematicLinear], rule: Rule) -> int:
                 "see docs/howto/own-element.md"
             )
         if not np.isfinite(K).all():
-            return 0  # what is no number is found by other checks
+            return 0  # NaN is found by other checks
         values = np.linalg.eigvalsh((K + K.T) / 2)
         counts.append(int((values <= NO_ENERGY * np.abs(values).max()).sum()) - 6)
     return max(0, *counts)

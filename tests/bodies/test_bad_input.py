@@ -255,6 +255,7 @@ ROTATIONS = 2 * np.eye(3), np.diag([1.0, 1, -1]), np.full((3, 3), NAN), np.eye(2
         (massive, load(lambda: kl.Traction("z+", (1, 0, 0)), *NO_MESH)),
         (massive, load(lambda: kl.FollowerPressure("z+", 1.0), *NO_MESH)),
         (massive, load(lambda: kl.BodyForce((1, 0, 0)), *NO_MESH)),
+        (massive, load(lambda: kl.Pressure("z+", 1.0, follower=True), "FollowerPressure", kl.ModelError)),
         (
             lambda: kl.FixedBody(kl.box()),
             load(lambda: kl.Gravity((0, 0, 1)), "loads do not affect a fixed body", kl.ModelError),

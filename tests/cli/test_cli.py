@@ -190,7 +190,7 @@ def test_the_formulation_of_the_elements_is_an_option(run, box):
     model.add(kl.Traction("z+", (1e5, 0.0, 0.0)))
     assert same(displacement("out.json"), model.solve().displacement())
     found = json.loads(Path("out.json").read_text())
-    assert found["formulation"].startswith("b_bar, as asked for: ")
+    assert found["formulation"].startswith("b_bar, as requested: ")
 
 
 SCRIPT = """import kratos_lite as kl

@@ -53,7 +53,7 @@ def test_each_material_has_the_element_that_does_not_lock_with_it():
     model.add(kl.Gravity((0, 0, -1.0)))
     model.add(kl.Traction("z+", (0, 0, 1e3)))
     text = dict(model.solve().table())["formulation"]
-    assert text.startswith("non_locking, as asked for: ")
+    assert text.startswith("non_locking, as requested: ")
     assert "BBar3D20N for Isotropic3D(E=1000000.0, nu=0.499" in text
 
 

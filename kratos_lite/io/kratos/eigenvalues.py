@@ -55,7 +55,7 @@ def modes_of(solver: Settings, notes: list[str]) -> tuple[int, float | None]:
     count = max(settings.integer(key, default * (key == sizes[0])) for key in sizes)
     settings.expect(count >= 1, sizes[0], f"must be at least 1; got {count}")
     if kind == "feast":
-        notes.append(f"feast: the {count} lowest modes are found, whatever the largest eigenvalue asked for")
+        notes.append(f"feast: the {count} lowest modes are found, whatever the largest eigenvalue requested")
     shift = settings.number("shift", 0.0)
     # Spectra takes the largest 1 / (λ - shift), not the largest in magnitude; measured against Kratos 10.4.4.
     settings.expect(shift >= 0, "shift", f"must be an eigenvalue ω² ≥ 0; got {shift:g}")

@@ -65,7 +65,7 @@ class RecordedBody:
             return {FIELDS[name].kratos: value for name, value in values.items()}, {}
 
     def at_nodes(self, state: State, names: Iterable[str] = ()) -> dict[str, Array]:
-        """Return displacements and velocities of the nodes by CalculiX's names, whatever is asked for."""
+        """Return displacements and velocities of the nodes by CalculiX's names, whatever is requested."""
         return dict(zip(("DISP", "VELO"), self.fields(state)[0].values(), strict=True))
 
     def row(self, state: State) -> Array:

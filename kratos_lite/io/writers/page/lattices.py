@@ -30,7 +30,7 @@ def fineness(faces: list[Block]) -> int:
 
 
 def lattice_of_face(shape: type[Shape], n: int) -> dict[str, Any]:
-    """Return N at the points of a lattice on a face, its triangles, and the pieces of the edges."""
+    """Return N at the points of a lattice on a face, its triangles, and the parts of the edges."""
     places, quadrilaterals = grid(shape.cell, n)
     triangles = quadrilaterals[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
     triangles = triangles[triangles[:, 1] != triangles[:, 2]]
