@@ -15,6 +15,7 @@ from contextlib import contextmanager, suppress
 from kratos_lite.cli import commands
 from kratos_lite.cli.parser import build_parser, with_values
 from kratos_lite.cli.ranks import share
+from kratos_lite.errors import KratosLiteError
 
 EXIT_BAD_INPUT, EXIT_INTERNAL, EXIT_INTERRUPTED = 2, 1, 130
 
@@ -45,8 +46,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _verdict(error: BaseException) -> tuple[int, str]:
     """Return the exit code of an error and what to say of it."""
-    from kratos_lite.errors import KratosLiteError
-
     if isinstance(error, KeyboardInterrupt):
         ended = isinstance(error, Terminated)
         text = f"{'terminated' if ended else 'interrupted'}; nothing half-written is left"
@@ -84,8 +83,6 @@ def _run(words: Sequence[str]) -> int:
 
 def _run_each(options: Namespace) -> int:
     """Run a command, on each of its files if it takes several; return the largest exit code."""
-    from kratos_lite.errors import KratosLiteError
-
     command, inputs = getattr(commands, options.command), getattr(options, "input", None)
     if not isinstance(inputs, list):
         return int(command(options))

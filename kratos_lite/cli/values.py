@@ -10,6 +10,7 @@ from math import isfinite, pi
 from typing import TYPE_CHECKING, Any
 
 from kratos_lite.errors import InputError, nearest
+from kratos_lite.tabular import names_of
 
 if TYPE_CHECKING:
     from kratos_lite.analysis.integrators import ModelIntegrator
@@ -139,7 +140,6 @@ def integrator(text: str) -> ModelIntegrator:
     'hht(-0.1)'
     """
     from kratos_lite.analysis.integrators import INTEGRATORS  # a quick start of statics
-    from kratos_lite.tabular import names_of
 
     name, _, words = text.partition(":")
     kind, constants = INTEGRATORS[name], numbers(words)
@@ -156,7 +156,6 @@ def material(text: str) -> tuple[str | None, Material]:
     ('steel', Isotropic3D(E=210000000000.0, nu=0.3, density=0.0, alpha=0.0))
     """
     from kratos_lite.materials import MATERIALS  # help and version do without NumPy
-    from kratos_lite.tabular import names_of
 
     *names, constants = text.split(":")
     laws = ["Isotropic3D", *(name for name in names if name in MATERIALS)]

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from kratos_lite.analysis.model import Model
 from kratos_lite.errors import InputError
 from kratos_lite.io.case import Case
 from kratos_lite.io.formats import describes_case, ending, input_file, read_document, write_document
+from kratos_lite.io.formats.document import Document
 from kratos_lite.io.formats.part_files import part_files, read_part
 from kratos_lite.io.kratos.to_model import model_from
+from kratos_lite.mesh import SIDES, Mesh
+from kratos_lite.model.supports import hanging_constraints
 from kratos_lite.validation import number, path_of
 from kratos_lite.view.progress import watched
-
-if TYPE_CHECKING:
-    from kratos_lite.analysis.model import Model
-    from kratos_lite.io.formats.document import Document
-    from kratos_lite.mesh import Mesh
 
 
 def read(
@@ -147,16 +146,13 @@ def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
     InputError
         The thing is not one of these, or the format cannot hold it.
     """
-    from kratos_lite.analysis.model import Model
     from kratos_lite.analysis.point_values import PointValues
     from kratos_lite.analysis.result import Result
     from kratos_lite.analysis.section import Section
     from kratos_lite.analysis.state import State
-    from kratos_lite.io.formats.document import Document
     from kratos_lite.io.writers.results import write_result
     from kratos_lite.io.writers.state import write_state
     from kratos_lite.io.writers.table import write_table
-    from kratos_lite.mesh import Mesh
 
     path = path_of(path)
     if isinstance(thing, Result):
@@ -183,14 +179,11 @@ def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
 
 def _document_of(mesh: Mesh) -> Document:
     """Return a mesh with names for files of sides, such as ``z+`` of a box, and hanging nodes tied."""
-    from kratos_lite.io.formats.document import Document
-    from kratos_lite.io.kratos.to_document import constraints_of, kratos_name
-    from kratos_lite.mesh import SIDES
-    from kratos_lite.model.supports import hanging_constraints
+    from kratos_lite.io.kratos.to_document import constraints_of, name_of_part
 
     ends = (*SIDES, "cut-", "cut+")
     parts = {
-        kratos_name(name) if name.rpartition(".")[2] in ends else name: part
+        name_of_part(name) if name.rpartition(".")[2] in ends else name: part
         for name, part in mesh.parts.items()
     }
     return Document(mesh.replace(parts=parts), constraints=constraints_of(mesh, hanging_constraints(mesh)))

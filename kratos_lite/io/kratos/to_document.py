@@ -184,14 +184,14 @@ def _nodal_data(mesh: Mesh, variable: str, where: Mask, values: Array, fixed: bo
 
 def _parts(mesh: Mesh) -> dict[str, Part]:
     """Return the parts with names that Kratos can read."""
-    parts = {kratos_name(name): part for name, part in mesh.parts.items()}
+    parts = {name_of_part(name): part for name, part in mesh.parts.items()}
     return {name: Part(part.nodes, part.elements, properties=()) for name, part in parts.items()}
 
 
-def kratos_name(part: str) -> str:
+def name_of_part(part: str) -> str:
     """Return the name of a part, or of a side, that Kratos can read.
 
-    >>> kratos_name("z+")
+    >>> name_of_part("z+")
     'z_plus'
     """
     return part.replace("+", "_plus").replace("-", "_minus")

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kratos_lite import __version__
 from kratos_lite.analysis.fields import FIELDS
 from kratos_lite.atomic import write_whole
 from kratos_lite.errors import InputError
@@ -120,8 +121,6 @@ def _name(value: complex) -> str:
 def write_modes_json(path: str | Path, values: Array | Complexes, buckling: bool = False) -> None:
     """Write factors; or frequencies in Hz with ω² as Kratos names it, or with the growth in 1/s."""
     import json
-
-    from kratos_lite import __version__
 
     if buckling:
         numbers = {"factors": values.tolist()}

@@ -8,20 +8,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kratos_lite.analysis.fields import fields
 from kratos_lite.analysis.part_analysis import PartResult
+from kratos_lite.analysis.result import Result
 from kratos_lite.atomic import all_or_none, write_whole
 from kratos_lite.distributed.communicator import ALONE, Alone
 from kratos_lite.distributed.partition import Partition
 from kratos_lite.io.formats.vtu import HEAD, checked, described, write_vtu
 from kratos_lite.typing import Numbers
-
-if TYPE_CHECKING:
-    from kratos_lite.analysis.result import Result
 
 Fields = tuple[Mapping[str, Numbers], Mapping[str, Numbers]]
 

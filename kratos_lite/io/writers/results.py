@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kratos_lite import __version__
 from kratos_lite.analysis.fields import fields
 from kratos_lite.analysis.peak import peak
 from kratos_lite.analysis.report import element_counts
@@ -107,8 +108,6 @@ def _estimate(result: Result) -> dict[str, Any]:
 def write_json(path: str | Path, result: Result, sections: Sequence[Any] = ()) -> None:
     """Write the table, displacements and reactions (m, N) by node id, and sections by planes and parts."""
     import json
-
-    from kratos_lite import __version__
 
     content = {"kratos_lite": __version__, "units": result.units, **summary(result), **_by_node(result)}
     if sections:
