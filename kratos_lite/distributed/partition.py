@@ -100,10 +100,10 @@ class Partition:
         self, points: Array, groups: list[ElementGroup], held: Mask, own: Ints, equation: Ints
     ) -> Part:
         """Return the equations with the elements of other parts at own nodes, which these send."""
-        every_group = self._groups_of_all(groups)
+        all_groups = self._groups_of_all(groups)
         about = np.column_stack([self.number, equation, held, points])  # numbers are whole up to 2^53
         tables = []
-        for group in every_group:
+        for group in all_groups:
             nodes = group.nodes
             to = [np.asarray((self.owner[nodes] == r).any(axis=1)) for r in range(self.ranks.size)]
             to[self.ranks.rank][:] = False
@@ -116,7 +116,7 @@ class Partition:
         row[new] = len(points) + np.arange(len(new))
         every = every[np.concatenate([np.arange(len(points)), first[new]])]
         whole = []
-        for group, table in zip(every_group, tables, strict=True):
+        for group, table in zip(all_groups, tables, strict=True):
             halo = row[np.searchsorted(numbers, table[..., 0])].astype(np.int32)
             nodes = np.concatenate([group.nodes, halo])
             whole.append(replace(group, nodes=nodes, rows=np.arange(len(nodes))))

@@ -6,6 +6,7 @@ import re
 from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 
@@ -14,6 +15,7 @@ import numpy as np
 from kratos_lite.errors import nearest
 from kratos_lite.io.settings import Settings, is_number, shown
 from kratos_lite.mesh import Mesh, Part
+from kratos_lite.typing import Array
 from kratos_lite.validation import finite
 
 FOREVER = 1e30
@@ -63,6 +65,12 @@ class RunContext:
     moved: bool = True  # Kratos would move the nodes with the displacement.
     outside: bool = False  # files outside the folder may be named.
     dofs: tuple[str, ...] = ("DISPLACEMENT",)  # what the names of variables that can be fixed begin with.
+
+    @cached_property
+    def places(self) -> tuple[Array, Array]:
+        """Where values are evaluated: nodes (n, 3) and centers of conditions (c, 3)."""
+        centers = [self.mesh.points[block.nodes].mean(axis=1) for block in self.mesh.conditions]
+        return self.mesh.points, np.concatenate([np.zeros((0, 3)), *centers])
 
     def rounded(self, time: float) -> float:
         """Return a time in s, or that of a step which it is but for rounding."""

@@ -19,7 +19,6 @@ from kratos_lite.io.kratos.expressions import evaluate
 from kratos_lite.io.kratos.variables import PRESSURES, TEMPERATURE, VECTORS, Variables
 from kratos_lite.io.names import nearest_variable
 from kratos_lite.io.settings import Settings, is_number, shown
-from kratos_lite.mesh import Mesh
 from kratos_lite.typing import Array, Ints
 
 Value = float | str
@@ -70,9 +69,9 @@ class Action:
             raise self.settings.error(key, f"{self.component}: {error}") from None
         return product
 
-    def put(self, values: Variables, places: tuple[Array, Array], time: float) -> None:
-        """Set the values that they are at a time in s; places are those of nodes and conditions."""
-        value = self.value(places[self.on_conditions][self.indices], time)
+    def put(self, values: Variables, context: RunContext, time: float) -> None:
+        """Set the values that they are at a time in s."""
+        value = self.value(context.places[self.on_conditions][self.indices], time)
         fields = values.conditional if self.on_conditions else values.nodal
         fields.put(self.component, self.indices, value)
 
@@ -193,7 +192,7 @@ def _fixed(settings: Settings, process: Process) -> list[bool]:
 
 def run(actions: Sequence[Action], context: RunContext, notes: list[str], values: Variables) -> None:
     """Bring the values and supports to what they are in the last step of a run; add notes."""
-    set_values(actions, context.times, values)
+    set_values(actions, context, values)
     last = len(context.times) - 1
     for action in actions:
         # what is fixed before the first step is so through it
@@ -224,14 +223,7 @@ def notes_of(actions: Sequence[Action], context: RunContext) -> list[str]:
     return list(dict.fromkeys(notes))
 
 
-def places_of(mesh: Mesh) -> tuple[Array, Array]:
-    """Return where values are evaluated: nodes (n, 3) and centers of conditions (c, 3)."""
-    centers = [mesh.points[block.nodes].mean(axis=1) for block in mesh.conditions]
-    return mesh.points, np.concatenate([np.zeros((0, 3)), *centers])
-
-
-def set_values(actions: Sequence[Action], times: Sequence[float], values: Variables) -> None:
+def set_values(actions: Sequence[Action], context: RunContext, values: Variables) -> None:
     """Set what actions set, each at its last step."""
-    places = places_of(values.mesh)
     for action in sorted((a for a in actions if a.steps and a.factors), key=lambda a: a.steps[-1]):
-        action.put(values, places, times[action.steps[-1]])
+        action.put(values, context, context.times[action.steps[-1]])

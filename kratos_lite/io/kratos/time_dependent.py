@@ -17,7 +17,7 @@ from kratos_lite.analysis.model import Model
 from kratos_lite.errors import InputError
 from kratos_lite.io.case import TimeIntegration
 from kratos_lite.io.kratos.context import Omission, RunContext
-from kratos_lite.io.kratos.processes import Action, notes_of, places_of, set_values
+from kratos_lite.io.kratos.processes import Action, notes_of, set_values
 from kratos_lite.io.kratos.variables import LOADING, TEMPERATURE, Variables
 from kratos_lite.io.settings import Settings
 from kratos_lite.mesh.blocks import mask_of
@@ -54,8 +54,8 @@ class ProcessesInTime:
         self._check(values)
         if self.dynamic:
             self._begin(values)
-        base, times = values.copy(), self.context.times
-        set_values(self.actions, times, values)
+        base = values.copy()
+        set_values(self.actions, self.context, values)
         for action in self.actions:
             if action.fixed:
                 values.fix(action.component, action.indices)
@@ -108,11 +108,11 @@ class ProcessesInTime:
 
     def _begin(self, values: Variables) -> None:
         """Find displacement and velocity at the start."""
-        start, places = values.copy(), places_of(values.mesh)
+        start = values.copy()
         for action in self.actions:
             name = action.component
             if action.steps[0] == 0 and action.factors:
-                action.put(start, places, self.context.times[0])
+                action.put(start, self.context, self.context.times[0])
                 accelerated = start.nodal.scalar(name)[action.indices].any()
                 is_still = not (name.startswith("ACCELERATION") and accelerated)
                 text = f"{name} cannot be given; the acceleration at the start is 0"
@@ -211,13 +211,13 @@ def _load_in_time(
     actions: Sequence[Action], context: RunContext, base: Variables, load_of: LoadOf
 ) -> Callable[[float], Load | None]:
     """Return the load of some actions as a function of the time; the same object while nothing changes."""
-    places, times = places_of(base.mesh), context.times
+    times = context.times
 
     @lru_cache(maxsize=1)
     def load(acting: tuple[tuple[int, float], ...]) -> Load | None:
         values = base.copy()
         for i, when in acting:
-            actions[i].put(values, places, when)
+            actions[i].put(values, context, when)
         return load_of(values)
 
     def at(time: float) -> Load | None:
