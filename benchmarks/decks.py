@@ -32,12 +32,15 @@ RULE = "ccx takes mass and body forces of C3D20R by 2×2×2 points, here they ar
 DIFFERS = {
     **dict.fromkeys([f"beamdy{i}" for i in (*range(1, 8), 14, 15, 19)], MODAL),
     **dict.fromkeys(["beamdy8", "beamdy9"], f"{MODAL}; {RULE}"),
-    **dict.fromkeys(["beamf", "disk2", "segment1", "segment2"], RULE),
-    **dict.fromkeys(["beamnh", "beamnlmpc", "beamnlp"], "ccx ends its iterations early"),
+    **dict.fromkeys(["beamf", "beamptied7", "disk2", "segment1", "segment2"], RULE),
+    **dict.fromkeys(
+        ["beamnh", "beamnldyp", "beamnlmpc", "beamnlp", "beampiso"], "ccx ends its iterations early"
+    ),
+    **dict.fromkeys(["beamnlt", "beampt"], "ccx subtracts heat from the gradient of displacements"),
     **dict.fromkeys(
         ["beamimpdy1", "beamimpdy1nodirect", "beamimpdy2"], "other increments, and damping in HHT"
     ),
-    **dict.fromkeys(["beamnldy", "beamnldynodirect"], "a sudden load in one increment"),
+    **dict.fromkeys(["beamdynamic", "beamnldy", "beamnldynodirect"], "a sudden load in one increment"),
     "spring5": MODAL,
     "beampic": "the iterative solver of ccx ends early",
     "cubef2f3": "faces are tied in the mean here, node by node in ccx",

@@ -104,6 +104,7 @@ from kratos_lite.materials import Material as Material
 from kratos_lite.materials.anisotropic3d import Anisotropic3D as Anisotropic3D
 from kratos_lite.materials.cone_softening3d import ConeSoftening3D as ConeSoftening3D
 from kratos_lite.materials.drucker_prager3d import DruckerPrager3D as DruckerPrager3D
+from kratos_lite.materials.finite_j2_plasticity3d import FiniteJ2Plasticity3D as FiniteJ2Plasticity3D
 from kratos_lite.materials.generalized_maxwell3d import GeneralizedMaxwell3D as GeneralizedMaxwell3D
 from kratos_lite.materials.isotropic3d import Isotropic3D as Isotropic3D
 from kratos_lite.materials.isotropic_damage3d import IsotropicDamage3D as IsotropicDamage3D

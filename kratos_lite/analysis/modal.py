@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
-from kratos_lite.analysis.preload import Preload, preload_stiffness
+from kratos_lite.analysis.preload import Preload, preload_stiffness, tangent_beyond_rest
+from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.solution_checks import Phases
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.errors import InputError, ModelError, SolveError
@@ -48,7 +49,11 @@ def natural_modes(
     with phase("assemble"):
         small = is_small(n, count)
         equations = e.system.equations
-        K_g = None if preload is None else preload_stiffness(e, preload, "a preload of modes")
+        K_g: BlockMatrix | None
+        if isinstance(preload, Result) and model.is_nonlinear:
+            K_g = tangent_beyond_rest(e, preload)
+        else:
+            K_g = None if preload is None else preload_stiffness(e, preload, "a preload of modes")
     with phase("modes"):
         if near is not None:
             omega, shapes = modes_near(

@@ -290,7 +290,8 @@ class Model(Structure):
 
         All supported degrees of freedom are fixed at zero.  A motion of the material is ignored: see
         `complex_modes`.  Laws that are not linear count with C, their tangent at rest, and no stress.  With a
-        preload, its stress stiffens or softens: K + K_g takes the place of K, K_g = ∫ grad N·σ grad N dV.
+        preload, its stress stiffens or softens: K + K_g takes the place of K, K_g = ∫ grad N·σ grad N dV;
+        at a nonlinear result of its own the tangent does, with that of loads that follow.
 
         Parameters
         ----------
@@ -309,7 +310,7 @@ class Model(Structure):
         ------
         MeshError, ModelError, InputError
             If the model is broken, has no mass, has fewer modes, or is too large to factorize for `near`; or
-            if the preload is beyond buckling or not that of linear statics, or leaves rigid motions free.
+            if the preload is beyond buckling or of laws with history, or leaves rigid motions free.
         SolveError
             If the iteration does not converge, or what it finds does not satisfy the equations.
         """

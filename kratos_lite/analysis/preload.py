@@ -8,6 +8,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
+from kratos_lite.analysis.quasi_static import assembly_of
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.static import StaticAnalysis
 from kratos_lite.assembly.block_matrix import BlockMatrix
@@ -15,6 +16,7 @@ from kratos_lite.assembly.stiffness import stress_stiffness
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model.loads import Load
 from kratos_lite.solvers.constrained_system import renumber
+from kratos_lite.solvers.tangents import turned
 
 Preload: TypeAlias = "Result | Load | Sequence[Load] | Literal[True]"
 """A result, loads of which one is made, or True for those of the model."""
@@ -38,3 +40,20 @@ def preload_stiffness(e: EquationsOfMotion, preload: Preload, what: str) -> Bloc
     matrix = BlockMatrix(np.zeros((len(data), 3, 3)), pattern.indices, pattern.indptr)
     matrix.add_scalar(data)
     return matrix
+
+
+def tangent_beyond_rest(e: EquationsOfMotion, result: Result) -> BlockMatrix:
+    """Return what the tangent (3a, 3a) at a nonlinear result, also of its loads, has beyond that at rest."""
+    states, assembly = [g.states for g in result.groups], assembly_of(e.model, e.system)
+    fits = result.mesh is e.model.mesh and len(states) == len(assembly.groups)
+    if not fits or any(
+        s.variables if s else s is not t for s, t in zip(states, assembly.start(), strict=True)
+    ):
+        raise InputError("a preload must be a result of this model, of laws without history; got another one")
+    u = e.system.gather(result.u)
+    tangent = assembly.evaluate(u, states, 0.0, [g.heating for g in result.groups])[1]
+    assert tangent is not None
+    data = tangent.data - e.system.assembled().data
+    _, following = e.applied.following(result.report.steps[-1].time, u)
+    e.system.pattern.add_tangents(data, [(nodes, -(k + turned(k)) / 2) for nodes, k in following])
+    return BlockMatrix(data, tangent.indices, tangent.indptr)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from copy import copy
 from dataclasses import replace
 from functools import partial
 from typing import Any, TypeAlias
@@ -20,6 +19,7 @@ from kratos_lite.assembly.gauss_point_fields import internal_load
 from kratos_lite.assembly.nonlinear_assembly import NonlinearAssembly, States, named, unnamed
 from kratos_lite.errors import InputError, ModelError, SolveError, naming
 from kratos_lite.mesh.mesh import place_of
+from kratos_lite.model.free_motions import free_motions
 from kratos_lite.model.loads.temperature import heated
 from kratos_lite.model.structure import Structure
 from kratos_lite.model.supports import Supports
@@ -113,9 +113,9 @@ class QuasiStaticAnalysis(ModelInTime):
         self.assembly = assembly_of(model, self.system)
         self.solver, self.arc_length = solver, arc_length
         super().__init__(model)
+        self.u = np.zeros(3 * len(self.system.nodes))
         self._hold(supports)
         self.work = 0.0
-        self.u = np.zeros(3 * len(self.system.nodes))
         self.states = self.assembly.start()
         self.increment, self.speed = np.zeros_like(self.u), 0.0
         self.load, self.rate, self.curvature = (np.zeros_like(self.u) for _ in range(3))
@@ -134,9 +134,9 @@ class QuasiStaticAnalysis(ModelInTime):
 
     def _hold(self, supports: Supports) -> None:
         """Let the supports that act at a time hold the model."""
-        held = copy(self.model)
-        held.supports = supports
-        held.free_motions(self.groups).check((), moving=False)
+        mesh, large = self.model.mesh, any(group.element.finite for group in self.groups)
+        x = mesh.points + self._whole(self.u) if large else mesh.points
+        free_motions(mesh.replace(points=x), supports, self.groups).check((), moving=False)
         self.system.constraint_map = supports.constraint_map(self.system.nodes)
         self.prescribed = PrescribedMotion(supports, self.system)
         plan = stepped(len(self.system.constraint_map.free), self.solver)
@@ -275,17 +275,19 @@ class QuasiStaticAnalysis(ModelInTime):
         self.reports.append(report)
         return report.iterations
 
-    def _balance(self, u: Array, load: Load, dt: float, before: float = np.inf) -> tuple[float, Response]:
-        """Return the relative residual at displacements (3a,), and what is known there."""
+    def _balance(
+        self, u: Array, load: Load, dt: float, before: float = np.inf, heat: float = 0.0
+    ) -> tuple[float, Response]:
+        """Return the residual at displacements (3a,) over forces or those of heat, and what is known."""
         # After a residual before it that is small, this one is converged, as a rule, and needs no tangent.
         near = before <= self.tolerance**0.5
         internal, K, states = self.assembly.evaluate(u, self.states, dt, self.heating, tangent=not near)
         force, tangent = load
-        scale = max(float(np.linalg.norm(v)) for v in (force, internal, self.load, self.internal))
+        scale = max(heat, *(float(np.linalg.norm(v)) for v in (force, internal, self.load, self.internal)))
         residual = float(np.linalg.norm(self.system.constraint_map.reduce(force - internal)))
         relative = residual / (scale or 1.0)
         if K is None and relative > self.tolerance:
-            return self._balance(u, load, dt)
+            return self._balance(u, load, dt, heat=heat)
         known = float(np.linalg.norm(self.u) + np.linalg.norm(self.prescribed.part(u)))  # u may have run away
         if K is not None and residual <= ROUNDING * K.norm() * known:
             relative = min(relative, self.tolerance)
@@ -311,11 +313,13 @@ class QuasiStaticAnalysis(ModelInTime):
         """Return the same from a start, with a jump of what is prescribed."""
         reduce = self.system.constraint_map.reduce
 
-        last = np.inf
+        last, heat = np.inf, 0.0
 
         def evaluate(u: Array) -> tuple[float, Response]:
-            nonlocal last
-            last, known = self._balance(u, load(u), dt, last)
+            nonlocal last, heat
+            last, known = self._balance(u, load(u), dt, last, heat)
+            if any(values is not None for values in self.heating):
+                heat = heat or float(np.linalg.norm(known[0]))
             return last, known
 
         def correction(u: Array, known: Response, residuals: list[float]) -> Array:

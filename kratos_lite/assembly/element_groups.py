@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kratos_lite import voigt
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.custom import is_builtin
 from kratos_lite.elements.exact_rules import (
@@ -26,6 +27,7 @@ from kratos_lite.elements.formulations import (
     is_nearly_incompressible,
 )
 from kratos_lite.elements.tables import tabulate
+from kratos_lite.elements.total_lagrangian import strain_change
 from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.materials import Material
 from kratos_lite.mesh import Block, Mesh, with_rows
@@ -113,7 +115,7 @@ class ElementGroup:
         """Return C (6, 6) and the initial stress of elements (m, 6), or (m, 7) with factors of C."""
         C, stress = as_double(self.material.C), self.prestress
         if self.heating is not None and self.is_evenly_heated:
-            thermal = self.elastic(self.heating.mean(axis=1)[:, None] * self.material.expansion)
+            thermal = self.elastic(self._swollen(self.heating.mean(axis=1)))
             stress = -thermal if stress is None else stress - thermal
         if self.factors is not None:
             stress = np.zeros((len(self), 6)) if stress is None else stress
@@ -163,7 +165,8 @@ class ElementGroup:
     @property
     def is_evenly_heated(self) -> bool:
         """Whether an element has one thermal strain, as kernels take it, or none."""
-        return self.heating is None or self.element.shape.degree == 1
+        known = self.heating is None or self.element.shape.degree == 1
+        return known or not np.ptp(self.heating, axis=1).any()  # type: ignore[arg-type]
 
     @property
     def without_initial(self) -> ElementGroup:
@@ -176,7 +179,14 @@ class ElementGroup:
             return 0.0
         N = tabulate(self.element.shape, self.rule)[0]
         N = np.full_like(N, 1 / N.shape[1]) if self.is_evenly_heated else N
-        return np.einsum("mk,gk,i->mgi", self.heating[chunk], N, self.material.expansion)
+        return self._swollen(self.heating[chunk] @ N.T)
+
+    def _swollen(self, temperatures: Array) -> Array:
+        """Return the strain (..., 6) of temperatures, of large displacements that of Green by α ΔT."""
+        strain = temperatures[..., None] * self.material.expansion
+        if not self.element.finite:
+            return strain
+        return strain_change(np.eye(3), voigt.tensor(strain * voigt.HALF_SHEAR))
 
     def initial_stress(self, chunk: slice) -> Array | float:
         """Return the stress of a chunk where nothing is displaced, (m, 1 or g, 6), or 0."""

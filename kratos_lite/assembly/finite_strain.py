@@ -40,9 +40,9 @@ def check_elements(groups: Sequence[ElementGroup]) -> None:
 
 
 def _compiled(group: ElementGroup) -> Any:
-    """Return the kernels if they stand for the geometry of an element class, else None."""
+    """Return the kernels if they stand for the geometry of an element class and its heating, else None."""
     check_elements([group])
-    return compiled("lagrange")
+    return compiled("lagrange") if group.is_evenly_heated else None
 
 
 def _arguments(

@@ -58,8 +58,7 @@ class NonlinearAssembly:
         self.springs = springs
         self._u0 = np.zeros(3 * len(points)) if u0 is None else u0
         self.symmetric = all(group.material.symmetric_tangent for group in groups)
-        self._linear = _only(groups, (group.is_linear for group in groups))
-        self._lagrange = _only(groups, (g.element.finite and g.material.is_linear for g in groups))
+        self._linear, self._lagrange = _apart(groups)
         self._dilatations = [None if g.material.is_linear else dilatation(self.points, g) for g in groups]
 
     def start(self) -> States:
@@ -94,20 +93,20 @@ class NonlinearAssembly:
         """
         displacement, u = u, self.strained(u)
         K, at_rest = self._linear_part
-        groups = self.groups
+        groups, large = self.groups, self._lagrange
         if any(values is not None for values in heating):
             groups = [replace(g, heating=values) for g, values in zip(groups, heating, strict=True)]
-            linear = _only(groups, (group.is_linear for group in groups))
+            linear, large = _apart(groups)
             at_rest = internal_load(self.points, linear, np.zeros_like(self.points))
         forces = at_rest + (K @ u.ravel()).reshape(-1, 3)
         data = K.data.copy() if tangent and self.constant is None else None
-        if any(map(len, self._lagrange)):
-            for number, group in enumerate(self._lagrange):
+        if any(map(len, large)):
+            for number, group in enumerate(large):
                 if len(group):  # it looks for inverted elements
                     ElementRange(self, group, number, slice(None), u, None).strain()
-            forces += finite_strain.internal_load(self.points, self._lagrange, u)
+            forces += finite_strain.internal_load(self.points, large, u)
             if data is not None:
-                data += finite_strain.stiffness(self.points, self._lagrange, self.pattern, u).data
+                data += finite_strain.stiffness(self.points, large, self.pattern, u).data
         new: States = []
         for number, (group, state) in enumerate(zip(groups, states, strict=True)):
             parts = []
@@ -129,9 +128,14 @@ class NonlinearAssembly:
         return (u - self._u0).reshape(-1, 3)
 
 
-def _only(groups: Sequence[ElementGroup], wanted: Iterable[bool]) -> list[ElementGroup]:
-    """Return the groups, empty but where they are wanted, so that they keep their numbers."""
-    return [g.take(np.full(len(g), keep)) for g, keep in zip(groups, wanted, strict=True)]
+def _apart(groups: Sequence[ElementGroup]) -> tuple[list[ElementGroup], list[ElementGroup]]:
+    """Return groups that are linear, and of linear laws those of large displacements; others are empty."""
+
+    def only(wanted: Iterable[bool]) -> list[ElementGroup]:
+        return [g.take(np.full(len(g), keep)) for g, keep in zip(groups, wanted, strict=True)]
+
+    finite = (g.element.finite and g.material.is_linear for g in groups)
+    return only(group.is_linear for group in groups), only(finite)
 
 
 def initial_states(points: Array, group: ElementGroup) -> PointStates:

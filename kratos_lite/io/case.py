@@ -225,6 +225,8 @@ class Case:
     above : rad/s, the frequency from which on the modes are, or None for the lowest ones.
     buckling : whether the modes are shapes of buckling, with factors of the loads.
     preload : whether the stress of the loads stiffens or softens in natural frequencies.
+    after : a case of the same mesh at whose end this one begins: natural frequencies about its state, a
+        transient from its displacements; it is run first.
     harmonic : options of `Model.harmonic` for the response to loads that swing, or None; its frequencies may
         also be a function of the model.
     solver, tolerance, error, most_unknowns, backend, petsc : of a model at rest, as for `Model.solve`.
@@ -241,6 +243,7 @@ class Case:
     above: float | None = None
     buckling: bool = False
     preload: bool = False
+    after: Case | None = None
     harmonic: dict[str, Any] | None = None
     solver: str = "auto"
     tolerance: float = 1e-10
@@ -252,6 +255,7 @@ class Case:
     expected: list[Callable[[Result], str]] = field(default_factory=list)
     files: list[Path] = field(default_factory=list)
     then: list[Case] = field(default_factory=list)
+    end: Result | None = field(default=None, init=False, repr=False)  # once it was run
 
     @property
     def analysis(self) -> str:

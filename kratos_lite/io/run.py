@@ -59,9 +59,17 @@ def run(case: Case, progress: Progress | None = None) -> Outcome:
     """
     check_case(case)
     check_outputs(case)
+    _run_before(case)
     with watched(progress) as shown:
         outcome: Outcome = runner_of(case).run(case, shown)
-        return outcome
+    case.end = outcome.result
+    return outcome
+
+
+def _run_before(case: Case) -> None:
+    """Run the case at whose end a case begins, unless it has been."""
+    if case.after is not None and case.after.end is None:
+        run(case.after)
 
 
 def check(case: Case) -> list[str]:
@@ -121,6 +129,7 @@ def prepare(case: Case, progress: Progress | None = None) -> tuple[Any, Iterator
     """Return the transient or body of a case in time and its states, checked; no step is taken yet."""
     if case.time is None:
         raise ModelError("this case is not in time; give it a kl.TimeIntegration")
+    _run_before(case)
     subject, states = runner_of(case).prepare(case, progress)
     return subject, states
 

@@ -423,7 +423,8 @@ class Supports:
         """Return displacements (n, 3) at a time with those of reference nodes."""
         if self.mesh.used_nodes().all():
             return u
-        P, c = self.followed(self.at(time).values)
+        now = self.at(time)
+        P, c = now.followed(now.values)
         return np.asarray(P @ u.ravel() + c).reshape(-1, 3)
 
     def carried(self, forces: Array) -> Array:

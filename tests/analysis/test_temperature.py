@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.errors import KratosLiteError, ModelError, SolveError
+from kratos_lite.errors import KratosLiteError, SolveError
 from kratos_lite.mesh.refinement import refine
 from kratos_lite.model.refined import refined
 
@@ -243,12 +243,34 @@ def test_a_body_that_does_not_swell_is_named():
     assert any("no material there has an alpha" in text for text in model.solve().report.warnings)
 
 
-def test_large_strains_are_refused():
-    model = kl.Model(kl.box(element="TotalLagrangianElement3D8N"), STEEL)
-    model.fix("z-")
-    model.add(kl.Temperature(100.0))
-    with pytest.raises(ModelError, match="a temperature is for small strains"):
-        model.solve()
+@pytest.mark.parametrize("values", [1e4, lambda X: 1e4 + 0 * X[:, 0]], ids=["even", "of places"])
+def test_large_bodies_swell_without_stress(values):
+    alpha = 1e-5
+    model = kl.Model(kl.box(element="TotalLagrangianElement3D20N"), kl.Isotropic3D(E, NU, alpha=alpha))
+    for side, axis in (("x-", "x"), ("y-", "y"), ("z-", "z")):
+        model.fix(side, axis)
+    model.add(kl.Temperature(values))
+    result = model.solve()
+    assert np.abs(result.u - 0.1 * model.mesh.points).max() < 1e-9
+    assert np.abs(result.stress()).max() < 1e-6 * E
+    for side in ("x+", "y+", "z+"):
+        model.fix(side, side[0])
+    held = -(0.1 + 0.1**2 / 2) * E / (1 - 2 * NU)  # Green's strain of the stretch 1.1
+    assert np.abs(model.solve().stress()[..., :3] - held).max() < 1e-9 * E
+
+
+def test_part_of_a_large_body_is_warm():
+    # Its temperature is not the same at all nodes of an element; little heat strains as small strains do.
+    found = []
+    for element in ("KinematicLinear3D20N", "TotalLagrangianElement3D20N"):
+        model = kl.Model(kl.box((1, 1, 3), (1, 1, 3), element), kl.Isotropic3D(E, NU, alpha=1e-5))
+        model.fix("z-")
+        model.fix("z+")
+        model.add(kl.Temperature(lambda X: 0.1 * X[:, 2] * (3 - X[:, 2]) * X[:, 0]))
+        found.append(model.solve())
+    small, large = found
+    assert np.abs(large.u - small.u).max() < 1e-5 * np.abs(small.u).max()
+    assert np.abs(large.stress() - small.stress()).max() < 1e-5 * np.abs(small.stress()).max()
 
 
 def test_orthotropic_bodies_swell_by_axes():

@@ -129,6 +129,32 @@ def test_a_bar_follows_its_measured_curve(steps):
         assert abs(state["accumulated_plastic_strain"][0] - p) < 1e-9 * p + 1e-14
 
 
+@pytest.mark.parametrize("J", [1.0, 1.2])
+def test_large_plastic_strains_are_logarithmic_and_keep_the_volume(J):
+    E, nu, Y, H = 200e9, 0.3, 250e6, 1e9
+    law, mu, K = kl.FiniteJ2Plasticity3D(E, nu, Y, H), E / 2.6, E / 1.2
+    state = law.initial_state()
+    for stretch in np.linspace(1, 1.5, 201)[1:]:
+        F = J ** (1 / 3) * np.array([stretch, stretch**-0.5, stretch**-0.5])
+        strain = np.append((F**2 - 1) / 2, np.zeros(3))
+        stress, _, state = law.evaluate(strain, state, 1.0, tangent=False)
+    cauchy, p = F**2 * stress[:3] / J, state["accumulated_plastic_strain"][0]
+    q = Y + H * p
+    assert np.abs(cauchy - K / 2 * (J - 1 / J) - q * np.array([2, -1, -1]) / 3).max() < 1e-9 * q
+    elastic = q * J / (3 * mu)  # the return keeps the volume, and logarithms, up to it
+    assert abs(p - (np.log(1.5) - elastic)) < elastic
+    assert abs(np.prod(1 + state["plastic_metric"][:3]) - 1) < 4 * elastic
+
+
+def test_the_elastic_part_at_large_strains_is_the_work_of_its_stress():
+    law = kl.FiniteJ2Plasticity3D(1e6, 0.3, 1e9)
+    strain, state = np.array([0.3, -0.1, 0.05, 0.2, -0.1, 0.04]), law.initial_state()
+    x, w = np.polynomial.legendre.leggauss(20)
+    stresses = [law.evaluate((1 + a) / 2 * strain, state, 1.0, tangent=False)[0] for a in x]
+    work = sum(b / 2 * s @ strain for b, s in zip(w, stresses, strict=True))
+    assert abs(law.energy(strain, stresses[-1], state) - work) < 1e-9 * work
+
+
 @pytest.mark.parametrize("curve", [[(0.0, 300e6)], [(0.1, 200e6)], [(0.1, 300e6), (0.1, 400e6)]])
 def test_a_curve_that_falls_or_turns_back_is_refused(curve):
     with pytest.raises(
@@ -343,6 +369,7 @@ def test_a_law_cannot_use_its_own_tangent_at_rest(monkeypatch):
     [
         (lambda: kl.J2Plasticity3D(200e9, 0.3, 0.0), "YIELD_STRESS"),
         (lambda: kl.J2Plasticity3D(200e9, 0.3, 1.0, -1.0), "softening"),
+        (lambda: kl.FiniteJ2Plasticity3D(200e9, 0.3, 1.0, 0.0, 1.0), "only J2Plasticity3D hardens kin"),
         (lambda: kl.J2Plasticity3D(200e9, 0.3, 2.0, 0.0, 0.0, 1.0), "SATURATION"),
         (lambda: kl.J2Plasticity3D(200e9, 0.5, 1.0), "POISSON_RATIO"),
         (lambda: kl.DruckerPrager3D(1e6, 0.3, 1e3, 95.0), "FRICTION_ANGLE"),

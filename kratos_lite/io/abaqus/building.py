@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -22,8 +23,7 @@ from kratos_lite.model.loads.nodal import NodalForces
 from kratos_lite.model.loads.surface import ConditionLoads
 from kratos_lite.model.loads.temperature import Temperature
 from kratos_lite.quadrature import Rule, by_order
-from kratos_lite.time_series import TimeSeries
-from kratos_lite.typing import Array, Ints
+from kratos_lite.typing import Array, Ints, Rows
 
 
 class Building:
@@ -74,7 +74,7 @@ class Building:
         one, other = (float(T[0]) if len(T) and np.ptp(T) == 0 else None for T in both)
         return replace(definition, now=one, start=other)
 
-    def hold(self, model: Model, held: Nodal, moves: dict[str, TimeSeries] | None = None) -> None:
+    def hold(self, model: Model, held: Nodal, moves: dict[str, Any] | None = None) -> None:
         """Add supports and connections to a model; nodes that share axis, motion and axes are one call."""
         axes = self.deck.axes
         local = axes.of_node
@@ -91,14 +91,14 @@ class Building:
                     model.fix(some, letter, value, local=frame)
         self.deck.connections.connect(model)
 
-    def loads(self, model: Model, acting: Acting) -> Iterable[tuple[Load, str]]:
-        """Yield the loads that act, each with the name of its amplitude."""
+    def loads(self, model: Model, acting: Acting, time: float = 0.0) -> Iterable[tuple[Load, str]]:
+        """Yield the loads that act with the supports of a time, each with the name of its amplitude."""
         deck = self.deck
         for _, name, _, _ in deck.sections if acting.bodies else ():
             if "DENSITY" not in deck.materials[name].cards:
                 deck.materials[name].card.wrong("GRAV and CENTRIF need its *DENSITY")
         mesh, n = model.mesh, model.mesh.n_nodes
-        F, P, carried = acting.forces, acting.pressures, model.supports.carried
+        F, P, carried = acting.forces, acting.pressures, model.supports.acting(time).carried
         for name, of in F.by_amplitude():
             values = np.where(of, F.values, 0.0)
             turned = np.flatnonzero(values.any(axis=1) & (deck.axes.of_node >= 0))
@@ -120,7 +120,7 @@ class Building:
             elif masses.any():
                 raise ModelError("*DLOAD: CENTRIF on masses is not supported; give their force by *CLOAD")
             else:
-                yield Gravity(_centrifugal(size, places), where), name
+                yield _Centrifugal(model, size, places, where), name
         T, initial = acting.temperatures, deck.initial
         same = float(initial[0]) if (initial == initial[0]).all() else 0.0
         for name, of in T.by_amplitude():
@@ -180,12 +180,20 @@ class Building:
             model.add_prestress(table[first, 2:][:, voigt.ABAQUS], some)
 
 
-def _centrifugal(square: float, places: tuple[float, ...]) -> Callable[[Array], Array]:
-    """Return ω² times the distance from an axis, of places."""
-    center, axis = np.array(places[:3]), np.array(places[3:]) / np.linalg.norm(places[3:])
+class _Centrifugal(Gravity):
+    """ω² times the distance from an axis, also of displaced elements."""
 
-    def acceleration(X: Array) -> Array:
-        arm = X - center
-        return np.asarray(square * (arm - (arm @ axis)[:, None] * axis))
+    def __init__(self, model: Model, square: float, places: tuple[float, ...], where: Ints) -> None:
+        center, axis = np.array(places[:3]), np.array(places[3:]) / np.linalg.norm(places[3:])
+        self._across = square * (np.eye(3) - np.outer(axis, axis))
+        self._groups = model.element_groups()
+        super().__init__(lambda X: (X - center) @ self._across, where)
 
-    return acceleration
+    def follow(self, mesh: Mesh, x: Array) -> Iterator[tuple[Rows, Array, Array]]:
+        """Yield what displacements add."""
+        for part in self._carriers(mesh, self._groups):
+            for chunk in part.chunks():
+                nodes = part.nodes[chunk]
+                M = part.at(mesh.points, chunk).scalar_mass(part.material.density)
+                more = M @ (x - mesh.points)[nodes] @ self._across
+                yield nodes, more, M[:, :, None, :, None] * self._across[:, None]

@@ -307,8 +307,6 @@ class Deck:
             step.card.wrong("the step has no procedure such as *STATIC")
         if self.acting.imaginary.given.any() and step.kind != "STEADYSTATEDYNAMICS":
             step.card.wrong(f"LOAD CASE=2 belongs to *STEADY STATE DYNAMICS; got *{step.kind}")
-        if step.large and any(kind == "CENTRIF" for kind, _, _ in self.acting.bodies):
-            step.card.wrong("CENTRIF with NLGEOM is not supported")
         step.held, step.acting = self.held.copy(), self.acting.copy()
         self.steps.append(step)
         self.open = None

@@ -140,10 +140,11 @@ class Job:
 
     def _parts(self, model: Model) -> Callable[[Array], tuple[ElementFields, dict[str, Array]]]:
         """Return what makes fields of displacements (n, 3) of a mode or a vibration, also those of nodes."""
-        groups = [
-            group if group.is_linear else replace(group, material=Anisotropic3D(group.material.C))
-            for group in model.element_groups()
-        ]
+        groups = model.element_groups()
+        for i, group in enumerate(groups):
+            if not group.is_linear:  # of small strains by the elasticity at rest
+                element: Any = group.element.__base__ if group.element.finite else group.element
+                groups[i] = replace(group, element=element, material=Anisotropic3D(group.material.C))
 
         def part(u: Array) -> tuple[ElementFields, dict[str, Array]]:
             fields = ElementFields(model.mesh, groups, np.ascontiguousarray(u))
@@ -171,6 +172,7 @@ class Job:
             count = sum(report.iterations for report in result.report.steps if report.time > last)
             self._tell_status(step, number, total - step.start, state.time - last, count)
             last = state.time
+        case.end = result
         return [f"{len(steps)} steps to {last:g} s"]
 
     def _number(self, step: Step) -> int:

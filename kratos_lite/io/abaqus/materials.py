@@ -87,9 +87,7 @@ def _law(definition: Definition, axes: LocalAxes | None, finite: bool) -> Materi
         E, nu = constants
         if "PLASTIC" not in cards:
             return Isotropic3D(E, nu, density, float(alpha[0]))
-        if finite:
-            cards["PLASTIC"].wrong("plastic flow at large strains is not supported; leave NLGEOM out")
-        return _plastic(cards["PLASTIC"], E, nu, density, float(alpha[0]))
+        return _plastic(cards["PLASTIC"], finite, E, nu, density, float(alpha[0]))
     if "PLASTIC" in cards:
         cards["PLASTIC"].wrong("it is supported with *ELASTIC and *EXPANSION of TYPE=ISO alone")
     law = Anisotropic3D(_elasticity(kind, constants), density, alpha)
@@ -113,8 +111,9 @@ def _expansion(definition: Definition) -> Array:
     return np.array([*given, 0.0, 0.0, 0.0])[voigt.ABAQUS] * voigt.SHEAR_TWICE
 
 
-def _plastic(card: Card, E: float, nu: float, density: float, alpha: float) -> Material:
+def _plastic(card: Card, finite: bool, E: float, nu: float, density: float, alpha: float) -> Material:
     """Return J2 plasticity with isotropic hardening by a curve, or kinematic one by one slope."""
+    from kratos_lite.materials.finite_j2_plasticity3d import FiniteJ2Plasticity3D
     from kratos_lite.materials.j2_plasticity3d import J2Plasticity3D
 
     at = dict[float, list[tuple[float, float]]]()
@@ -128,7 +127,10 @@ def _plastic(card: Card, E: float, nu: float, density: float, alpha: float) -> M
     (_, first), *curve = curves[0]
     kind = card.option("HARDENING", "ISOTROPIC").upper()
     if kind == "ISOTROPIC":
-        return J2Plasticity3D(E, nu, first, density=density, alpha=alpha, curve=curve)
+        law = FiniteJ2Plasticity3D if finite else J2Plasticity3D
+        return law(E, nu, first, density=density, alpha=alpha, curve=curve)
+    if finite:
+        card.wrong("kinematic hardening with NLGEOM is not supported")
     if kind != "KINEMATIC" or len(curve) != 1 or curve[0][0] <= 0:
         card.wrong("HARDENING is ISOTROPIC, or KINEMATIC with two lines, which give its slope")
     slope = (curve[0][1] - first) / curve[0][0]

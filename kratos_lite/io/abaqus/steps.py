@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from itertools import takewhile
 from math import ceil, pi
 from pathlib import Path
@@ -50,7 +51,8 @@ class _Cases(Building):
 
     def cases(self) -> list[tuple[Case, list[Step]]]:
         """Return the cases, each with its steps."""
-        cases, steps = list[tuple[Case, list[Step]]](), self.deck.steps
+        self.made = cases = list[tuple[Case, list[Step]]]()
+        steps = self.deck.steps
         if not steps:
             model = self.model()
             self.hold(model, self.deck.held)
@@ -85,14 +87,22 @@ class _Cases(Building):
 
     def _frequency(self, step: Step) -> Case:
         before = self.last("STATIC", step) if step.perturbs else None
-        if before is not None and self.is_nonlinear(before):
-            step.card.wrong("frequencies about the state of a nonlinear step are not supported")
         if before is not None and (before.held.given != step.held.given).any():
             step.card.wrong("frequencies with other supports than their preload are not supported")
-        model = self._loaded(before or step)
+        after = self._case_of(before) if before is not None and self.is_nonlinear(before) else None
+        if after is None:
+            model = self._loaded(before or step)
+        else:
+            assert after.time is not None
+            model = copy(after.model)
+            model.supports = model.supports.acting(after.time.end)
         if any(step.numbers()[1:]):
             model.notes.append("bounds of frequencies are ignored: the lowest ones are found")
-        return Case(model, modes=self.count(step), preload=before is not None)
+        return Case(model, modes=self.count(step), preload=before is not None and not after, after=after)
+
+    def _case_of(self, step: Step) -> Case:
+        """Return the case that is made of a step already."""
+        return next(case for case, steps in self.made if step in steps)
 
     def _buckle(self, step: Step) -> Case:
         return Case(self._loaded(step), modes=self.count(step), buckling=True)
@@ -114,7 +124,13 @@ class _Cases(Building):
         card = steps[0].procedure
         assert card is not None
         alpha = Row(card.place, (card.option("ALPHA", "-0.05"),)).number(0)
-        return Case(model, self._time(model, steps, 1, HHT(alpha), self._damping_of_materials()))
+        time = self._time(model, steps, 1, HHT(alpha), self._damping_of_materials())
+        before = self.last("STATIC", steps[0])
+        if before and steps[0].ramps:
+            steps[0].card.wrong("AMPLITUDE=RAMP after a static step is not supported")
+        if before and any("PLASTIC" in material.cards for material in self.deck.materials.values()):
+            steps[0].card.wrong("to go on from the state of a law with history is not supported")
+        return Case(model, time, after=self._case_of(before) if before else None)
 
     def _modaldynamic(self, *steps: Step) -> Case:
         model = self._in_turn(steps, False)
@@ -209,21 +225,22 @@ class _Cases(Building):
 
     def _in_turn(self, steps: Sequence[Step], large: bool) -> Model:
         """Return the model whose loads and supports are those of steps in turn."""
-        is_moving = steps[0].kind in MOVING
+        goes_on = {"STATIC": not any(map(self.is_nonlinear, self.earlier(steps[0]))), "DYNAMIC": True}
         for before in self.earlier(steps[0]):
-            if before.kind in MOVING or self.is_nonlinear(before) or (is_moving and before.period):
+            if before.period and (before.kind in MOVING or not goes_on.get(steps[0].kind)):
                 steps[0].card.wrong("to go on from the state of another kind of step is not supported")
         given = np.any([step.acting.temperatures.given[:, 0] for step in steps], axis=0)
         now = np.where(given, np.nan, self.deck.initial) if given.any() else None  # those of each are several
         model, series = self.model(large, now), [self._series(step) for step in steps]
         self._move(model, steps, series)
+        ends = np.cumsum([step.period for step in steps]).tolist()
         for k, step in enumerate(steps):
             T = step.acting.temperatures
             if self.deck.initial.any() and any(name for name, _ in T.by_amplitude()):
                 step.card.wrong("amplitudes of temperatures need initial temperatures of 0 in this step")
             if k and step.ramps and step.acting.names():
                 step.card.wrong("amplitudes after the first of several nonlinear steps are not supported")
-            for load, name in self.loads(model, step.acting):
+            for load, name in self.loads(model, step.acting, ends[k]):
                 each = [series[k][name] if one is step else None for one in steps]
                 model.add(load, amplitude=_course(steps, np.eye(len(steps))[k], each))
         return model
@@ -238,39 +255,53 @@ class _Cases(Building):
 
     def _move(self, model: Model, steps: Sequence[Step], series: Sequence[Amplitudes]) -> None:
         """Support a model in steps in turn, with the displacements that each prescribes."""
-        held = steps[0].held.copy()
-        for step in steps[1:]:
-            if (step.held.given != held.given).any():
-                step.card.wrong("supports that change between nonlinear steps are not supported")
-        values = np.stack([step.held.values for step in steps], axis=-1)
-        moved = held.given & values.any(axis=-1)
-        numbers = np.stack([step.held.amplitudes[moved] for step in steps], axis=-1)
-        both = np.column_stack([values[moved], numbers])
+        held, each = steps[0].held.copy(), [step.held for step in steps]
+        given: Any = np.stack([one.given for one in each], axis=-1)
+        values = np.where(given, np.stack([one.values for one in each], axis=-1), np.nan)
+        held.given = given.any(axis=-1)
+        moved = held.given & (values != 0).any(axis=-1)
+        changed = (moved & ~given.all(axis=-1)).any(axis=1)
+        if changed.any() and steps[0].kind in MOVING:
+            steps[1].card.wrong("supports that change between steps in time are not supported")
+        if (changed & ~model.mesh.used_nodes()).any() and self.deck.connections.springs:
+            steps[1].card.wrong("supports of reference nodes that change are not supported with springs")
+        numbers = np.stack([one.amplitudes for one in each], axis=-1)
+        both = np.column_stack([values[moved], np.where(given, numbers, 0)[moved]])
         alike, of = np.unique(both, axis=0, return_inverse=True)
         held.amplitudes[moved], held.names = 1 + of.ravel(), ["", *map(str, range(len(alike)))]
         courses = {}
         for i, row in enumerate(alike):
             sizes, which = np.split(row, 2)
-            each = [s[step.held.names[int(n)]] for s, step, n in zip(series, steps, which, strict=True)]
-            courses[str(i)] = _course(steps, sizes, each)
+            names = [s[one.names[int(n)]] for s, one, n in zip(series, each, which, strict=True)]
+            courses[str(i)] = _course(steps, sizes, names)
         self.hold(model, held, courses)
 
 
-def _course(steps: Sequence[Step], sizes: Array, amplitudes: Sequence[TimeSeries | None]) -> TimeSeries:
-    """Return over steps in turn what has a size in each, with an amplitude or without: then it keeps it."""
+def _course(steps: Sequence[Step], sizes: Array, amplitudes: Sequence[TimeSeries | None]) -> Any:
+    """Return, by the time, what has a size in each of some steps, with an amplitude or without.
+
+    Without, it keeps it.  A size nan is None up to the end of its step; what follows it acts at once.
+    """
     first = amplitudes[0](0.0) if amplitudes[0] else 0.0 if steps[0].ramps else 1.0
-    times, values, start = [0.0], [first * sizes[0]], 0.0
-    for step, size, amplitude in zip(steps, sizes, amplitudes, strict=True):
-        whole, inner, factors = step.period if step.ramps else AT_ONCE * step.period, np.zeros(0), [1.0, 1.0]
+    times, values, start, known = [0.0], [first * np.nan_to_num(sizes[0])], 0.0, np.isfinite(sizes)
+    for step, size, amplitude, grows in zip(steps, sizes, amplitudes, [True, *known], strict=False):
+        whole = step.period * (1.0 if step.ramps and grows else AT_ONCE)
+        inner, factors = np.zeros(0), [1.0, 1.0]
         if amplitude is not None:
             some = (amplitude.times > 0) & (amplitude.times < step.period)
             whole, inner = AT_ONCE * step.period, amplitude.times[some]
             factors = [amplitude(0.0), *amplitude.values[some], amplitude(step.period)]
         times += [start + whole, *(start + inner), start + step.period]
-        values += [size * factor for factor in factors]
+        values += [np.nan_to_num(size) * factor for factor in factors]
         start += step.period
     knots, at = np.unique(times, return_index=True)
-    return TimeSeries(knots, np.array(values)[at])
+    course, ends = TimeSeries(knots, np.array(values)[at]), np.cumsum([step.period for step in steps])
+
+    def while_known(time: float) -> float | None:
+        k = min(int(np.searchsorted(ends, time * (1 - 1e-9))), len(steps) - 1)
+        return course(time) if known[k] or time <= 0 else None
+
+    return course if known.all() else while_known
 
 
 def _sweep(low: float, high: float, count: int, bias: float, modes: int) -> Callable[[Model], Array]:

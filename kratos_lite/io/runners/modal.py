@@ -60,7 +60,8 @@ def _real_modes(case: Case, progress: Progress | None) -> tuple[Array, Array]:
     """Return the lowest frequencies in rad/s, or those from one on, and their shapes."""
     model, count, above = case.model, case.modes, case.above
     if above is None:
-        return model.modes(count, preload=case.preload or None, progress=progress)
+        preload = case.preload or None if case.after is None else case.after.end
+        return model.modes(count, preload=preload, progress=progress)
     for tried in (count, 2 * count, 4 * count, 8 * count):
         values, shapes = model.modes(tried, near=above, progress=progress)
         chosen = np.flatnonzero(values >= above)[:count]

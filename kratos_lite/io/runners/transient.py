@@ -29,6 +29,8 @@ def prepare(case: Case, progress: Progress | None = None) -> tuple[TransientAnal
     assert time is not None
     names = ("integrator", "rayleigh", "lumped", "displacement", "velocity")
     settings: dict[str, Any] = {name: getattr(time, name) for name in names} | {"progress": progress}
+    if case.after is not None and case.after.end is not None:
+        settings["displacement"] = case.after.end.u
     transient = case.model.transient(**settings)
     if not time.balanced and not (time.displacement is None and time.velocity is None):
         transient = TransientAnalysis(_held_at_first(transient), **settings)

@@ -39,6 +39,7 @@ class Temperature(Load):
     -----
     Between nodes T is interpolated by the shape functions; linear elements take the mean of their nodes, as
     their strains cannot follow more.  σ = C (B u - α ΔT), and the nodes are loaded by ∫ B^T C α ΔT dV.
+    At large displacements Green's strain of the stretch 1 + α ΔT takes the place of α ΔT.
     Source: Cook, Malkus, Plesha & Witt, Concepts and Applications of Finite Element Analysis (2002), section
     3.9.
 
@@ -135,9 +136,8 @@ def heated(
 def _heated(group: ElementGroup, heating: Array) -> ElementGroup:
     if not (heating.any() and group.material.expansion.any()):
         return group
-    if group.element.finite or "local_system" in group.element.custom:
+    if "local_system" in group.element.custom:
         raise ModelError(
-            f"{group.element.__name__}: a temperature is for small strains, and for no local system of one's "
-            "own; take another formulation, or leave the temperature out"
+            f"{group.element.__name__}: a temperature is for no local system of one's own; leave it out"
         )
     return replace(group, heating=heating)

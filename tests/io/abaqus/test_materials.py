@@ -177,8 +177,3 @@ def test_a_law_at_several_temperatures_is_refused(step: str, read: Read) -> None
         kl.InputError, match=r"\*ELASTIC: it depends on the temperature, which must be the same"
     ):
         read("*ELASTIC\n2e4,.3,0.\n1e4,.3,100.\n" + PLAIN + step, TETRAHEDRON)
-
-
-def test_plasticity_with_large_displacements_is_refused(read: Read) -> None:
-    with pytest.raises(kl.InputError, match="plastic flow at large strains"):
-        read("*ELASTIC\n2e4,.3\n*PLASTIC\n25.,0.\n" + PLAIN + LARGE, TETRAHEDRON)

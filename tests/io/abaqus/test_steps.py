@@ -115,6 +115,30 @@ STEPS: dict[str, tuple[str, str]] = {
     "large motion": (
         CUBE + QUICK, f"{IN_TIME.replace('STEP', 'STEP, NLGEOM')}*CLOAD, AMPLITUDE=A\nTOP,1,30.\n{PRINT}",
     ),
+    "supports that come and go": (
+        CUBE,
+        f"{FINE}1.,1.\n{EXACT}*CLOAD\nTOP,1,20.\n{PRINT}"
+        f"{FINE}1.,1.\n{EXACT}*BOUNDARY\nTOP,1,1,.1\n{PRINT}"
+        f"{FINE}1.,1.\n{EXACT}*BOUNDARY, OP=NEW\nBOTTOM,1,3\n5,2,2,.05\n{PRINT}",
+    ),
+    "plastic flow at large strains": (
+        PLASTIC,
+        f"{FINE}.2,1.\n{EXACT}*BOUNDARY\nTOP,3,3,.4\nTOP,1,1,.3\n{PRINT}"
+        f"{FINE}.5,1.\n{EXACT}*BOUNDARY\nTOP,3,3,.2\n{PRINT}",
+    ),
+    "heat with NLGEOM": (
+        CUBE.replace("*DENSITY", "*EXPANSION\n1e-6\n*DENSITY")
+        + "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nALL,0.\n",
+        f"{FINE}.5,1.\n{EXACT}*TEMPERATURE\nTOP,20.\n*CLOAD\nTOP,1,1.\n{PRINT}",
+    ),
+    "CENTRIF follows displacements": (
+        CUBE, f"{FINE}.5,1.\n{EXACT}*DLOAD\nEALL,CENTRIF,2.,0,.3,-.5,0,1.,0.\n{PRINT}",
+    ),
+    "motion from a state at rest": (
+        CUBE + "*AMPLITUDE, NAME=A\n0,1,.05,0.,.1,0\n",
+        f"{FINE}1.,1.\n{EXACT}*CLOAD\nTOP,1,30.\n*EL FILE\nENER\n{PRINT}"
+        f"{IN_TIME}{EXACT}*CLOAD, AMPLITUDE=A\nTOP,1,30.\n{PRINT}",
+    ),
     "initial velocity": (CUBE + "*INITIAL CONDITIONS, TYPE=VELOCITY\nTOP,1,2.\n", f"{IN_TIME}{PRINT}"),
 }  # fmt: skip
 
@@ -137,6 +161,10 @@ MODES = {  # steps, of which the last has modes; how near ccx is: its preload ch
     "of a body under tension": (
         "*STEP\n*STATIC\n*CLOAD\nTOP,3,.05\n*END STEP\n"
         "*STEP, PERTURBATION\n*FREQUENCY\n4\n*END STEP\n", 0.005,
+    ),
+    "about a nonlinear state, with loads that follow": (
+        f"{FINE}1.,1.\n{EXACT}*DLOAD\nEALL,P4,.5\nEALL,CENTRIF,.02,0,0,0,1.,0,0\n*END STEP\n"
+        "*STEP, PERTURBATION\n*FREQUENCY\n4\n*END STEP\n", 2e-5,
     ),
     "buckling by loads of the step alone": (
         "*STEP\n*STATIC\n*CLOAD\n80,1,.01\n*END STEP\n"
@@ -204,6 +232,7 @@ def test_a_deck_without_steps_is_a_model(read: Read) -> None:
     assert np.abs(u[:4]).max() == 0
 
 
+KINEMATIC = PLASTIC.replace("*PLASTIC", "*PLASTIC, HARDENING=KINEMATIC")
 REDUCED = CUBE.replace("C3D8,", "C3D8I,")
 NEXT = "*STEP\n*STATIC\n*CLOAD\nTOP,3,1.\n*END STEP\n"
 HOT = "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nTOP,20.\n" + AMPLITUDES + IN_TIME
@@ -214,10 +243,9 @@ WRONG = {
     "*STEP\n*DYNAMIC, EXPLICIT\n1.,1.\n*END STEP\n": "option EXPLICIT is not supported",
     "*STEP\n*MODAL DYNAMIC\n1.,1.\n*END STEP\n": "needs a step with *FREQUENCY before it",
     "*STEP\n*STATIC\n*CLOAD, LOAD CASE=2\nTOP,1,1.\n*END STEP\n": "LOAD CASE=2 belongs to *STEADY STATE",
-    f"{NEXT}*STEP\n*DYNAMIC\n1.,1.\n*END STEP\n": "to go on from the state of another kind of step",
-    f"{LARGE}*DLOAD\nEALL,CENTRIF,1.,0,0,0,0,0,1.\n*END STEP\n": "CENTRIF with NLGEOM is not supported",
-    f"{LARGE}*END STEP\n{LARGE}*BOUNDARY\nTOP,1,1\n*END STEP\n": "supports that change between",
-    f"{LARGE}*END STEP\n*STEP, PERTURBATION\n*FREQUENCY\n3\n*END STEP\n": "about the state of a nonl",
+    f"{IN_TIME}*END STEP\n{LARGE}*END STEP\n": "to go on from the state of another kind of step",
+    f"{IN_TIME}*END STEP\n{IN_TIME}*BOUNDARY\nTOP,1,1\n*END STEP\n": "supports that change between",
+    f"{NEXT}{IN_TIME.replace('STEP', 'STEP, AMPLITUDE=RAMP')}*END STEP\n": "AMPLITUDE=RAMP after a static",
     f"{NEXT}*STEP, PERTURBATION\n*FREQUENCY\n3\n*BOUNDARY\nTOP,1,1\n*END STEP\n": "with other supports than",
     f"{MODES_STEP}*STEP\n*MODAL DYNAMIC\n.1,.1\n*MODAL DAMPING\n1,4,.1\n*END STEP\n": "RAYLEIGH with α and β",
     f"{MODES_STEP}*STEP\n*STEADY STATE DYNAMICS, HARMONIC=NO\n1.,2.\n*END STEP\n": "HARMONIC=NO is not",
@@ -236,7 +264,11 @@ def test_steps_that_are_not_supported_say_so(text: str, read: Read) -> None:
 
 
 @pytest.mark.parametrize(
-    ("cube", "why"), [(REDUCED, "NLGEOM with C3D8I"), (PLASTIC, "plastic flow at large")]
+    ("cube", "why"),
+    [
+        (REDUCED, "NLGEOM with C3D8I"),
+        (KINEMATIC, "kinematic hardening with"),
+    ],
 )
 def test_models_of_large_displacements_that_are_not_supported(cube: str, why: str, read: Read) -> None:
     with pytest.raises(kl.InputError, match=why):
