@@ -1,7 +1,7 @@
 """Measure: ``python -m benchmarks quick``, or ``full``, or one set by its name.
 
-Sets: ``kratos error growth stall assembly parse skips cube1 motion ale distributed``, and in this process
-``effectivity adaptive edges dynamics laws loads folders decks``.
+Sets: ``kratos error growth stall assembly parse skips cube1 motion ale gradient distributed``,
+and in this process ``effectivity adaptive edges dynamics laws loads folders decks``.
 
 ``report`` makes the pages and pictures of the docs from the results kept; ``references`` makes the
 energies of the scenes without an exact field.  See benchmarks/README.md.
@@ -59,6 +59,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], list[Run]]] = {
         "motion", (OURS, NUMPY), o.programs, [(name, "", 0) for name in MOTIONS], "motion"
     ),
     "ale": lambda o: sets.ale_runs(o.programs),
+    "gradient": lambda o: sets.gradient_runs(o.programs, o.cells or (20, 40)),
     "distributed": lambda o: scaling.runs(o.cells),
 }
 """The runs of each set, from the options."""

@@ -159,6 +159,16 @@ def times_of(row: Row | None, names: Sequence[str]) -> list[float | None]:
     return [times.get(name) for name in names]
 
 
+def gradients(rows: Sequence[Row]) -> str:
+    """Return times, the memory of the whole process, and how far the gradients are apart."""
+    text = compared(rows, ("forward", "gradient", "process"))
+    told = [
+        [label(place_of(r)), r["program"], megabytes(r["peak"]), error(r["errors"]["difference"])]
+        for r in rows
+    ]
+    return text + "\n" + table("scene | program | MB | difference", told)
+
+
 def skips(rows: Sequence[Row]) -> str:
     """Return what each skip is worth: seconds and memory beside the row it is compared with."""
     pairs = {"half_unloaded": "two_bodies", "two_bodies": "two_bodies"}
@@ -250,6 +260,7 @@ SECTIONS = {
     "skips": ("What need not be computed", skips),
     "motion": ("Bodies in motion: time of one step of one body", motions),
     "ale": ("Matrices of a wheel in flow", wheels),
+    "gradient": ("One gradient", gradients),
 }
 """Title and table of each group of rows."""
 NOTES = {
@@ -277,6 +288,10 @@ NOTES = {
     "ratio ≤ 0.25 for M+G+H and for K. "
     "The difference is the largest of all entries of M, G, H, K, relative to the largest one of the matrix.",
     "skips": "Whole processes; the ratio is to the plain row of the same scene.",
+    "gradient": "The work of the loads and its derivative by the stiffness of each element, as topology "
+    "optimization needs it: a cantilever of 2n × n × n cells 8N whose stiffness varies at random by 1 : 762 "
+    "(torch-fem's own benchmark). One thread of each; seconds, in brackets kratos_lite / program; `forward` "
+    "is all from model to displacements. Goal: forward and gradient ≤ 0.1.",
 }
 
 

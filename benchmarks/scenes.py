@@ -40,6 +40,7 @@ def write(scene: Scene, folder: Path) -> Path:
     path = folder / stem(scene.name, scene.kind, scene.n)
     (block,) = scene.model.mesh.blocks
     supports, material = scene.model.supports, scene.model.element_groups()[0].material
+    scaled = scene.model.stiffness_factors is not None
     np.savez(
         f"{path}.npz",
         points=scene.model.mesh.points,
@@ -50,8 +51,10 @@ def write(scene: Scene, folder: Path) -> Path:
         values=supports.values,
         forces=scene.forces(),
         elasticity=np.array([material.E, material.nu]),
+        factors=scene.model.stiffness_factors if scaled else [],
     )
-    write_for_kratos(Path(f"{path}.mdpa"), scene.model)
+    if not scaled:
+        write_for_kratos(Path(f"{path}.mdpa"), scene.model)
     return path
 
 
@@ -85,6 +88,24 @@ def cylinder(kind: str, n: int) -> Scene:
 def block(kind: str, n: int) -> kl.Model:
     """Return the unit block of n³ cells, clamped at its bottom, under gravity in three directions."""
     return weighty(kl.box(cells=(n, n, n), element=element(kind)), material=SOLID)
+
+
+def simp(kind: str, n: int) -> kl.Model:
+    """Return a cantilever whose cells have random densities ρ and the stiffness 1e-3 + (1 - 1e-3) ρ³.
+
+    It is the structural mesh of mosaic (Pasteur Labs) as torch-fem's benchmarks have it: 2n × n × n cells in
+    rows along z, then y, then x; the softest is 762 times softer than the stiffest.
+    """
+    mesh = kl.box((2, 1, 1), cells=(2 * n, n, n), element=element(kind))
+    model = kl.Model(mesh, kl.Isotropic3D(E=70e3, nu=0.3))
+    density = np.zeros(mesh.n_elements)
+    centers = mesh.points[mesh.blocks[0].nodes].mean(axis=1).round(9)
+    random = np.random.default_rng(0).standard_normal(len(centers))
+    density[np.lexsort(centers.T[::-1])] = np.clip(0.5 + 0.3 * random, 0.05, 0.95)
+    model.scale_stiffness(1e-3 + (1 - 1e-3) * density**3)
+    model.fix("x-")
+    model.add(kl.Traction("x+", (0, 0, -1)))
+    return model
 
 
 # ---- scenes for what can be skipped ------------------------------------------------------------------
@@ -134,7 +155,7 @@ SCENES: dict[str, Callable[[str, int], Scene | kl.Model]] = {
     for made in (
         shared.manufactured, shared.sphere, shared.bending, shared.cook, shared.l_domain, shared.cavity,
         shared.cantilever, shared.cube,
-        hole, cylinder, block, two_bodies, unloaded, unreferenced, warped, held,
+        hole, cylinder, block, simp, two_bodies, unloaded, unreferenced, warped, held,
     )
 } | {
     "hole_incompressible": partial(hole, nu=0.4999),

@@ -190,6 +190,14 @@ def ale_runs(programs: Sequence[str], sizes: Iterable[Any] = ale.MESHES, repeat:
     return runs("ale", (OURS, NUMPY, "GetFEM"), programs, places, "ale", (("repeat", repeat),))
 
 
+def gradient_runs(programs: Sequence[str], sizes: Sequence[int] = (20, 40)) -> list[Run]:
+    """Return the derivative of the compliance by the stiffness of all elements, beside torch-fem."""
+    places = [("simp", "8N", n) for n in sizes]
+    return runs(
+        "gradient", (OURS, "torch-fem"), programs, places, "gradient", (("arrays", True), ("threads", 1))
+    )
+
+
 def cube1_runs(programs: Sequence[str]) -> list[Run]:
     """Return the whole process for one element, beside a process that imports NumPy alone."""
     return runs("cube1", ("import numpy", *FROM_FILES), programs, [("cube", "8N", 1)])

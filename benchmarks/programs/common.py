@@ -43,7 +43,8 @@ class Job:
     stem : path of the scene without ending.
     kind : element kind such as ``8N``.
     tolerance : relative residual for iterative solvers.
-    element, points, nodes, fixed, values, forces, elasticity, reference : the problem as `read` leaves it.
+    element, points, nodes, fixed, values, forces, elasticity, factors, reference : the problem, as `read`
+        leaves it.
     """
 
     element: NDArray[np.str_]
@@ -54,6 +55,7 @@ class Job:
     values: Array
     forces: Array
     elasticity: Array
+    factors: Array
     reference: Array
 
     def __init__(self, given: dict[str, Any]) -> None:

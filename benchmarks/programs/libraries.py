@@ -250,15 +250,33 @@ def torch_fem(job: Job) -> Array | None:
         import torchfem.materials
         import torchfem.sparse
     torch.set_default_dtype(torch.float64)
+    torch.set_num_threads(job.given.get("threads", torch.get_num_threads()))
     job.answer["version"] = importlib.metadata.version("torch-fem")
     job.read()
     with job.phase("mesh"):
         E, nu = job.elasticity.tolist()
         material = torchfem.materials.IsotropicElasticity3D(E=E, nu=nu)
         cells = torch.from_numpy(job.cells.astype(np.int64))
+        factors = torch.tensor(job.factors, requires_grad=True)
+        if job.task == "gradient":
+            material = material.vectorize(len(cells))
+            material.C = factors[:, None, None, None, None] * material.C
         model = torchfem.Solid(torch.from_numpy(job.points), cells, material)
+    if job.task == "gradient":
+        return torch_gradient(job, torch, model, factors)
     k = job.fastest("matrix", model.k0)
     return None if job.task == "assembly" else torch_solve(job, torch, torchfem.sparse, model, k)
+
+
+def torch_gradient(job: Job, torch: Any, model: Any, factors: Any) -> Array:
+    """Return the derivative (m,) of the work of the loads by a factor of the stiffness of each element."""
+    model.constraints[torch.from_numpy(job.fixed)] = True
+    model.forces[:] = torch.from_numpy(job.forces)
+    with job.phase("forward"):
+        u, *_ = model.solve(stol=job.tolerance, differentiable_parameters=factors)
+    with job.phase("gradient"):
+        torch.inner(model.forces.ravel(), u.ravel()).backward()
+    return np.asarray(factors.grad)
 
 
 def torch_solve(job: Job, torch: Any, sparse: Any, model: Any, k: Any) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,8 @@ WORDS = {"tolerance", "solver"}
 
 def work(job: Job) -> Array | None:
     """Do the job."""
+    if "threads" in job.given:
+        os.environ["KRATOS_LITE_THREADS"] = str(job.given["threads"])
     with job.phase("import"):
         import kratos_lite as kl
     job.answer["version"] = kl.__version__
@@ -41,6 +44,12 @@ def work(job: Job) -> Array | None:
         return None
     if job.task == "assembly":
         return assembly(job, model)
+    if job.task == "gradient":
+        model.scale_stiffness(job.factors)
+        with job.phase("forward"):
+            result = model.solve(tolerance=job.tolerance)
+        with job.phase("gradient"):
+            return np.asarray(result.gradient(kl.Compliance()))
     system = model.static(**{word: job.given[word] for word in WORDS if word in job.given})
     for _ in range(job.given.get("cases", 1)):
         result = system.solve()

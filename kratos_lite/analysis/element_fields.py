@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from kratos_lite.assembly.recovery import Recovery
     from kratos_lite.mesh.locate import Located
     from kratos_lite.model.local_axes import LocalAxes
+    from kratos_lite.model.ties import Coupling
 
 PLACES = ("gauss", "element", "node", "averaged", "raw")
 
@@ -43,6 +44,7 @@ class ElementFields:
         u.setflags(write=False)  # strains and stresses are made of it later
         self._strained = u if u0 is None else u - u0
         self._springs: Csr | None = None  # (3n, 3n) N/m
+        self._ties: Sequence[Coupling] = ()
 
     # ---- strains and stresses ----------------------------------------------------------------------
 

@@ -30,6 +30,8 @@ CONE = 0.4
 """Height of the cone of a support, of the longest arrow."""
 LEAST = 0.02
 """Part of the longest arrow that is drawn."""
+TIE = r"$\circ$"
+"""Marker of a tie."""
 LETTERS, LINES = 90, 12
 """Of a line of the legend; and of the legend."""
 
@@ -49,9 +51,9 @@ def materials_of(structure: Structure) -> Values | None:
 def legend_of(structure: Structure) -> list[Entry]:
     """Return what the marks of a model stand for."""
     rows = [("^", SUPPORT, str(condition)) for condition in structure.supports.conditions]
-    rows += [("x", DARK, str(point)) for point in structure.remote_points]
+    rows += [(TIE if tie.nodes_of else "x", DARK, f"{tie.title} {tie}") for tie in structure.supports.ties]
     rows += [("o" if one.is_mass else "s", DARK, repr(one)) for one in structure.attachments]
-    rows += [(_marker(load), LOAD, f"{structure._label(load)}{load!r}") for load in structure.loads]
+    rows += [(_marker(load), LOAD, structure._said(load)) for load in structure.loads]
     entries = [(marker, color, _cut(in_units(text, structure.units))) for marker, color, text in rows]
     more = len(entries) - LINES
     return entries if more <= 0 else [*entries[:LINES], ("", DARK, f"and {more} more: print(model)")]
@@ -67,7 +69,7 @@ def _cut(text: str) -> str:
 
 
 def marks_of_model(structure: Structure) -> Marks:
-    """Return the marks of supports, loads, springs, added masses and remote points."""
+    """Return the marks of supports, loads, springs, added masses, ties and remote points."""
     shown, mesh, none = structure.attachments, structure.mesh, np.zeros((0, 2, 3))
     spokes = [none]
     for point in structure.remote_points:
@@ -84,7 +86,9 @@ def marks_of_model(structure: Structure) -> Marks:
     for drawn in _loads(structure):
         for kind, known in arrows.items():
             known.append(surface.arrows(kind, [(X, v) for X, v, way in drawn if way == kind]))
+    tied = [mesh.points[nodes] for tie in structure.supports.ties for nodes in tie.nodes_of[1::2]]
     return Marks(
+        pivots=np.concatenate([none[:, 0], *(X[spread(X, MARKS)] for X in tied)]),
         springs=lines(mass=False, inside=False),
         between=lines(mass=False, inside=True),
         masses=lines(mass=True, inside=False)[:, 0],

@@ -442,7 +442,7 @@ class QuasiStaticAnalysis(ModelInTime):
         groups = heated(model.mesh, groups, self.temperatures)
         u0 = model.initial_displacement
         result = Result(model.mesh, groups, self._whole(self.u).copy(), reactions, loads, report, u0)
-        result._springs = model.supports.springs
+        result._springs, result._ties = model.supports.springs, model.supports.ties
         return result
 
 

@@ -14,7 +14,7 @@ from kratos_lite.analysis.peak import peak
 from kratos_lite.analysis.report import Report, element_counts, vector
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.mesh import Mesh, Where
+from kratos_lite.mesh import Mesh, Where, WhereElements
 from kratos_lite.model.loads import Load
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.linear_solver import Solution
@@ -205,7 +205,7 @@ class Result(ElementFields, Tabular):
             raise InputError(f"a line needs two ends; both are {ends[0].tolist()}")
         return LineValues(self, ends, whole_number(n, "n", least=2), flag(recovered, "recovered"))
 
-    def section(self, where: Any, *, recovered: bool = True) -> Section:
+    def section(self, where: Any, *, part: WhereElements = None, recovered: bool = True) -> Section:
         """Return a cut by a plane or around a part: force, moment, area, centroid and the stress on it.
 
         Force and moment are sums of internal nodal forces, whose virtual work with a rigid motion of what
@@ -217,7 +217,9 @@ class Result(ElementFields, Tabular):
         Parameters
         ----------
         where : a plane, ``("x", 0.5)`` or a normal (3,) and an offset in m, beyond which n·X is larger; or
-            elements by part name, property id, mask or indices, which lie beyond a cut around them.
+            elements by part name, property id, mask or indices, which lie beyond a cut around them, through
+            their faces to others and to what they are tied to.
+        part : the elements through which a plane cuts, as those of one bolt; all if not given.
         recovered : the stress is that recovered at nodes, as for `at`; otherwise C B u.
 
         Returns
@@ -227,10 +229,10 @@ class Result(ElementFields, Tabular):
         Raises
         ------
         InputError
-            The plane is none.
+            The plane is none, or `part` is given without.
         MeshError
-            It misses the body, there are no such elements or no others beside them, or this process has only
-            a part of the mesh.
+            It misses the body or part, there are no such elements or no others beside them, or this process
+            has only a part of the mesh.
 
         Examples
         --------
@@ -244,7 +246,7 @@ class Result(ElementFields, Tabular):
         """
         from kratos_lite.analysis.section import section  # a quick start for results
 
-        return section(self, where, flag(recovered, "recovered"))
+        return section(self, where, part, flag(recovered, "recovered"))
 
     def energy(self) -> float:
         """Return the strain energy ½ ∫ ε:C:ε dV in J, of the elastic strain, and ½ u·K u of springs."""
@@ -581,5 +583,5 @@ def result_of(
         **{**report, "notes": [*model.remarks(), *report.get("notes", ())]},
     )
     result = kind(model.mesh, groups, u, reactions, loads, made, model.initial_displacement, analysis)
-    result._springs = model.supports.springs
+    result._springs, result._ties = model.supports.springs, model.supports.ties
     return result

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -16,14 +17,15 @@ from kratos_lite.assembly.nonlinear_assembly import internal_forces
 from kratos_lite.elements.surface import area_vectors, face_rule
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import InputError, MeshError
-from kratos_lite.mesh import Mesh, mask_of, with_rows
+from kratos_lite.mesh import Mesh, WhereElements, mask_of, with_rows
 from kratos_lite.mesh.locate import Located
 from kratos_lite.mesh.topology import faces_of
+from kratos_lite.model.ties import Coupling
 from kratos_lite.quadrature import rule_for
 from kratos_lite.shapes.faces import FACE_SHAPES, Triangle3
 from kratos_lite.tabular import Tabular, in_units
 from kratos_lite.typing import Array, ArrayLike, Ints, Mask, Numbers
-from kratos_lite.validation import finite
+from kratos_lite.validation import finite, short
 from kratos_lite.view.plane import Plane, cut_cells, plane_of
 
 ON_PLANE = 1e-9
@@ -124,10 +126,10 @@ class Section(Tabular):
         return rows
 
 
-def section(fields: ElementFields, where: Any, recovered: bool = True) -> Section:
+def section(fields: ElementFields, where: Any, part: WhereElements = None, recovered: bool = True) -> Section:
     """Return a cut of a result by a plane or around a part; see `Result.section`."""
     mesh, u = fields.mesh, fields._strained
-    name, weights, pieces = cut_of(mesh, where)
+    name, weights, pieces = cut_of(mesh, where, part, fields._ties)
     located, area = _located(mesh, pieces, name)
     values = fields.at(located, recovered=recovered)  # type: ignore[attr-defined]
     x, points, sigma = mesh.points, located.points, voigt.tensor(values.stress)
@@ -137,7 +139,9 @@ def section(fields: ElementFields, where: Any, recovered: bool = True) -> Sectio
     dA, total = np.linalg.norm(area, axis=1), area.sum(axis=0)
     whole, net = float(dA.sum()), float(np.linalg.norm(total))
     centroid, normal = dA @ points / whole, total / net if net > ON_PLANE * whole else 0 * total
-    forces = internal_forces(mesh.points, fields.groups, u)
+    inside = mask_of(mesh.elements(part), mesh.n_elements)
+    groups = [group.take(inside[group.rows]) for group in fields.groups]
+    forces = internal_forces(mesh.points, groups, u)
     forces = forces if mesh.hanging is None else mesh.hanging.gather(forces)
     both = weights @ forces, weights @ np.cross(x - centroid, forces)
     traction = np.einsum("qij,qj->qi", sigma, area / dA[:, None])
@@ -145,69 +149,86 @@ def section(fields: ElementFields, where: Any, recovered: bool = True) -> Sectio
     return Section(name, normal, whole, centroid, *both, *of_points, mesh.units)
 
 
-def cut_of(mesh: Mesh, where: Any) -> tuple[str, Array, Pieces]:
+def cut_of(
+    mesh: Mesh, where: Any, part: WhereElements, ties: Sequence[Coupling]
+) -> tuple[str, Array, Pieces]:
     """Return a cut in words, by how much nodes lie beyond it (n,), and its pieces; raise for none."""
     if not mesh.whole:
         raise MeshError("a section needs the whole mesh on one process; solve it from one file")
     pair = isinstance(where, (tuple, list)) and len(where) == 2
     if pair and isinstance(where[0], (str, tuple, list, np.ndarray)):
-        return _by_plane(mesh, plane_of(where, np.zeros(3), "a section"))
+        return _by_plane(mesh, plane_of(where, np.zeros(3), "a section"), part)
     if isinstance(where, str) and "=" in where and where not in mesh.parts:
         raise InputError(f"a section by a plane is a pair such as ('x', 0.5); got {where!r}")
-    return _around(mesh, where)
+    if part is not None:
+        raise InputError(f"part belongs to a section by a plane, such as ('x', 0.5); got {short(where)}")
+    return _around(mesh, where, ties)
 
 
-def _by_plane(mesh: Mesh, plane: Plane) -> tuple[str, Array, Pieces]:
+def _by_plane(mesh: Mesh, plane: Plane, part: WhereElements) -> tuple[str, Array, Pieces]:
     """Return the cut by a plane: nodes beyond it count 1, nodes on it half, unless it bounds the body."""
+    inside = mask_of(mesh.elements(part), mesh.n_elements)
     n, offset = plane.normal, plane.offset
     d = mesh.points @ n - offset
     d[np.abs(d) <= ON_PLANE * np.linalg.norm(np.ptp(mesh.extent, axis=0))] = 0.0
-    used = d[mesh.used_nodes()]
-    low, high = float(used.min()), float(used.max())
+    used = np.zeros(mesh.n_nodes, dtype=bool)
+    for block, at in with_rows(mesh.blocks):
+        used[block.nodes[inside[at]]] = True
+    low, high = float(d[used].min(initial=np.inf)), float(d[used].max(initial=-np.inf))
     axis = "xyz"[int(n.argmax())] if n.max() == 1 else f"({', '.join(f'{c:.4g}' for c in n)})·X"
     name, spans = (
         in_units(text, mesh.units)
         for text in (f"{axis} = {offset:g} m", f"{offset + low:g} … {offset + high:g} m")
     )
     if low > 0 or high < 0:
-        raise MeshError(f"the section {name} misses the body, which spans {spans} there")
+        what = "the body" if part is None else "the part"
+        raise MeshError(f"the section {name} misses {what}, which spans {spans} there")
+    if part is not None:
+        name += f" of {part!r}" if isinstance(part, (str, int)) else " of some elements"
     weights = np.heaviside(d, 0.0 if low == 0 else 1.0 if high == 0 else 0.5)
-    return name, weights, _polygons(mesh, -d if high == 0 else d, n)
+    return name, weights, _polygons(mesh, -d if high == 0 else d, n, inside)
 
 
-def _polygons(mesh: Mesh, d: Array, n: Array) -> Pieces:
-    """Yield the section where the distance (n,) of nodes is 0, in triangles."""
+def _polygons(mesh: Mesh, d: Array, n: Array, inside: Mask) -> Pieces:
+    """Yield the section of elements inside where the distance (n,) of nodes is 0, in triangles."""
     rule = rule_for("triangle", DEGREE)
-    for number, block in enumerate(mesh.blocks):
+    for number, (block, at) in enumerate(with_rows(mesh.blocks)):
         if len(block):
             straight = len(block.known_shape.nodes) == block.known_shape.corners
             cells, corners, _ = cut_cells(block, d, mesh.points, 1 if straight else None)
+            kept = inside[at][cells]
+            cells, corners = cells[kept], corners[kept]
             P = corners[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 6)
             area = np.linalg.norm(np.cross(P[:, 1, :3] - P[:, 0, :3], P[:, 2, :3] - P[:, 0, :3]), axis=1)
-            at = tabulate(Triangle3, rule)[0] @ P
+            x = tabulate(Triangle3, rule)[0] @ P
             dA = area[:, None, None] * rule.weights[:, None] * n
-            yield number, np.repeat(cells, 2), at[..., :3], at[..., 3:], dA
+            yield number, np.repeat(cells, 2), x[..., :3], x[..., 3:], dA
 
 
-def _around(mesh: Mesh, where: Any) -> tuple[str, Array, Pieces]:
-    """Return the cut around a part: its nodes count 1, those that others share half."""
+def _around(mesh: Mesh, where: Any, ties: Sequence[Coupling]) -> tuple[str, Array, Pieces]:
+    """Return the cut around a part: its nodes count 1, those that others share half, tied ones 0."""
     name = f"around {where!r}" if isinstance(where, (str, int)) else "around some elements"
     inside = mask_of(mesh.elements(where), mesh.n_elements)
     own, others = np.zeros((2, mesh.n_nodes), dtype=bool)
     for block, at in with_rows(mesh.blocks):
         own[block.nodes[inside[at]]] = True
         others[block.nodes[~inside[at]]] = True
-    return name, own - 0.5 * (own & others), _faces(mesh, inside)
+    tied = np.zeros(mesh.n_nodes, dtype=bool)
+    for pair in chain.from_iterable(zip(tie.nodes_of[::2], tie.nodes_of[1::2], strict=True) for tie in ties):
+        for a, b in (pair, pair[::-1]):
+            tied[a] |= own[a].all() and not own[b].any()
+    return name, np.where(tied, 0.0, own - 0.5 * (own & others)), _faces(mesh, inside, tied)
 
 
-def _faces(mesh: Mesh, inside: Mask) -> Pieces:
-    """Yield the faces between elements inside and others, of the smaller ones where nodes hang."""
+def _faces(mesh: Mesh, inside: Mask, tied: Mask) -> Pieces:
+    """Yield the faces between elements inside and others, of the smaller ones where nodes hang, and tied."""
     faces, start = mesh.all_faces, 0
     between = inside[faces.element[faces.one]] != inside[faces.element[faces.other]]
     cut = np.isin(np.arange(len(faces.element)), faces.other[between])
     for number, (block, rows) in enumerate(with_rows(mesh.blocks)):
         for columns in map(list, faces_of(block)):
-            cells = np.flatnonzero(cut[start : start + len(block)])
+            on_tie = inside[rows] & tied[block.nodes[:, columns]].all(axis=1)
+            cells = np.flatnonzero(cut[start : start + len(block)] | on_tie)
             start += len(block)
             shape = FACE_SHAPES[len(columns)]
             N, X = tabulate(shape, face_rule(shape))[0], mesh.points[block.nodes[cells][:, columns]]

@@ -174,6 +174,17 @@ def _add_to_model(model: Model, options: Namespace) -> None:
         model.recognize_units()
     for part, (axes, value) in options.fix:
         model.fix(part, axes, value)
+    for part in options.symmetry:
+        model.symmetry(part)
+    for one, other in options.tie:
+        model.tie(one, other)
+    _add_loads(model, options)
+    if motions := given(options, "rotation", "translation"):
+        model.add(_motion(model, options, *motions))
+
+
+def _add_loads(model: Model, options: Namespace) -> None:
+    """Add the loads of the command line to a model."""
     if options.gravity and any(isinstance(load, Gravity) for load in model.loads):
         model.notes.append("--gravity is added to the gravity of the file")
     for acceleration in options.gravity:
@@ -181,10 +192,11 @@ def _add_to_model(model: Model, options: Namespace) -> None:
     for name, load in LOADS.items():
         for part, value in getattr(options, name):
             model.add(load(part, value))
+    for name, follow in (("remote", model.distribute), ("rigid", model.rigid)):
+        for part, point, force, moment in getattr(options, name):
+            model.add(follow(part, point).load(force, moment))
     for value, reference in options.temperature:
         model.add(Temperature(value, reference))
-    if motions := given(options, "rotation", "translation"):
-        model.add(_motion(model, options, *motions))
 
 
 def _where(model: Model, part: str | None) -> str | int | None:

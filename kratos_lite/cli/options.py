@@ -25,9 +25,10 @@ OUTPUT = (
     ".pvd, .html, .csv, .npz; of modes: .pvd, .html; of all: .frd (CalculiX); may be given several times"
 )
 PICTURE = "picture of the deformed model, of its modes, or of a body along its path; .gif, .mp4: film"
+REMOTE = "PART:POINT:FORCE[,MOMENT]"
 RESTART = "go on from a state that --state wrote; files hold the rest alone, so give them new names"
 STRESS_FREE = "do not take the DISPLACEMENT of free nodes in the file for the state without stress"
-SECTION = "force, moment and area of a cut: by a plane such as x=0.5, or around the elements of a part"
+SECTION = "force, moment and area of a cut: by a plane, x=0.5 or BOLT:x=0.5 of one part, or around a part"
 UNITS = "consistent units of all numbers here and in the file, a label: auto, mm N MPa t … (SI)"
 VTU = "how .vtu files store their numbers: quickest, smallest, or to be read by eye (binary)"
 
@@ -91,11 +92,15 @@ GROUPS = {
                 "--material", "[PART:][LAW:]E=…,nu=…", "constants in SI units, in place of those of the file"
             ),
             Option("--fix", "PART:xyz[=VALUE]", "prescribed displacement in m along these axes (0)"),
+            Option("--symmetry", "PART", "a plane of symmetry: no displacement across it"),
+            Option("--tie", "PART:PART", "tie two surfaces, whose meshes need not match"),
             Option("--gravity", "X,Y,Z", "acceleration in m/s²"),
             Option("--traction", "PART:X,Y,Z", "force per area in Pa"),
             Option("--pressure", "PART:P", "pressure in Pa, positive into the body"),
             Option("--point-load", "PART:X,Y,Z", "force in N on a part of one node"),
             Option("--resultant", "PART:X,Y,Z", "force in N in all, spread over the faces of the part"),
+            Option("--remote", REMOTE, "force in N and moment in N m at a point in m, spread over a part"),
+            Option("--rigid", REMOTE, "the same at a point that a part follows rigidly"),
             Option("--temperature", "T[:REFERENCE]", "of the whole model, and that without strain (0)"),
             many=True,
             only="models",

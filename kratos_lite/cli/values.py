@@ -113,6 +113,28 @@ def displacement(text: str) -> tuple[str, float]:
     return axes, number(value) if equals else 0.0
 
 
+def parts(text: str) -> tuple[str, str]:
+    """Return the two parts of ``PART:PART``.
+
+    >>> parts("plate.z+:rib.z-")
+    ('plate.z+', 'rib.z-')
+    """
+    one, other = text.split(":")
+    return one, other
+
+
+def remote_load(text: str) -> tuple[str, list[float], list[float], list[float]]:
+    """Return part, point, force and moment of ``PART:X,Y,Z:FX,FY,FZ[,MX,MY,MZ]``.
+
+    >>> remote_load("hole:0.3,0,0:0,0,-500,0,20,0")
+    ('hole', [0.3, 0.0, 0.0], [0.0, 0.0, -500.0], [0.0, 20.0, 0.0])
+    """
+    part, point, words = text.rsplit(":", 2)
+    *force, mx, my, mz = numbers(words if words.count(",") > 2 else f"{words},0,0,0")
+    fx, fy, fz = force
+    return part, vector(point), [fx, fy, fz], [mx, my, mz]
+
+
 def temperature(text: str) -> list[float]:
     """Return temperature and reference of ``T[:REFERENCE]``.
 
@@ -123,14 +145,15 @@ def temperature(text: str) -> list[float]:
     return [number(value), number(reference or "0")]
 
 
-def section(text: str) -> str | tuple[str, float]:
-    """Return the plane of ``x=0.5``, or a part.
+def section(text: str) -> tuple[str | tuple[str, float], str | None]:
+    """Return the plane of ``[PART:]x=0.5`` and the part that it cuts, or a part to cut around.
 
-    >>> section("y=-0.5"), section("hub")
-    (('y', -0.5), 'hub')
+    >>> section("bolt:y=-0.5"), section("hub")
+    ((('y', -0.5), 'bolt'), ('hub', None))
     """
-    axis, equals, offset = text.partition("=")
-    return (axis, number(offset)) if equals else text
+    plane, equals, offset = text.partition("=")
+    part, _, axis = plane.rpartition(":")
+    return ((axis, number(offset)), part or None) if equals else (text, None)
 
 
 def integrator(text: str) -> ModelIntegrator:
@@ -200,6 +223,8 @@ FORMS: dict[str, Callable[[str], Any]] = {
     "FRACTION": fraction,
     "X,Y,Z": vector,
     "xyz[=VALUE]": displacement,
+    "PART:PART": parts,
+    "PART:POINT:FORCE[,MOMENT]": remote_load,
     "[PART:][LAW:]E=…,nu=…": material,
     "AXIS:RATE[:ACCELERATION]": rates,
     "STEP:STEPS[:EVERY]": steps,
@@ -216,7 +241,7 @@ def read(form: str, text: str) -> Any:
     >>> read("PART:X,Y,Z", "z+:0,0,-1e5")
     ('z+', [0.0, 0.0, -100000.0])
     """
-    if not form.startswith("PART:"):
+    if form in FORMS or not form.startswith("PART:"):
         return FORMS.get(form, str)(text)
     part, _, rest = text.rpartition(":")
     if not (part and rest):

@@ -122,7 +122,7 @@ class Outputs:
     picture : of the end of a model, or of the path of a body; a film with the ending .gif or .mp4.
     state : the last state, from which another run goes on.
     mode : how .vtu files store their numbers: ``binary`` if not given, ``compressed`` or ``ascii``.
-    sections : planes and parts, as for `Result.section`, that summary and json of a model at its end have.
+    sections : where and part, as for `Result.section`, of cuts for the summary and json of a model.
     in_steps : files of a model in the steps that a run file of Kratos asks for.
     """
 

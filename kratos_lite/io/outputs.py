@@ -43,8 +43,8 @@ def check_outputs(case: Case) -> None:
 
         if case.modes or case.harmonic is not None or not case.is_of_model:
             raise InputError("a section is that of a result of a model; leave it out")
-        for where in outputs.sections:
-            cut_of(case.model.mesh, where)
+        for where, part in outputs.sections:
+            cut_of(case.model.mesh, where, part, case.model.supports.ties)
     if not case.is_of_model and outputs.json is not None:
         raise InputError(f"{outputs.json}: a body has no summary in .json; write .csv or .npz")
 

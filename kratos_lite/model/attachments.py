@@ -121,9 +121,16 @@ class AttachedMatrix(Attachment):
                 setattr(made, name, finer.where(place))
         return made
 
+    def _unit(self) -> str:
+        """Return the units of its values, in brackets."""
+        per = "" if self.is_mass else "/m³" if _point_of(self.where) is None else "/m"
+        rotation = " [kg m²]" if self.is_mass else " [N m/rad]"
+        return f" [{'kg' if self.is_mass else 'N'}{per}]{rotation if self.W[3:, 3:].any() else ''}"
+
     def __repr__(self) -> str:
         named = {name: value for name, value in vars(self).items() if name != "W" and value is not None}
-        return f"{type(self).__name__}({', '.join(f'{name}={short(v)}' for name, v in named.items())})"
+        values = ", ".join(f"{name}={short(value)}" for name, value in named.items())
+        return f"{type(self).__name__}({values}){self._unit()}"
 
 
 class ElasticSupport(AttachedMatrix):
@@ -168,7 +175,7 @@ class ElasticSupport(AttachedMatrix):
         if k.shape not in ((), (3,), (6,), (3, 3), (6, 6)):
             raise InputError(f"the stiffness must be a number, (3,), (3, 3), (6,) or (6, 6); got {k.shape}")
         W = _semidefinite(k if k.ndim == 2 else np.diag(np.atleast_1d(k)), "the stiffness")
-        self.where, self.stiffness, self.to, self.W = where, W.tolist() if k.ndim else float(k), to, W
+        self.where, self.stiffness, self.to, self.W = where, k.tolist(), to, W
         one, other = _point_of(where), _point_of(to)
         if k.ndim == 0 and one is not None:
             raise InputError("the stiffness on a point is (3,) or (3, 3), in N/m; got a number")
@@ -197,8 +204,8 @@ class AddedMass(AttachedMatrix):
         if inertia is not None:
             if not isinstance(where, RemotePoint):
                 raise InputError("an inertia is for remote points, such as model.rigid(...)")
-            inertia = finite(inertia, "the inertia of an added mass", (3, 3))
-            self.W[3:, 3:] = _semidefinite(inertia, "the inertia of an added mass")
+            known = _semidefinite(finite(inertia, "the inertia of an added mass", (3, 3)), "the inertia")
+            self.W[3:, 3:], self.inertia = known, known.tolist()
 
     def _weights(self, vectors: Array) -> Array:
         """Return the mass at places of faces, by area."""

@@ -232,11 +232,12 @@ def _unit(v: Array) -> Array:
     return np.asarray(v / length)
 
 
-def normal_of_plane(points: Array) -> Array:
+def normal_of_plane(points: Array, what: str) -> Array:
     """Return the normal (3,) of the plane through points, its largest component > 0; ModelError for none."""
     if len(points) > 2:
         _, sizes, axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
         if sizes[1] > 1e-9 * sizes[0] and sizes[2] <= 1e-9 * sizes[0]:
             normal = np.where(np.abs(axes[2]) < 1e-12, 0.0, axes[2])
             return np.asarray(normal * np.sign(normal[np.abs(normal).argmax()]) + 0.0)
-    raise ModelError("a plane of symmetry needs three or more nodes that lie in one plane, and on no line")
+    text = "a plane of symmetry needs three or more nodes that lie in one plane, and on no line"
+    raise ModelError(f"{what}: {text}")

@@ -92,13 +92,17 @@ def better_element(element: type[KinematicLinear], family: str = "KinematicLinea
 
 def _in_bending(mesh: Mesh, element: type[KinematicLinear], groups: Sequence[ElementGroup]) -> list[str]:
     """Warn of plain linear bricks and wedges that are long: of the one with most G/E (a/t)², by its edges."""
-    most, text = 0.0, ""
-    edges = np.array(element.shape.edges).T
+    most, text, points = 0.0, "", mesh.points.T.copy()
     for group in groups:
-        X = mesh.points[group.nodes]
-        length = np.linalg.norm(X[:, edges[0]] - X[:, edges[1]], axis=2)
-        thickness = np.where(length > 0, length, np.inf).min(axis=1)
-        ratio = length.max(axis=1) / thickness
+        X = np.take(
+            points, group.nodes.T, axis=1
+        )  # (3, k, m): all elements at once for one edge after another
+        longest, shortest = np.zeros(len(group)), np.full(len(group), np.inf)
+        for a, b in element.shape.edges:
+            square = sum((x[a] - x[b]) ** 2 for x in X)
+            np.maximum(longest, square, out=longest)
+            np.minimum(shortest, square, where=square > 0, out=shortest)
+        ratio = np.sqrt(longest / shortest)
         excess = _shear_over_young(group.material.C) * ratio**2
         worst = int(np.argmax(excess))
         if ratio[worst] > LONG and excess[worst] > most:

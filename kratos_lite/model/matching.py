@@ -46,7 +46,8 @@ def opposite(mesh: Mesh, a: Ints, b: Ints, shift: Array | None = None) -> Ints:
     raise ModelError(
         "periodic boundaries and cuts need nodes that lie opposite one another; "
         f"there are {len(a)} and {len(b)}, not in the same places: mesh both faces alike, in Gmsh by "
-        "Periodic Surface, in a box with bricks, as its tetrahedra may differ from face to face"
+        "Periodic Surface, in a box with bricks, as its tetrahedra may differ from face to face, and leave "
+        "error= out, which may refine one face alone"
     )
 
 
@@ -151,6 +152,8 @@ class Cut(PartTie):
 
 class BoltForce(Load):
     """A force in N that pulls the two sides of a cut together."""
+
+    unit = " [N]"
 
     def __init__(self, a: Where, b: Where, force: float) -> None:
         self.a, self.b, self.force = a, b, number(force, "the force of a bolt", least=-np.inf)

@@ -27,10 +27,13 @@ from kratos_lite.model.remote_point import RemotePoint
 from kratos_lite.model.solid import Solid
 from kratos_lite.model.spurious_modes import check_rules, check_spurious_modes
 from kratos_lite.model.supports import AXES, DirichletCondition, Supports, axis_numbers
-from kratos_lite.model.ties import Tie
+from kratos_lite.model.ties import Tie, name_of
 from kratos_lite.time_series import Factor
 from kratos_lite.typing import Array, ArrayLike
 from kratos_lite.validation import finite, function_or_none, instance, number, short
+
+ROWS = 20
+"""Of one kind that a summary has."""
 
 
 class Structure(Solid):
@@ -144,7 +147,8 @@ class Structure(Solid):
         >>> model.supports.fixed[:, 0].sum(), model.supports.fixed[:, 1:].any()
         (np.int64(4), np.False_)
         """
-        normal = normal_of_plane(self.mesh.points[self.mesh.nodes(where)])
+        nodes = self.mesh.nodes(where)
+        normal = normal_of_plane(self.mesh.points[nodes], name_of(where, nodes))
         across, local = AXES[normal.argmax()], None
         if np.count_nonzero(normal) > 1:
             across, local = "x", Cartesian(normal)
@@ -572,6 +576,10 @@ class Structure(Solid):
         """Return what stands before a load: its name and a colon, or nothing."""
         return next((f"{name}: " for name, named in self._named.items() if named is load), "")
 
+    def _said(self, load: Load) -> str:
+        """Return a load with its name and unit."""
+        return f"{self._label(load)}{load!r}{getattr(load, 'load', load).unit}"
+
     def remove(self, load: str | Load) -> None:
         """Take a load away.
 
@@ -661,18 +669,24 @@ class Structure(Solid):
             span = f"{self._factors.min():g} … {self._factors.max():g}"
             rows.append(("stiffness", f"times {span}, a factor for each element"))
         rows.append(("fixed", f"{self.supports.fixed.sum()} components"))
-        rows += [("support", str(condition)) for condition in self.supports.named.values()]
-        rows += [(tie.title, str(tie)) for tie in self.supports.ties]
-        rows += [("attached", repr(attachment)) for attachment in self.attachments]
+        rows += _first([("support", str(condition)) for condition in self.supports.conditions])
+        rows += _first([(tie.title, str(tie)) for tie in self.supports.ties])
+        rows += _first([("attached", repr(attachment)) for attachment in self.attachments])
         if len(self.supports.constraints):
             rows.append(("constraints", str(len(self.supports.constraints))))
-        rows += [("load", f"{self._label(load)}{load!r}") for load in self.loads]
+        rows += _first([("load", self._said(load)) for load in self.loads])
         rows += [] if self.motion is None else [("motion", str(self.motion))]
         return rows + [("note", note) for note in self.remarks()]
 
     def __repr__(self) -> str:
         name = type(self).__name__
         return f"{name}({self.mesh.n_nodes} nodes, {self.mesh.n_elements} elements, {len(self.loads)} loads)"
+
+
+def _first(rows: list[tuple[str, str]]) -> list[tuple[str, str]]:
+    """Return the first rows of a kind, and how many more there are."""
+    more = len(rows) - ROWS
+    return rows if more <= 0 else [*rows[:ROWS], (rows[0][0], f"and {more} more")]
 
 
 CHECKS: tuple[Callable[[Structure, Sequence[ElementGroup]], Iterable[str]], ...] = (

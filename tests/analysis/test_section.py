@@ -173,6 +173,57 @@ def test_a_cut_along_tied_faces():
         result.section(np.arange(8))
 
 
+def tied():
+    left, right = (kl.box((2, 1, 1), n, "20N", origin=(x, 0, 0)) for x, n in ((0, (2, 2, 2)), (2, (2, 3, 3))))
+    model = kl.Model(kl.join({"left": left, "right": right}), LAW)
+    model.tie("left.x+", "right.x-")
+    model.fix("left.x-")
+    model.add(kl.Traction("right.x+", FORCE))
+    return model
+
+
+@pytest.mark.parametrize(
+    ("where", "part", "x", "sign"),
+    [
+        ("right", None, 2.0, 1),  # around the part: through the tie
+        ("left", None, 2.0, -1),
+        (("x", 2.0), "left", 2.0, 1),
+        (("x", 2.0), "right", 2.0, 1),
+        (("x", 2.6), "right", 2.6, 1),
+    ],
+)
+def test_one_part_of_a_tied_body(where, part, x, sign):
+    cut = tied().solve(tolerance=1e-13).section(where, part=part)
+    assert abs(cut.area - 1) < 1e-12
+    assert np.abs(cut.normal - [sign, 0, 0]).max() < 1e-12
+    assert np.abs(cut.centroid - [x, 0.5, 0.5]).max() < 1e-12
+    assert np.abs(sign * cut.force - FORCE).max() < 1e-9 * 7
+    assert np.abs(cut.moment_about((4, 0.5, 0.5))).max() < 1e-8
+    assert np.abs(cut.stress_force - cut.force).max() < 0.05
+
+
+def test_a_plane_cuts_one_of_two_bars_that_share_their_ends():
+    """Two bars side by side, one twice as stiff: each carries its share."""
+    mesh = kl.box((4.0, 3.0, 1.0), (4, 3, 1))
+    y = centers(mesh)[:, 1]
+    inner = np.flatnonzero((np.abs(y - 1.5) > 0.5) | (np.abs(centers(mesh)[:, 0] - 2) > 1))
+    mesh = kl.Mesh(mesh.points, {"KinematicLinear3D8N": mesh.blocks[0].nodes[inner]})
+    model = kl.Model(mesh, kl.Isotropic3D(E=1e6, nu=0.0))
+    y = centers(mesh)[:, 1]
+    mesh.add_part("stiff", lambda X: X[:, 1] > 1.999)
+    model.assign(kl.Isotropic3D(E=2e6, nu=0.0), "stiff")
+    model.fix("x-")
+    model.fix("x+", "xyz", [1e-3, 0, 0])
+    result = model.solve(tolerance=1e-13)
+    whole = result.section(("x", 2.0))
+    stiff, soft = (result.section(("x", 2.0), part=part) for part in ("stiff", np.flatnonzero(y < 1)))
+    assert np.abs(stiff.force + soft.force - whole.force).max() < 1e-9 * whole.force[0]
+    assert abs(stiff.area - 1) < 1e-12
+    assert abs(whole.area - 2) < 1e-12
+    assert stiff.force[0] > 1.5 * soft.force[0] > 0
+    assert "of 'stiff'" in str(stiff)
+
+
 @pytest.mark.parametrize("element", ["KinematicLinear3D8N", "EnhancedStrain3D8N", "BBar3D8N"])
 def test_laws_that_are_not_linear(element):
     law = kl.J2Plasticity3D(E=1e6, nu=0.3, yield_stress=40.0, hardening=1e5)
@@ -287,6 +338,19 @@ def test_cuts_that_are_none(where, words):
     assert all(word in str(error.value) for word in words), error.value
 
 
+@pytest.mark.parametrize(
+    ("where", "part", "words"),
+    [
+        (("x", 1.5), "x-", "part 'x-' has no elements"),
+        (("x", 1.5), [3], "the section x = 1.5 m misses the part, which spans 3 … 4 m there"),
+        ([0], [3], "part belongs to a section by a plane"),
+    ],
+)
+def test_parts_that_no_plane_cuts(where, part, words):
+    with pytest.raises(KratosLiteError, match=words):
+        cantilever().solve().section(where, part=part)
+
+
 def test_a_part_of_a_mesh_on_another_process_is_refused():
     result = cantilever().solve()
     result.mesh = result.mesh.replace(whole=False)
@@ -311,13 +375,16 @@ def test_sections_on_the_command_line(run, tmp_path, monkeypatch):
     model = cantilever()
     model.mesh.add_part("end", lambda X: X[:, 0] > 1.9)
     kl.write("beam.mdpa", model)
-    words = ["--section", "x=1.5", "--section", "end", "--json", "beam.json"]
+    words = ["--section", "x=1.5", "--section", "end", "--section", "end:x=2.5", "--json", "beam.json"]
     done = run("solve", "beam.mdpa", *words)
     assert done.code == 0
     assert "section force         (7, 2, 5) N" in done.out
-    first, second = json.loads(Path("beam.json").read_text())["sections"]
+    first, second, third = json.loads(Path("beam.json").read_text())["sections"]
+    assert abs(third["moment"][1] + 7.5) < 1e-9
+    assert third["where"] == "x = 2.5 m of 'end'"
     assert np.abs(np.array(first["moment"]) - [0, -12.5, 5]).max() < 1e-9
     assert second["where"] == "around 'end'"
     assert abs(second["force"][2] - 5) < 1e-9
     assert run("solve", "beam.mdpa", "--section", "x=9").refuses("x = 9 m misses the body")
+    assert run("solve", "beam.mdpa", "--section", "end:x=1").refuses("x = 1 m misses the part")
     assert run("solve", "beam.mdpa", "--section", "x=1", "--modes", "2").refuses("of a result of a model")

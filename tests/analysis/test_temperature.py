@@ -280,3 +280,24 @@ def test_orthotropic_bodies_swell_by_axes():
         model.fix(side, axis)
     model.add(kl.Temperature(100.0))
     assert np.abs(model.solve().u - model.mesh.points * [1e-3, 2e-3, 3e-3]).max() < 1e-12
+
+
+def test_a_hot_hollow_sphere_has_the_stress_of_the_closed_form():
+    """Of a sector on rollers all around, hot inside.  Source: Timoshenko & Goodier, section 151."""
+    a, b, E, nu, alpha, T = 1.0, 2.0, 210e9, 0.3, 12e-6, 100.0
+    box = kl.box((1, 1, 1), (8, 2, 2), "KinematicLinear3D20N")
+    r, polar, azimuth = a + (b - a) * box.points[:, 0], 1.2 + 0.4 * box.points[:, 1], 0.4 * box.points[:, 2]
+    outwards = [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)]
+    model = kl.Model(
+        box.replace(points=r[:, None] * np.stack(outwards, axis=1)), kl.Isotropic3D(E, nu, alpha=alpha)
+    )
+    axes = kl.Spherical()
+    for column, letter in ((1, "t"), (2, "p")):
+        model.fix(np.flatnonzero(box.points[:, column] % 1 == 0), letter, local=axes)
+    model.add(kl.Temperature(T * (b / r - 1) / (b / a - 1)))
+    found = model.solve().stress("node", local=axes)
+    size = alpha * E * T / (1 - nu) * a * b / (b**3 - a**3)
+    across = a + b - (a * a + a * b + b * b) / (2 * r) - (a * b) ** 2 / (2 * r**3)
+    along = a + b - (a * a + a * b + b * b) / r + (a * b) ** 2 / r**3
+    expected = size * np.stack([along, across, across], axis=1)
+    assert np.abs(found[:, :3] - expected).max() < 0.02 * np.abs(expected).max()

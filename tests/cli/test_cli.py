@@ -158,6 +158,24 @@ def test_a_temperature_says_the_same_as_a_script(run, box):
     assert run("solve", "box.vtu", *words, "--temperature", "1:2:3").refuses("--temperature: ")
 
 
+def test_ties_planes_of_symmetry_and_remote_points_say_the_same_as_a_script(run, folder):
+    lower, upper = (kl.box((1, 1, 1), (n, n, n), "KinematicLinear3D8N", origin=(0, 0, n - 2)) for n in (2, 3))
+    kl.write("two.mdpa", both := kl.join({"a": lower, "b": upper}))
+    words = ["--material", STEEL, "--fix", "a.z_minus:z", "--symmetry", "x-", "--symmetry", "a.y_minus"]
+    words += ["--tie", "a.z_plus:b.z_minus", "--remote", "b.x_plus:2,0.5,1.5:10,0,-20"]
+    words += ["--rigid", "b.z_plus:0.5,0.5,4:100,0,-200,3,50,7", "--json", "out.json"]
+    assert run("solve", "two.mdpa", *words).code == 0
+    model = kl.Model(both, LAW)
+    model.fix("a.z-", "z")
+    model.symmetry("x-")
+    model.symmetry("a.y-")
+    model.tie("a.z+", "b.z-")
+    model.add(model.distribute("b.x+", (2, 0.5, 1.5)).load((10, 0, -20)))
+    model.add(model.rigid("b.z+", (0.5, 0.5, 4)).load((100, 0, -200), moment=(3, 50, 7)))
+    assert same(displacement("out.json"), model.solve().displacement())
+    assert run("solve", "two.mdpa", *words, "--symmetry", "b").refuses("b: a plane of symmetry needs three")
+
+
 def test_material_by_property_and_by_law(run, box):
     wood = (
         "Orthotropic3D:E_x=11e9,E_y=2e9,E_z=1e9,nu_xy=0.4,nu_yz=0.3,nu_xz=0.35,"
@@ -461,6 +479,14 @@ WRONG_OPTIONS = {
     "no part": (
         [*HELD, "--pressure", "1e5"],
         "--pressure: expected PART:P (pressure in Pa, positive into the body); got '1e5'",
+    ),
+    "no second part": ([*HELD, "--tie", "x+"], "--tie: expected PART:PART (tie two surfaces, whose meshes"),
+    "tied to itself": ([*HELD, "--tie", "x+:z+"], "cannot tie x+ to z+: both have node"),
+    "no plane": ([*HELD, "--symmetry", "Top"], "there is no part 'Top'"),
+    "no force at a point": ([*HELD, "--remote", "x+:1,2,3"], "--remote: expected PART:POINT:FORCE[,MOMENT]"),
+    "half a moment": (
+        [*HELD, "--rigid", "x+:1,2,3:4,5,6,7,8"],
+        "--rigid: expected PART:POINT:FORCE[,MOMENT]",
     ),
     "unknown axis": (["--material", STEEL, "--fix", "z-:w"], "axes must be some of x, y, z"),
     "two values": ([*HELD, "--fix", "z-:z=1"], "z"),

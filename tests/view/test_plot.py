@@ -629,3 +629,21 @@ def test_a_window_on_a_gap_between_faces_is_empty(result):
 def test_a_mesh_collapsed_to_a_point_is_drawn(place):
     mesh = kl.Mesh(np.full((8, 3), place), {"KinematicLinear3D8N": [list(range(8))]})
     assert np.isfinite(kl.plot(mesh).get_size_inches()).all()
+
+
+def test_ties_are_marked_and_listed_with_all_that_acts_and_its_units():
+    pair = {"a": kl.box((1, 1, 1), (1, 1, 1)), "b": kl.box((1, 1, 1), (2, 2, 2), origin=(1, 0, 0))}
+    model = kl.Model(kl.join(pair), STEEL)
+    plain = len(model.plot().axes[0].lines)
+    model.tie("a.x+", "b.x-")
+    model.symmetry("a.x-")
+    model.add(kl.Pressure("b.x+", 2.0), amplitude=lambda t: t)
+    model.add(kl.ElasticSupport("b.z-", 7.0))
+    point = model.rigid("b.y+", (1.5, 2, 0.5))
+    model.add_mass(point, 3.0, inertia=np.eye(3))
+    figure, table = model.plot(), str(model)
+    assert len(figure.axes[0].lines) > plain
+    said = [t.get_text() for t in figure.axes[-1].get_legend().get_texts()]
+    assert "tie a.x+ to b.x-: 9 nodes depend on the others" in said
+    for row in ("a.x-, x = 0 m", "stiffness=7.0) [N/m³]", "[kg] [kg m²]", "amplitude=<lambda>) [Pa]"):
+        assert row in table

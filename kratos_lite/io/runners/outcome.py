@@ -56,8 +56,8 @@ class Outcome:
             A label and a value each.
         """
         rows = self.rows or (self.result.table() if self.result else [])
-        for where in self.case.outputs.sections if self.result else ():
-            rows = [*rows, *self.result.section(where).table()]  # type: ignore[union-attr]
+        for where, part in self.case.outputs.sections if self.result else ():
+            rows = [*rows, *self.result.section(where, part=part).table()]  # type: ignore[union-attr]
         shown = [(name, text) for name, text in rows if verbose or name != "skipped"]
         units = self.case.model.units if self.case.is_of_model else "SI"
         return [*self.lines, *(f"{name:<{WIDTH}}{in_units(text, units)}" for name, text in shown)]

@@ -111,7 +111,7 @@ def write_json(path: str | Path, result: Result, sections: Sequence[Any] = ()) -
 
     content = {"kratos_lite": __version__, "units": result.units, **summary(result), **_by_node(result)}
     if sections:
-        content["sections"] = [_section(result.section(where)) for where in sections]
+        content["sections"] = [_section(result.section(where, part=part)) for where, part in sections]
     try:
         text = json.dumps(content, ensure_ascii=False, allow_nan=False)
     except ValueError:

@@ -38,6 +38,8 @@ DEEPEST = 8
 class Load(ABC):
     """Something that pushes a structure.  A load of your own needs `forces` alone."""
 
+    unit: str = ""
+    """Of its values, in brackets, as summaries show it."""
     local: LocalAxes | None = None
     """Axes of its vectors, if these are not x y z."""
 

@@ -33,6 +33,7 @@ class BodyForce(DistributedLoad):
     local : axes of the force, one vector or a function: `Cylindrical`, …; x y z if not given.
     """
 
+    unit = " [N/m³]"
     what: ClassVar[tuple[str, str]] = "a body force", "(3,) or (n, 3) in N/m³"
 
     def __init__(
@@ -125,6 +126,7 @@ class Gravity(BodyForce):
     array([ 0.  ,  0.  , -9.81])
     """
 
+    unit = " [m/s²]"
     what = "gravity", "(3,) or (n, 3) in m/s²"
 
     def __init__(

@@ -39,6 +39,8 @@ class PointLoad(Load):
     [0, -2, 0, -2, 0, -2, 0, -2]
     """
 
+    unit = " [N]"
+
     def __init__(
         self, where: Where, force: ArrayLike, each: bool = False, *, local: LocalAxes | None = None
     ) -> None:
@@ -143,6 +145,8 @@ class NodalForces(Load):
     ----------
     values : (n, 3) float, N.
     """
+
+    unit = " [N]"
 
     def __init__(self, values: ArrayLike) -> None:
         self.values = vectors(values, "nodal forces", "(n, 3) in N", (2,))

@@ -93,6 +93,7 @@ class Traction(FaceLoad):
     local : axes of the traction, one vector or a function: `Cylindrical`, …; x y z if not given.
     """
 
+    unit = " [Pa]"
     what, each_face = "a traction", True
     nodal = "traction", 2
 
@@ -128,6 +129,7 @@ class LineLoad(Traction):
     local : as of `Traction`.
     """
 
+    unit = " [N/m]"
     what, cells, each_face = "a line load", ("line",), True
 
 
@@ -149,6 +151,7 @@ class Pressure(FaceLoad):
         The normal is neither, the pressure no number, or a follower is a function of places.
     """
 
+    unit = " [Pa]"
     what, each_face = "a pressure", True
     nodal = "pressure", 1
 
@@ -223,6 +226,7 @@ class Resultant(FaceLoad):
     -100.0
     """
 
+    unit = " [N] [N m]"
     what = "a resultant"
 
     def __init__(
