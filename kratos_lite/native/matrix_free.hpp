@@ -21,7 +21,7 @@ struct Ties {
         int axis;
         double weight;
     };
-    std::vector<int32_t> dependents, start, independents;
+    std::vector<int32_t> dependents, start, independents;  // dependents ascend
     std::vector<double> weights;
     std::vector<Share> shares;       // sorted by nodes
     std::vector<int32_t> of;         // first share of each node, (n + 1)
@@ -127,13 +127,14 @@ public:
         const auto turn = turns.take();
         std::vector<double> D = kept.empty() ? diagonal_blocks() : std::exchange(kept, {});
         const std::vector<double> untied = ties.size() ? D : std::vector<double>();
+        const auto dependent = [&](int32_t k) { return ties.dependents[ties.shares[k].tie]; };
         for (int64_t i = 0; ties.size() && i < n; ++i)
-            for (int32_t k = ties.of[i]; k < ties.of[i + 1]; ++k)
-                for (int32_t l = ties.of[i]; l < ties.of[i + 1]; ++l) {
+            for (int32_t k = ties.of[i]; k < ties.of[i + 1]; ++k)  // shares of one dependent node follow each other
+                for (int32_t l = k; l < ties.of[i + 1] && dependent(l) / 3 == dependent(k) / 3; ++l) {
                     const Ties::Share &a = ties.shares[k], &b = ties.shares[l];
-                    const int32_t j = ties.dependents[a.tie], m = ties.dependents[b.tie];
-                    if (j / 3 == m / 3)
-                        D[9 * i + 3 * a.axis + b.axis] += a.weight * b.weight * untied[9 * (j / 3) + 3 * (j % 3) + m % 3];
+                    const double value = a.weight * b.weight * untied[3 * dependent(k) + dependent(l) % 3];
+                    D[9 * i + 3 * a.axis + b.axis] += value;
+                    if (l != k) D[9 * i + 3 * b.axis + a.axis] += value;
                 }
         return D;
     }
