@@ -92,7 +92,7 @@ def check_jacobians(mesh: Mesh, elements: Sequence[type[KinematicLinear]]) -> li
     # allowed and noted; so is a slight fold at a node, at most FOLD of the mean det J, which badly shaped but
     # useful elements have.
     problems = Problems(kind=MeshError)
-    flat = folded = 0
+    flat = folded = inverted = 0
     for block, element in zip(mesh.blocks, elements, strict=True):
         shape, g = element.shape, len(element.rule)
         dN = np.concatenate([tabulate(shape, element.rule)[1], gradients_at_nodes(shape)])
@@ -109,6 +109,9 @@ def check_jacobians(mesh: Mesh, elements: Sequence[type[KinematicLinear]]) -> li
             for e in wrong[:MAX_PROBLEMS]:
                 problems.add(_describe_inverted(mesh, block, int(cells[e]), det[e], g))
             problems.count += len(wrong[MAX_PROBLEMS:])
+            inverted += int((det < 0).all(axis=1).sum())
+    if 1 < inverted == problems.count:
+        raise MeshError(f"{problems.messages[0]}; {inverted - 1} more elements are inverted, too")
     problems.raise_if_any()
     warnings = [f"{flat} elements have det J = 0 at a corner node (singular corner)"] if flat else []
     if folded:

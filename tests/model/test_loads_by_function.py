@@ -1,5 +1,7 @@
 """A load is what its function says: resultants against closed forms and the divergence theorem."""
 
+import math
+
 import numpy as np
 import pytest
 from meshes import KINDS
@@ -97,3 +99,16 @@ def test_a_jump_inside_elements_is_a_warning_that_names_the_part(load, part):
     model.loads.clear()
     model.add(kl.Pressure("z+", lambda X: 1e3 * np.sin(3 * X[:, 0])), amplitude=lambda t: 2.0 + t)
     assert model.solve().report.warnings == []
+
+
+@pytest.mark.parametrize(
+    "wrong", [lambda X: X[:, 3], lambda X: math.sin(X[:, 0]), lambda X: 1.0 if X[:, 0] > 0 else 0.0]
+)
+def test_a_function_that_fails_is_told_what_places_are(wrong):
+    model = kl.Model(kl.box(), LAW)
+    model.fix("z-")
+    model.add(kl.Pressure("z+", wrong))
+    with pytest.raises(
+        kl.InputError, match=r"pressure: the function fails .* X is \(m, 3\), all places at once"
+    ):
+        model.solve()

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeAlias, TypeVar
 import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup, add_nodal
-from kratos_lite.errors import InputError, ModelError
+from kratos_lite.errors import InputError, KratosLiteError, ModelError
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.local_axes import LocalAxes
 from kratos_lite.time_series import Factor, TimeSeries, function_of
@@ -368,7 +368,16 @@ def at_places(function: OfPlace, what: str, width: tuple[int, ...]) -> Callable[
     """Return a function of places (..., 3) that checks what the given one of (m, 3) returns."""
 
     def checked(X: Array) -> Array:
-        values, m = finite(function(X.reshape(-1, 3).copy()), what), X[..., 0].size
+        try:
+            given = function(X.reshape(-1, 3).copy())
+        except (IndexError, TypeError, ValueError) as error:
+            if isinstance(error, KratosLiteError):
+                raise
+            hint = (
+                f"X is (m, 3), all places at once, and x is X[:, 0]; numpy's functions take arrays: {error}"
+            )
+            raise InputError(f"{what}: the function fails at places X; {hint}") from error
+        values, m = finite(given, what), X[..., 0].size
         if values.shape not in ((m, *width), width):
             shape = "(m, 3)" if width else "(m,)"
             raise InputError(f"{what} at places (m, 3) must have shape {shape}; got {values.shape}")
