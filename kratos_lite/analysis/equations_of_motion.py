@@ -21,7 +21,7 @@ from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.linear_solver import LinearSolver
 from kratos_lite.solvers.mass import Mass
-from kratos_lite.solvers.plan import Plan, stepped
+from kratos_lite.solvers.plan import LIGHT, Facts, Plan, choose, stepped
 from kratos_lite.typing import Array, Mask, Progress
 from kratos_lite.validation import finite
 
@@ -52,6 +52,7 @@ class EquationsOfMotion:
         steady: bool = False,
         massless: bool = False,
         solver: str = "direct",
+        planned: Callable[[str, Facts], Plan] = choose,
         progress: Progress | None = None,
     ) -> None:
         self.model, self._steady = model, steady
@@ -78,6 +79,7 @@ class EquationsOfMotion:
             self.groups,
             model.supports.constraint_map,
             solver=solver,
+            planned=planned,
             hanging=model.mesh.hanging,
             patterns=model.patterns,
             progress=progress,
@@ -100,6 +102,7 @@ class EquationsOfMotion:
                     "damping of the motion"
                 )
         self._kept: tuple[Any, Solve] | None = None
+        self._product: tuple[Array, Array] | None = None  # the last u and K u
         self._scalar_kept: tuple[tuple[float, float], tuple[Any, Any]] | None = None
 
     # ---- loads and supports ------------------------------------------------------------------------------
@@ -135,10 +138,9 @@ class EquationsOfMotion:
     # ---- matrices ----------------------------------------------------------------------------------------
 
     @property
-    def K(self) -> BlockMatrix:
+    def K(self) -> Any:
         """Stiffness (3a, 3a) of the elements alone in N/m."""
-        K: BlockMatrix = self.system.K
-        return K
+        return self.system.K
 
     def stiffness_terms(self, time: float) -> Array | None:
         """Return what the motion adds to K, data (nnz,) on the pattern, or None."""
@@ -199,7 +201,9 @@ class EquationsOfMotion:
 
     def times_stiffness(self, u: Array, time: float) -> Array:
         """Return K u with what the motion adds, at a time."""
-        out = self.K @ u
+        if self._product is None or not np.array_equal(self._product[0], u):
+            self._product = u.copy(), self.K @ u
+        out = self._product[1]
         if (scalar := self._scalars(time)[0]) is not None:
             out = out + (scalar @ u.reshape(-1, 3)).ravel()
         return np.asarray(out)
@@ -230,6 +234,7 @@ class EquationsOfMotion:
     def _elastic(self, m: float, c: float, k: float) -> BlockMatrix:
         """Return m M + c C + k K without what a motion adds, (3a, 3a)."""
         K, (alpha, beta) = self.K, self.rayleigh
+        K = K if isinstance(K, BlockMatrix) else self.system.assembled()
         A = BlockMatrix((k + c * beta) * K.data, K.indices, K.indptr)
         if mass := m + c * alpha:
             A.add_scalar(mass * self.mass.data)
@@ -241,8 +246,7 @@ class EquationsOfMotion:
         """Return what solves (m M + c C + k K) u = f + reactions; it is kept for the same matrix."""
         key = m, c, k, *self.rates(time)
         if self._kept is None or self._kept[0] != key:
-            near = None if self.is_symmetric(time, c) else self._elastic(m, c, k)
-            self._kept = key, self._solver(self.matrix(time, m, c, k), near, m, k)
+            self._kept = key, self._solver(time, m, c, k)
         return self._kept[1]
 
     # ---- what laws remember: nothing if they are linear --------------------------------------------------
@@ -297,20 +301,32 @@ class EquationsOfMotion:
         damped = bool(self.terms and self.terms.motion.damping)
         return not (acceleration or (rate and (c or damped)))
 
-    def _solver(self, A: BlockMatrix, near: BlockMatrix | None, m: float, k: float) -> Solve:
-        """Return what solves A x = f; `near` is what it has beside skew parts, if it is not symmetric."""
+    def _solver(self, time: float, m: float, c: float, k: float) -> Solve:
+        alpha, beta = self.rayleigh
+        size = k + c * beta  # of K, by which the equations are divided
+        mass, factors = (m + c * alpha) / size, (m / size, c / size, k / size)
         made, plan = self.system.equations, stepped(len(self.system.constraint_map.free))
-        equations = replace(made, K=A, plan=plan, symmetric=near is None, with_mass=(k, m * self.mass.nodal))
-        if near is not None and plan.iterates:
-            equations.near = replace(equations, K=near, symmetric=True)
-        return partial(_solved, equations, self.system.progress)
+        nodal, symmetric = mass * self.mass.nodal, self.is_symmetric(time, c)
+        made = replace(made, plan=plan, mass=nodal, symmetric=symmetric)
+        if isinstance(self.K, BlockMatrix) or np.abs(nodal).max() > LIGHT * self.system.norm:
+            made.K = self.matrix(time, *factors)
+        else:
+            made.K = self.K.with_mass(mass, self.mass.times, partial(self._elastic, *factors))
+        if not made.symmetric and plan.iterates:  # what it has beside skew parts
+            made.near = replace(made, K=self._elastic(*factors), symmetric=True)
+        return partial(_solved, made, size, self.system.progress)
 
 
 def _solved(
-    equations: LinearSolver, progress: Progress | None, f: Array, prescribed: Array, start: Array | None
+    equations: LinearSolver,
+    size: float,
+    progress: Progress | None,
+    f: Array,
+    prescribed: Array,
+    start: Array | None,
 ) -> Array:
     """Return displacements (3a,); no lambda, as an analysis can be pickled."""
-    return equations.solve(f, STEP_TOLERANCE, progress, prescribed, start, OF_START).x
+    return equations.solve(f / size, STEP_TOLERANCE, progress, prescribed, start, OF_START).x
 
 
 def _checked_rayleigh(rayleigh: tuple[float, float]) -> tuple[float, float]:

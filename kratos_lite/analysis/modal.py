@@ -80,7 +80,7 @@ def _by_iteration(
         return np.zeros(count), R[:count].T
     stiffness = solver.times if K_g is None else lambda u: solver.times(u) + K_g.times(u)
     times_K, times_M = (_reduced_product(constraints, times) for times in (stiffness, e.mass.times))
-    norms = solver.norm, float(abs(e.mass.matrix()).sum(axis=1).max())
+    norms = solver.norm, e.mass.norm()
     known = (R, times_M(R)) if len(R) else None
     problem = Problem(
         len(constraints.free), times_K, times_M, _preconditioner(e, solver), norms, known, progress

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from copy import copy
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,12 @@ from kratos_lite.typing import Array, Bsr, Ints
 
 
 class MatrixFree:
-    """The stiffness K (3n, 3n) in N/m of elements that the kernels know, which is only multiplied."""
+    """The stiffness K (3n, 3n) in N/m of elements that the kernels know, which is only multiplied.
+
+    With m and a product with M, it is K + m M, of which the kernels know K alone.
+    """
+
+    mass: tuple[float, Callable[[Array], Array]] | None = None
 
     def __init__(
         self,
@@ -35,17 +41,33 @@ class MatrixFree:
         self.points, self.groups = as_double(points), list(groups)
         self.assembled = self._assembled if assembled is None else assembled
         self.tied = False
+
+    @cached_property
+    def product(self) -> Any:
+        """What the kernels multiply with."""
         module = compiled("multigrid", self.groups[0].element)
-        self.product: Any = module.Product(self.points, list(map(_tables, self.groups)))
+        return module.Product(self.points, list(map(_tables, self.groups)))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what is pickled: what kernels hold is made anew."""
+        return {name: value for name, value in vars(self).items() if name != "product"}
 
     def tie(self, T: Any, assembled: Callable[[], BlockMatrix]) -> MatrixFree:
         """Return T^T K T (3n, 3n), with T in the numbering of all components; `assembled` makes it."""
         tied = copy(self)
-        tied.tied, tied.assembled = True, assembled
+        tied.product, tied.tied, tied.assembled = self.product, True, assembled
         dependents = np.flatnonzero((np.diff(T.indptr) > 0) & (T.diagonal() == 0)).astype(np.int32)
         rows = T[dependents]
         self.product.tie(dependents, rows.indptr.astype(np.int32), rows.indices.astype(np.int32), rows.data)
         return tied
+
+    def with_mass(
+        self, m: float, times: Callable[[Array], Array], assembled: Callable[[], BlockMatrix]
+    ) -> MatrixFree:
+        """Return K + m M, M given by its product with vectors (3n,); `assembled` makes it."""
+        both = copy(self)
+        both.product, both.mass, both.assembled = self.product, (m, times), assembled
+        return both
 
     @staticmethod
     def takes(group: ElementGroup) -> bool:
@@ -63,7 +85,8 @@ class MatrixFree:
 
     def __matmul__(self, x: Array) -> Array:
         """Return K x of a vector (3n,)."""
-        return self.product.times(np.ascontiguousarray(x, dtype=float), self.tied)
+        product: Array = self.product.times(np.ascontiguousarray(x, dtype=float), self.tied)
+        return product if self.mass is None else product + self.mass[0] * self.mass[1](x)
 
     def norm(self) -> float:
         """Return the largest row sum of |K| over the nodes of an element at the stiffest node."""

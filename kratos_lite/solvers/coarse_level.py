@@ -55,13 +55,13 @@ class PCoarseLevel:
         P = kron(csr_array((self.weights, self.indices, self.indptr), shape=shape), eye_array(3))
         return replace(self, assemble=lambda: BlockMatrix.of(self.K.scipy().tocsr() + P.T @ springs @ P))
 
-    def with_mass(self, k: float, nodal: Array) -> PCoarseLevel:
-        """Return the level of k K + M, with masses of all nodes (n,) lumped at the corners."""
+    def with_mass(self, nodal: Array) -> PCoarseLevel:
+        """Return the level of K + M, with masses of all nodes (n,) lumped at the corners."""
         fine = np.repeat(np.arange(len(self.indptr) - 1), np.diff(self.indptr))
         lumped: Array = np.bincount(self.indices, self.weights * nodal[fine], len(self.nodes)).astype(float)
 
         def assemble() -> BlockMatrix:
-            A = BlockMatrix(k * self.K.data, self.K.indices, self.K.indptr)
+            A = BlockMatrix(self.K.data.copy(), self.K.indices, self.K.indptr)
             A.add_scalar(lumped, A.diagonal_blocks())
             return A
 

@@ -43,6 +43,7 @@ class ConstrainedSystem:
         constraints: Callable[[Ints], ConstraintMap],
         *,
         solver: str = "auto",
+        planned: Callable[[str, Facts], Plan] = choose,
         tolerance: float = 1e-10,
         patterns: PatternCache | None = None,
         progress: Progress | None = None,
@@ -59,6 +60,7 @@ class ConstrainedSystem:
         self.skipped: list[str] = []
         self.warnings: list[str] = []
         self._patterns = patterns or PatternCache()
+        self._choose = planned
         self.plan = self._planned(solver)
 
     def _planned(self, solver: str) -> Plan:
@@ -71,8 +73,9 @@ class ConstrainedSystem:
             contrast=lambda: stiffness_contrast(self.groups),
             is_stretched=self._is_stretched,
             is_plate=self._is_plate,
+            nodes=lambda: min(len(group.element.shape.nodes) for group in self.groups),
         )
-        return choose(solver, facts)
+        return self._choose(solver, facts)
 
     def _bandwidth(self) -> float:
         width = nodal_width(self.pattern, self.pattern.rows(), cuthill_mckee(self.pattern)[1])

@@ -53,7 +53,7 @@ class LinearSolver:
     groups: Sequence[ElementGroup] = ()  # with `hanging`: quadratic elements, whose linear ones are a level
     hanging: HangingNodes | None = None
     springs: Any = None  # (3n, 3n) N/m, what K has beside the groups, or None
-    with_mass: tuple[float, Array] | None = None  # k, masses of nodes (n,), where K is k K + M of the groups
+    mass: Array | None = None  # of nodes (n,), where K is K + M of the groups
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what is pickled: what a method has prepared lives outside of Python, and is made anew."""
@@ -72,11 +72,12 @@ class LinearSolver:
 
         `prescribed` displacements (3n,) take the place of c of the constraint map.  An iteration begins at
         `start` (3n,), of which the free components count, if that is nearer than 0.  With a `reduction` it
-        ends where the residual is this fraction of that of 0 or the start, whichever is less.
+        ends where the residual is this fraction of that of 0 or the start, whichever is less, and the
+        backward error is not computed: NaN.
         """
         reduce, expand = self.constraint_map.reduce, self.constraint_map.expand
         c = self.constraint_map.c if prescribed is None else prescribed
-        u, b = c, reduce(f - self.K @ c)
+        u, b = c, reduce(f - self.K @ c if c.any() else f)
         size = norm = float(np.linalg.norm(b))
         aim = tolerance * self._fraction(f, c, size) * size
         if start is not None and self.plan.iterates:
@@ -94,7 +95,7 @@ class LinearSolver:
         if len(b) and (u is c or tolerance < 1):
             q, iterations, plan = self._solve(b, tolerance, progress, u is not c or reduction > 0)
         u = expand(q, u)
-        error = backward_error(reduce(f - self.K @ u), self.norm, u, f)
+        error = np.nan if reduction else backward_error(reduce(f - self.K @ u), self.norm, u, f)
         return Solution(u, plan.method, plan.reason, iterations, error)
 
     def times(self, u: Array) -> Array:
@@ -191,8 +192,8 @@ class LinearSolver:
         linear, map = p_coarse_level(self.points, self.groups, self.hanging), self.constraint_map
         if linear is not None and self.springs is not None:
             linear = linear.with_springs(self.springs)
-        if linear is not None and self.with_mass is not None:
-            linear = linear.with_mass(*self.with_mass)
+        if linear is not None and self.mass is not None:
+            linear = linear.with_mass(self.mass)
         if linear is not None and map.T is not None:
             linear = apply_ties(linear, map.T, map.free)
         make: Any
@@ -214,10 +215,13 @@ class LinearSolver:
         free, rhs = self.constraint_map.free, np.zeros(len(self.constraint_map.c))
         rhs[free] = b
         aim = tolerance if continued else tolerance_of(tolerance, len(b))
-        if (near := self.near or self._without_means) is not None:
+        kernel_lacks = self if getattr(self.K, "mass", None) else None
+        if (near := self.near or self._without_means or kernel_lacks) is not None:
             q, iterations, good = self._by_near(b, aim if self.near is None else tolerance, near, progress)
             if good:
                 return q, iterations, self.plan
+            if near is self:
+                return q, iterations, after(iterations, tolerance, len(b), False)
             self.near = None  # not near enough
         multigrid = self._prepared("_multigrid", "set up", progress)
         norm = self.norm if self._blocks is self.K else self._blocks.norm()

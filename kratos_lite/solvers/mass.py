@@ -82,8 +82,9 @@ class Mass:
 
     def solve_constrained(self, f: Array, constraint_map: ConstraintMap, c: Array) -> Array:
         """Return x = T q + c with T^T (M x - f) = 0, (3n,), by conjugate gradients: M is well-conditioned."""
-        diagonal = self.matrix().diagonal()
-        T = constraint_map.T
+        diagonal, T = np.repeat(self.scalar.diagonal(), 3), constraint_map.T
+        if self.attached is not None:
+            diagonal += self.attached.diagonal()
         D = diagonal[constraint_map.free] if T is None else T.multiply(T).T @ diagonal
         b = constraint_map.reduce(f - self.times(c))
 
@@ -103,6 +104,11 @@ class Mass:
         data = np.zeros(len(self.pattern.indices))
         data[self.pattern.diagonal] = self.nodal
         return data
+
+    def norm(self) -> float:
+        """Return the largest row sum of |M|, or what it does not exceed."""
+        of = [abs(A).sum(axis=1).max() for A in (self.scalar, self.attached) if A is not None]
+        return float(sum(of))
 
     def matrix(self) -> Csr:
         """Return the mass matrix of all components, (3n, 3n) in kg."""

@@ -6,7 +6,7 @@ All thresholds of such choices stand here, each with what it means and, in paren
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from kratos_lite.elements.formulations import NEAR_HALF
 from kratos_lite.errors import InputError, SolveError
@@ -34,6 +34,11 @@ LARGEST_CONTRAST = 1e3  # stiffest to softest material; above, errors may triple
 STRETCHED, EXTREME = 3.0, 30.0  # longest to shortest side of a cell (8N 1:5: 12 iterations, not 48)
 PER_STRETCHED, PER_EXTREME = 20, 200  # cells among which one such does not matter (columns: 22, not 190)
 FLAT = 0.1  # thickness to width up to which a body bends like a plate (8N 1:20: 14 iterations, not 28)
+# ---- steps without a matrix: multigrid smooths the stiffness alone ----
+MANY_NODES = (
+    20  # of elements that need no matrix (steps of 10N: 0.24 s, with one 0.18; of 27N: 0.13 and 0.25)
+)
+LIGHT = 0.1  # largest mass of a node by the norm of K (27N, 0.06: 9 iterations, not 7; 0.2: 13, not 6)
 # ---- iterations ----
 ROUND_OFF = 1e-15  # a tolerance that is never reached: iterations stop at what round-off allows
 PATIENCE, PATIENCE_FROM = 400, 60  # iterations as long as a factorization; those that show a rate (boxes)
@@ -75,6 +80,7 @@ class Facts:
     contrast: Callable[[], float] = lambda: 1.0  # largest to smallest modulus of materials
     is_stretched: Callable[[], bool] = lambda: False  # whether many cells are long or flat, or some extremely
     is_plate: Callable[[], bool] = lambda: False  # whether the body is thin and flat, and free to bend
+    nodes: Callable[[], int] = lambda: 0  # of the element that has the fewest
 
 
 def choose(solver: str, facts: Facts) -> Plan:
@@ -173,6 +179,14 @@ def stepped(unknowns: int, solver: str = "auto") -> Plan:
     if unknowns <= STEPPED_LIMIT:
         return Plan("direct", f"{unknowns} unknowns ≤ {STEPPED_LIMIT}: factors are fastest over many steps")
     return Plan("amg", f"{unknowns} unknowns > {STEPPED_LIMIT}: few iterations from the last state")
+
+
+def of_motion(solver: str, facts: Facts) -> Plan:
+    """Return how to solve the equations of a step without what a motion of the material adds."""
+    plan = stepped(facts.unknowns, solver)
+    if not plan.iterates or facts.nodes() < MANY_NODES or max(facts.bulk_over_shear()) > NEAR_HALF:
+        return plan
+    return replace(plan, matrix_free=needs_no_matrix(facts))
 
 
 def of_band(unknowns: int, width: int, height: int) -> Plan:

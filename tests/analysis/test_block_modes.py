@@ -1,5 +1,7 @@
 """Modes of larger models, by a block of vectors: none is missed, none comes twice."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.linalg import eigh
@@ -7,6 +9,7 @@ from scipy.linalg import eigh
 import kratos_lite as kl
 from kratos_lite.analysis import modal
 from kratos_lite.analysis.modal import critical_rate
+from kratos_lite.assembly.matrix_free import MatrixFree
 from kratos_lite.errors import SolveError
 from kratos_lite.mesh.refinement import refine
 from kratos_lite.native import kernels
@@ -264,10 +267,29 @@ def test_the_linear_level_of_a_step_has_mass():
         solve = transient.equations.solver(0.0, 4 / h**2, 0.0, 1.0, h)
         equations = solve.args[0]
         if not kept:
-            equations.with_mass = None
+            equations.mass = None
             vars(equations).pop("_multigrid", None)
         iterations.append(equations.solve(f, 1e-10).iterations)
     assert iterations[0] < iterations[1]
+
+
+@pytest.mark.parametrize("tied", [False, True])
+def test_steps_by_products_of_the_stiffness_alone_come_to_what_factors_give(tied, monkeypatch):
+    monkeypatch.setattr("kratos_lite.solvers.plan.STEPPED_LIMIT", 0)
+    model = kl.Model(kl.box((1, 1, 2), (3, 3, 6), "KinematicLinear3D27N"), kl.Isotropic3D(nu=0.3, **STEEL))
+    model.fix("x-")
+    if tied:
+        first, *others = model.mesh.nodes("x+").tolist()
+        for node in others[:20]:
+            model.constrain((node, "z"), {(first, "z"): 0.5})
+    e = model.transient(rayleigh=(3.0, 1e-6)).equations
+    f = np.random.default_rng(0).standard_normal(e.size)
+    for a, product in ((1e7, True), (1e12, False)):  # 1/s², a step that is short beside the cells
+        equations = e.solver(0.0, a, 100.0, 0.9, 1.0).args[0]
+        assert isinstance(equations.K, MatrixFree) == (product and kernels("multigrid") is not None)
+        direct = replace(equations, K=e.matrix(0.0, a, 100.0, 0.9), plan=Plan("direct"))
+        x, exact = e.solver(0.0, a, 100.0, 0.9, 1.0)(f, 0 * f, 0 * f), direct.solve(f, 1e-12).x
+        assert np.abs(x - exact).max() < 1e-4 * np.abs(exact).max()
 
 
 def test_transport_terms_by_minimal_residuals_come_to_what_factors_give(monkeypatch):
