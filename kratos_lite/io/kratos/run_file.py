@@ -21,7 +21,7 @@ from kratos_lite.io.kratos.eigenvalues import EIGEN, EIGEN_KEYS, eigenvalue_comp
 from kratos_lite.io.kratos.expected_values import COMPARISONS
 from kratos_lite.io.kratos.initial_state import MODULE, initial_state_of
 from kratos_lite.io.kratos.keys import IN_TIME, unused_keys
-from kratos_lite.io.kratos.laws import is_nonlinear, make_linear, notes_on_stress, quasi_static_of
+from kratos_lite.io.kratos.laws import is_nonlinear, make_linear, notes_on_laws, quasi_static_of
 from kratos_lite.io.kratos.motion import add_motion
 from kratos_lite.io.kratos.outputs import OUTPUT_PROCESSES, OutputProcess
 from kratos_lite.io.kratos.point_elements import set_apart
@@ -117,7 +117,7 @@ def _notes_on_keys(settings: Settings, dynamic: bool, eigen: bool, small: bool) 
 def _notes_on_laws(document: Document, small: bool, eigen: bool) -> list[str]:
     """Make a document linear where its solution is; return notes on what its laws mean here."""
     notes = make_linear(document) if small else []
-    notes += notes_on_stress(document)
+    notes += notes_on_laws(document)
     if not (small or eigen or is_nonlinear(document)):
         text = "analysis_type is non_linear: the linear solution is computed, on the undeformed body"
         carriers = [block.name for block in document.mesh.conditions if len(block)]
