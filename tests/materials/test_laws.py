@@ -230,7 +230,7 @@ def test_the_pyramid_meets_the_strengths_of_mohr_and_coulomb(make):
     for strain in (np.linspace(0, 2e-4, 8), -np.linspace(0, 2e-3, 8)):
         strength = tension if strain[-1] > 0 else -compression
         assert abs(uniaxial(law, strain, law.initial_state())[0][-1] / strength - 1) < 1e-9
-    path = kl.material_point(law, {"xy": np.linspace(0, 2e-4, 9)}, confined=("xx", "yy", "zz"))
+    path = kl.material_point(law, {"xy": np.linspace(0, 2e-4, 9)}, confined=True)
     if make is kl.CoulombSoftening3D:  # dilatant and confined: the larger pressure carries more
         s = tensor(path.stress[-1].T).T
         ends = np.linalg.eigvalsh(s)[[2, 0]]
@@ -286,6 +286,22 @@ def test_damage_does_not_heal():
     back, again = uniaxial(law, [1e-4], state)
     assert abs(back[0] / stress[0] - 1 / 3) < 1e-9
     assert again["damage"] == state["damage"]
+
+
+@pytest.mark.parametrize("duration", [0.5, 20.0])
+@pytest.mark.parametrize("confined", [True, False])
+def test_a_point_takes_its_time_and_is_confined_or_free(duration, confined):
+    """A ramp of a Prony series: σ = M ε̇ ((1 - w) t + w τ (1 - exp(-t / τ))), M of a bar or an oedometer."""
+    E, nu, w, tau = 1e9, 0.3, 0.3, 10.0
+    law = kl.GeneralizedMaxwell3D(E, nu, w, tau)
+    path = kl.material_point(law, {"xx": [1e-3]}, duration=duration, confined=confined, steps=20)
+    assert abs(path.time[-1] - duration) < 1e-12 * duration
+    M = E * (1 - nu) / (1 + nu) / (1 - 2 * nu) if confined else E
+    t = path.time
+    exact = M * 1e-3 / duration * ((1 - w) * t + w * tau * (1 - np.exp(-t / tau)))
+    assert np.abs(path.stress[:, 0] - exact).max() < 1e-3 * exact.max()
+    lateral = nu / (1 - nu) * exact if confined else 0 * exact
+    assert np.abs(path.stress[:, 1] - lateral).max() < 1e-3 * exact.max()
 
 
 def test_relaxation_and_creep_of_order_two():
