@@ -8,6 +8,7 @@ import pytest
 import kratos_lite as kl
 from kratos_lite.errors import InputError, MaterialError, SolveError
 from kratos_lite.materials import Material
+from kratos_lite.materials.softening_curves import CURVES
 
 CURVE = ((1e-4, 260e6), (2e-4, 260e6), (3e-4, 900e6), (2e-3, 950e6), (3e-3, 2000e6))  # steep between flat
 LAWS = [
@@ -251,6 +252,22 @@ def test_a_bar_of_tresca_follows_points_and_falls_then(steps):
     stress, _ = uniaxial(law, np.linspace(0, 0.02, 20 * steps), start(law))
     p, rest = 0.02 - stress[-1] / 200e9, 4e6 - 0.15e6 - 0.35e6  # J/m³ that are left
     assert abs(stress[-1] / (1.5e8 * np.exp(-1.5e8 / rest * (p - 3e-3))) - 1) < 0.2 / steps
+
+
+@pytest.mark.parametrize("curve", [0, 1, 2, 3, 5, 6])
+def test_slopes_of_curves_are_their_derivatives(curve):
+    more = {"peak": 1.5e8, "peak_at": 0.3, "strains": (0, 0.01, 0.02), "stresses": (1e8, 2e8, 1e8)}
+    law = kl.J2Softening3D(200e9, 0.3, 1e8, 1.0, curve, **more)
+    stress, slope = CURVES[curve](law, np.linspace(0.01, 0.98, 40) + 1e-30j, np.full(40, 5e6), np.zeros(40))
+    assert np.abs(stress.imag / 1e-30 - slope.real).max() < 1e-10 * 1e8
+
+
+def test_a_thrust_dissipates_the_larger_energy_of_compression():
+    law = kl.CoulombSoftening3D(30e9, 0.2, 3e6, 1e4, 3, 15e6, friction=30.0, dilatancy=30.0)
+    stress, state = uniaxial(law, [-1e-3], start(law))
+    assert abs(stress[0] + 15e6) < 1e-9 * 15e6
+    expected = stress[0] * state["plastic_strain"][0] * 0.1 / (1e4 * 5**2)
+    assert abs(state["plastic_dissipation"][0] / expected - 1) < 1e-9
 
 
 def test_a_curve_that_needs_more_than_the_fracture_energy_is_refused():
