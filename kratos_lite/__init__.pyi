@@ -102,7 +102,10 @@ from kratos_lite.materials import MATERIALS as MATERIALS
 from kratos_lite.materials import LinearMaterial as LinearMaterial
 from kratos_lite.materials import Material as Material
 from kratos_lite.materials.anisotropic3d import Anisotropic3D as Anisotropic3D
+from kratos_lite.materials.cone_damage3d import ConeDamage3D as ConeDamage3D
 from kratos_lite.materials.cone_softening3d import ConeSoftening3D as ConeSoftening3D
+from kratos_lite.materials.coulomb_damage3d import CoulombDamage3D as CoulombDamage3D
+from kratos_lite.materials.coulomb_softening3d import CoulombSoftening3D as CoulombSoftening3D
 from kratos_lite.materials.drucker_prager3d import DruckerPrager3D as DruckerPrager3D
 from kratos_lite.materials.finite_j2_plasticity3d import FiniteJ2Plasticity3D as FiniteJ2Plasticity3D
 from kratos_lite.materials.generalized_maxwell3d import GeneralizedMaxwell3D as GeneralizedMaxwell3D
@@ -116,6 +119,9 @@ from kratos_lite.materials.ogden3d import Ogden3D as Ogden3D
 from kratos_lite.materials.orthotropic3d import Orthotropic3D as Orthotropic3D
 from kratos_lite.materials.rankine_damage3d import RankineDamage3D as RankineDamage3D
 from kratos_lite.materials.saint_venant_kirchhoff3d import SaintVenantKirchhoff3D as SaintVenantKirchhoff3D
+from kratos_lite.materials.simo_ju_damage3d import SimoJuDamage3D as SimoJuDamage3D
+from kratos_lite.materials.tresca_damage3d import TrescaDamage3D as TrescaDamage3D
+from kratos_lite.materials.tresca_softening3d import TrescaSoftening3D as TrescaSoftening3D
 from kratos_lite.materials.umat import UMAT as UMAT
 from kratos_lite.materials.von_mises_damage3d import VonMisesDamage3D as VonMisesDamage3D
 from kratos_lite.mesh import Block as Block

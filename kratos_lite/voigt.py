@@ -57,12 +57,17 @@ def determinant(a: Array) -> Array:
     return np.asarray(xx * (yy * zz - yz**2) - xy * (xy * zz - yz * zx) + zx * (xy * yz - yy * zx))
 
 
-def inverse(a: Array) -> Array:
-    """Return the inverse (..., 6) of a symmetric tensor (..., 6)."""
+def cofactor(a: Array) -> Array:
+    """Return the determinant times the inverse (..., 6) of a symmetric tensor (..., 6)."""
     xx, yy, zz, xy, yz, zx = np.moveaxis(a, -1, 0)
     normal = yy * zz - yz**2, zz * xx - zx**2, xx * yy - xy**2
     shear = yz * zx - xy * zz, zx * xy - yz * xx, xy * yz - zx * yy
-    return np.stack([*normal, *shear], axis=-1) / determinant(a)[..., None]
+    return np.stack([*normal, *shear], axis=-1)
+
+
+def inverse(a: Array) -> Array:
+    """Return the inverse (..., 6) of a symmetric tensor (..., 6)."""
+    return cofactor(a) / determinant(a)[..., None]
 
 
 def acoustic_tensor(C: Array, direction: Array) -> Array:

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import radians, sin
 from typing import ClassVar
 
-from kratos_lite.materials.isotropic_law import check_angles
-from kratos_lite.materials.j2_softening3d import J2Softening3D
+from kratos_lite.materials.softening import Softening, names_in_kratos
 
 
 @dataclass(frozen=True)
-class ConeSoftening3D(J2Softening3D):
+class ConeSoftening3D(Softening):
     """J2Softening3D within the cone of Drucker and Prager: its strength grows with the pressure.
 
     Elastic while 2 sin φ tr σ + √3 (3 - sin φ) √J₂ ≤ (3 + sin φ) σ_Y f(κ): a bar begins to flow at σ_Y in
@@ -22,22 +20,28 @@ class ConeSoftening3D(J2Softening3D):
     E, nu : Young's modulus in Pa and Poisson's ratio.
     yield_stress : σ_Y of tension in Pa, > 0.
     fracture_energy : J/m², > 0.
-    curve : 0 to soften linearly, 1 exponentially, 3 for perfect plasticity.
-    compression : the yield stress once more, as files have it; 0 if not given.
+    curve : of the yield stress, 0 to 6: linear softening; exponential; to a peak, then exponential; perfect
+        plasticity; a polynomial of the plastic strain; linear, then exponential; through points.
+    compression : yield stress of compression in Pa; 0 for that of tension.
     density : kg/m³.
     alpha : thermal expansion in 1/K; see `Temperature`.
-    friction : angle φ of internal friction in degrees, 0 < φ < 90.
-    dilatancy : angle in degrees, 0 ≤ ψ ≤ φ, of the potential of the flow; associated if it is φ.
+    friction, dilatancy : angles in degrees, 0 ≤ ψ ≤ φ < 90, of a cone or pyramid as surface or potential.
+    peak, peak_at : of curve 2, stress in Pa and κ, 0 … 1.
+    linear_until : of curves 0 and 5, κ from which on softening is exponential; 0 for 0.99 and 0.9.
+    strains, stresses : of curve 6, plastic strains from 0 and stresses in Pa; of curve 4, the two strains
+        where the polynomial and the constant after it end, and its coefficients in Pa.
+    potential : of the flow, ``VonMises``, ``DruckerPrager``, ``Tresca`` or ``ModifiedMohrCoulomb``; that of
+        the surface if not given.
 
     Raises
     ------
     MaterialError
-        If a constant lies outside its bounds.
+        If a constant lies outside its bounds, or an element has too little fracture energy for a curve.
 
     Notes
     -----
-    Return to the cone, and to its apex, which softens from step to step.  Source: Oller, Nonlinear Dynamics
-    of Structures (2014), and DruckerPragerYieldSurface of KratosConstitutiveLawsApplication.
+    Return to the cone, and to its apex.  Source: Oller, Nonlinear Dynamics of Structures (2014), and
+    DruckerPragerYieldSurface of KratosConstitutiveLawsApplication.
 
     Examples
     --------
@@ -48,35 +52,5 @@ class ConeSoftening3D(J2Softening3D):
     -23.33 MPa
     """
 
-    friction: float = 0.0
-    dilatancy: float = 0.0
-
-    aliases: ClassVar[tuple[str, ...]] = ("SmallStrainIsotropicPlasticity3DDruckerPragerDruckerPrager",)
-    variables: ClassVar[dict[str, str]] = J2Softening3D.variables | {
-        "friction": "FRICTION_ANGLE",
-        "dilatancy": "DILATANCY_ANGLE",
-    }
-    keeps_volume: ClassVar[bool] = False
-
-    @property
-    def symmetric_tangent(self) -> bool:  # type: ignore[override]
-        """Whether the flow is associated, and nothing softens."""
-        return self.friction == self.dilatancy and self.curve == 3
-
-    @property
-    def cones(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Factors of tr σ and √J₂ in the equivalent stress, and in the potential of the flow."""
-        sines = (sin(radians(angle)) for angle in (self.friction, self.dilatancy))
-        (surface, flow) = ((2 * s / (3 - 3 * s), 3**0.5 * (3 - s) / (3 - 3 * s)) for s in sines)
-        return surface, flow
-
-    @property
-    def strength(self) -> float:
-        """The equivalent stress in Pa at which a bar begins to flow, its strength in compression."""
-        s = sin(radians(self.friction))
-        return self.yield_stress * (3 + s) / (3 - 3 * s)
-
-    def check(self) -> None:
-        """Check the angles, too."""
-        super().check()
-        check_angles(self)
+    surface: ClassVar[str] = "DruckerPrager"
+    aliases: ClassVar[tuple[str, ...]] = names_in_kratos(surface)

@@ -17,10 +17,15 @@ ELASTIC = Isotropic3D.variables
 """Variables of the constants of Isotropic3D, which other laws have, too."""
 
 
-def check_angles(law: Any) -> None:
-    """Check the angles of friction and dilatancy of a law."""
+def check_friction(law: Any) -> None:
+    """Check the angle of friction of a law."""
     if not 0 < law.friction < 90:
         raise MaterialError(f"{law._name('friction')} {law.friction:g} must lie in 0° … 90°")
+
+
+def check_angles(law: Any) -> None:
+    """Check the angles of friction and dilatancy of a law."""
+    check_friction(law)
     if not 0 <= law.dilatancy <= law.friction:
         text = f"must lie in 0° … {law.friction:g}°, the friction"
         raise MaterialError(f"{law._name('dilatancy')} {law.dilatancy:g} {text}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields
 from functools import cached_property
 from sys import float_info
@@ -48,6 +48,7 @@ class Material:
         Kirchhoff, and elements are total Lagrangian.
     positive, not_negative : constants that must be > 0 or ≥ 0 → their units.
     tables : constants that are arrays, kept as tuples → their shapes, a word for any length.
+    words : constants that are words → those that they may be.
     internal_variables : name → numbers at each Gauss point, 0 at the beginning; ``element_length``
         and ``element_radius`` are cube root of the volume and farthest node from the center, in m.
     symmetric_tangent : whether the tangent is symmetric.
@@ -87,6 +88,7 @@ class Material:
     positive: ClassVar[Mapping[str, str]] = {}
     not_negative: ClassVar[Mapping[str, str]] = {}
     tables: ClassVar[Mapping[str, Axes]] = {}
+    words: ClassVar[Mapping[str, Sequence[str]]] = {}
     internal_variables: ClassVar[Mapping[str, int]] = {}
     symmetric_tangent: ClassVar[bool] = True
     keeps_volume: ClassVar[bool] = False
@@ -133,6 +135,11 @@ class Material:
                 if array.size:
                     finite(array, self._name(name), self.tables[name], error=MaterialError)
                 vars(self)[name] = _tuples(array.tolist())
+                continue
+            if name in self.words:
+                if value not in self.words[name]:
+                    words = ", ".join(filter(None, self.words[name]))
+                    raise MaterialError(f"{self._name(name)} must be one of {words}; got {value!r}")
                 continue
             if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
                 raise MaterialError(f"{self._name(name)} must be a number; got {value!r}")

@@ -6,12 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-
 from kratos_lite import voigt
 from kratos_lite.errors import MaterialError
 from kratos_lite.materials.isotropic_damage3d import IsotropicDamage3D
 from kratos_lite.materials.material import Material
+from kratos_lite.materials.yield_surfaces import SURFACES, Invariants
 from kratos_lite.typing import Array
 
 
@@ -42,6 +41,7 @@ class VonMisesDamage3D(IsotropicDamage3D):
 
     Examples
     --------
+    >>> import numpy as np
     >>> import kratos_lite as kl
     >>> concrete = kl.VonMisesDamage3D(E=30e9, nu=0.2, strength=3e6, fracture_energy=100.0)
     >>> start = concrete.initial_state()
@@ -51,6 +51,7 @@ class VonMisesDamage3D(IsotropicDamage3D):
     True
     """
 
+    surface: ClassVar[str] = "VonMises"
     aliases: ClassVar[tuple[str, ...]] = ("SmallStrainIsotropicDamage3DVonMises",)
     variables: ClassVar[dict[str, str]] = IsotropicDamage3D.variables | {"linear": "SOFTENING_TYPE"}
     internal_variables: ClassVar[Mapping[str, int]] = {"damage": 1, "threshold": 1, "element_radius": 1}
@@ -60,12 +61,21 @@ class VonMisesDamage3D(IsotropicDamage3D):
     def from_variables(cls, values: dict[str, Any]) -> Material:
         """Make the material from the variables of a file; SOFTENING_TYPE is 0 for linear softening."""
         given = {"YIELD_STRESS": values["YIELD_STRESS_TENSION"]} if "YIELD_STRESS_TENSION" in values else {}
+        tension = values.get("YIELD_STRESS", values.get("YIELD_STRESS_TENSION"))
+        compression = tension if "YIELD_STRESS" in values else values.get("YIELD_STRESS_COMPRESSION", tension)
+        if cls.surface == "VonMises" and tension != compression:  # which softens by that of compression
+            raise MaterialError(f"YIELD_STRESS_COMPRESSION of {cls.__name__} must be YIELD_STRESS_TENSION")
         kind = values.get("SOFTENING_TYPE", 1)
         if kind not in (0, 1):
             raise MaterialError(f"SOFTENING_TYPE must be 0, linear, or 1, exponential; got {kind}")
         return super().from_variables(given | values | {"SOFTENING_TYPE": 1 - kind})
 
     def _equivalent(self, strain: Array, effective: Array) -> tuple[Array, Array, float]:
-        s, q = voigt.deviator(effective), voigt.von_mises(effective)
-        gradient = 3 * self.elastic.lame[1] * s / np.where(q > 0, q, 1.0)[..., None]
-        return q, gradient, self.strength
+        surface = SURFACES[self.surface](getattr(self, "friction", 0.0), self._ratio)
+        q, normal = Invariants(effective).equivalent(surface)
+        return q, voigt.times(normal, self.elastic.C), self.strength * surface.of_tension
+
+    @property
+    def _ratio(self) -> float:
+        """Strength of compression over that of tension."""
+        return (getattr(self, "compression", 0.0) or self.strength) / self.strength

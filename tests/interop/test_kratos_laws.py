@@ -21,6 +21,7 @@ from run_files import (
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.io.files import read_case
 from kratos_lite.io.kratos.outputs.values import ORDER_OF_POINTS
+from kratos_lite.io.kratos.properties import material_from
 from kratos_lite.io.run import prepare, run
 
 for wheel in ("Multiphysics", "StructuralMechanicsApplication", "ConstitutiveLawsApplication"):
@@ -91,6 +92,103 @@ def test_ten_steps_are_those_of_kratos(tmp_path, name):
         **EXACT,
     )
     compare(tmp_path, content, 10)
+
+
+SURFACES = ("VonMises", "DruckerPrager", "Tresca", "ModifiedMohrCoulomb")
+ROCK = {
+    "YOUNG_MODULUS": 20e9, "POISSON_RATIO": 0.2, "FRACTURE_ENERGY": 5e5, "SOFTENING_TYPE": 1,
+    "YIELD_STRESS_TENSION": 4e7, "YIELD_STRESS_COMPRESSION": 8e7, "FRICTION_ANGLE": 32.0,
+    "DILATANCY_ANGLE": 20.0, "MAXIMUM_STRESS": 13e7, "MAXIMUM_STRESS_POSITION": 0.2,
+    "PLASTIC_STRAIN_VECTOR_PLASTICITY_POINT_CURVE": [0.0, 1e-3, 4e-3, 8e-3],
+    "EQUIVALENT_STRESS_VECTOR_PLASTICITY_POINT_CURVE": [4e7, 5e7, 5.5e7, 5e7],
+    "PLASTIC_STRAIN_INDICATORS": [2e-3, 4e-3], "CURVE_FITTING_PARAMETERS": [4e7, 5e9, -1e12],
+}  # fmt: skip
+
+
+def stresses_in_kratos(name, variables, path):
+    """Return the stresses (k, 6) of a law of Kratos at a point of a cube of 0.1 m along strains (k, 6)."""
+    import KratosMultiphysics as KM
+    import KratosMultiphysics.ConstitutiveLawsApplication as application
+
+    part, properties, law = KM.Model().CreateModelPart("P"), KM.Properties(1), getattr(application, name)()
+    for key, value in variables.items():
+        variable = KM.KratosGlobals.GetVariable(key)
+        whole = int(value) if key in ("HARDENING_CURVE", "SOFTENING_TYPE") else value
+        properties.SetValue(variable, KM.Vector(value) if isinstance(value, list) else whole)
+    corners = 0.1 * ELEMENTS["KinematicLinear3D8N"].nodes / 2
+    cube = KM.Hexahedra3D8(*(part.CreateNewNode(i + 1, *place) for i, place in enumerate(corners.tolist())))
+    info, options, at = KM.ProcessInfo(), KM.Flags(), KM.ConstitutiveLawParameters()
+    info.SetValue(KM.STEP, 2)  # in the first iteration of all it does not flow
+    options.Set(KM.ConstitutiveLaw.USE_ELEMENT_PROVIDED_STRAIN, True)
+    options.Set(KM.ConstitutiveLaw.COMPUTE_STRESS, True)
+    strain, stress, C, N = KM.Vector(6), KM.Vector(6), KM.Matrix(6, 6), KM.Vector([0.125] * 8)
+    law.InitializeMaterial(properties, cube, N)
+    for name, value in (
+        ("Options", options), ("StrainVector", strain), ("StressVector", stress), ("ConstitutiveMatrix", C),
+        ("ProcessInfo", info), ("MaterialProperties", properties), ("ElementGeometry", cube),
+        ("ShapeFunctionsValues", N),
+    ):  # fmt: skip
+        getattr(at, f"Set{name}")(value)
+    found = []
+    for e in path:
+        for i in range(6):
+            strain[i] = e[i]
+        law.CalculateMaterialResponseCauchy(at)
+        found.append(list(stress))
+        law.FinalizeMaterialResponseCauchy(at)
+    return np.array(found)
+
+
+def stresses_here(name, variables, path):
+    law = material_from(variables | {"CONSTITUTIVE_LAW": name})
+    state, found = law.initial_state(), []
+    state["element_radius"][:] = 0.05 * 3**0.5
+    for strain in path:
+        stress, _, state = law.evaluate(strain, state, 1.0)
+        found.append(stress)
+    return np.array(found)
+
+
+POINT_LAWS = [
+    *(
+        (f"SmallStrainIsotropicPlasticity3D{s}{s}", {"HARDENING_CURVE": c})
+        for s in SURFACES
+        for c in range(7)
+    ),
+    *(
+        (f"SmallStrainIsotropicPlasticity3D{s}{p}", {"HARDENING_CURVE": 1})
+        for s in SURFACES
+        for p in SURFACES
+    ),
+    *((f"SmallStrainIsotropicDamage3D{s}", {}) for s in SURFACES[1:]),
+    *(
+        (f"SmallStrainIsotropicDamage3D{s}", {"YIELD_STRESS_COMPRESSION": 4e7})
+        for s in ("VonMises", "Rankine")
+    ),
+    ("SmallStrainIsotropicDamage3DModifiedMohrCoulomb", {"SOFTENING_TYPE": 0}),
+    ("SmallStrainIsotropicDamage3DSimoJu", {"FRACTURE_ENERGY": 1e16, "YIELD_STRESS_COMPRESSION": 4e7}),
+]
+
+
+@pytest.mark.parametrize(("name", "more"), POINT_LAWS)
+def test_stresses_of_a_point_are_those_of_kratos(name, more):
+    """Along three random paths of strains without shears yz and zx."""
+    for seed in range(3):
+        steps = np.random.default_rng(seed).normal(size=(8, 6)) * 6e-4 - 2e-4 * np.array([1, 1, 1, 0, 0, 0])
+        path = np.cumsum(steps * [1, 1, 1, 1, 0, 0], axis=0)
+        known = stresses_in_kratos(name, ROCK | more, path)
+        assert np.abs(stresses_here(name, ROCK | more, path) - known).max() < 1e-10 * np.abs(known).max()
+
+
+@pytest.mark.parametrize(("name", "depends"), [("VonMises", False), ("Tresca", True)])
+def test_the_flow_of_tresca_in_kratos_depends_on_the_axes(name, depends):
+    """The same strain, with the axes named anew: here the same stress."""
+    law, variables = f"SmallStrainIsotropicPlasticity3D{name}{name}", ROCK | {"HARDENING_CURVE": 3}
+    path = np.array([[2e-3, -2e-3, 1e-4, 0.0, -2e-3, 1e-3]])
+    turned = [1, 2, 0, 4, 5, 3]
+    for stresses, equal in ((stresses_in_kratos, not depends), (stresses_here, True)):
+        one, other = stresses(law, variables, path)[0], stresses(law, variables, path[:, turned])[0]
+        assert (np.abs(one[turned] - other).max() < 1e-10 * np.abs(one).max()) == equal
 
 
 @pytest.mark.parametrize("prefix", ["", "SmallDisplacement"])

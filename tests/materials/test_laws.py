@@ -8,6 +8,7 @@ import pytest
 import kratos_lite as kl
 from kratos_lite.errors import InputError, MaterialError, SolveError
 from kratos_lite.materials import Material
+from kratos_lite.materials.softening_curves import CURVES
 
 CURVE = ((1e-4, 260e6), (2e-4, 260e6), (3e-4, 900e6), (2e-3, 950e6), (3e-3, 2000e6))  # steep between flat
 LAWS = [
@@ -19,6 +20,10 @@ LAWS = [
     (kl.J2Softening3D(200e9, 0.3, 250e6, 4e6, curve=0), 3e-3),
     (kl.ConeSoftening3D(20e9, 0.3, 1e8, 4e6, friction=12.0, dilatancy=5.0), 3e-3),
     (kl.ConeSoftening3D(20e9, 0.3, 1e8, 4e6, 0, friction=10.0, dilatancy=10.0), 3e-3),
+    (kl.CoulombDamage3D(30e9, 0.2, 3e6, 100.0, friction=30.0, compression=2e7), 1e-3),
+    (kl.ConeDamage3D(30e9, 0.2, 3e6, 100.0, linear=1, friction=20.0), 2e-4),
+    (kl.TrescaDamage3D(30e9, 0.2, 3e6, 100.0), 2e-4),
+    (kl.SimoJuDamage3D(30e9, 0.2, 3e6, 100.0), 2e-4),
     (kl.DruckerPrager3D(20e6, 0.3, 1e4, 30.0), 2e-3),
     (kl.DruckerPrager3D(20e6, 0.3, 1e4, 30.0, 10.0, 1e5), 2e-3),
     (kl.DruckerPrager3D(20e6, 0.3, 1e4, 30.0, 30.0, 1e5), 2e-3),
@@ -33,6 +38,13 @@ LAWS = [
     (kl.Ogden3D(0.63e6, 1.3, 1e7, 1.2e3, 5.0, -1e4, -2.0), 0.1),
     (kl.Ogden3D(0.63e6, 1.3, 1e5, bulk4=3e6, bulk6=2e7), 0.1),
 ]
+BY_STEPS = [  # what they come to depends on the steps, as in Kratos
+    (kl.J2Softening3D(20e9, 0.3, 1e8, 4e6, 2, 2e8, peak=15e7, peak_at=0.3, potential="Tresca"), 3e-2),
+    (kl.J2Softening3D(20e9, 0.3, 1e8, 4e6, 4, strains=(5e-3, 6e-3), stresses=(1e8, 9e9, -1e12)), 3e-2),
+    (kl.TrescaSoftening3D(20e9, 0.3, 1e8, 4e6, 5), 3e-2),
+    (kl.TrescaSoftening3D(20e9, 0.3, 1e8, 4e6, 6, strains=(0, 0.01, 0.03), stresses=(1e8, 2e8, 19e7)), 2e-2),
+    (kl.CoulombSoftening3D(20e9, 0.3, 1e8, 4e7, 1, 3e8, friction=30.0, dilatancy=20.0), 3e-2),
+]
 HYPERELASTIC = [law for law, _ in LAWS if law.strain_measure == "finite"]
 
 
@@ -45,7 +57,7 @@ def start(law: Material, *shape: int) -> dict:
 
 
 @pytest.mark.parametrize(
-    ("law", "size"), LAWS, ids=lambda v: type(v).__name__ if isinstance(v, Material) else ""
+    ("law", "size"), LAWS + BY_STEPS, ids=lambda v: type(v).__name__ if isinstance(v, Material) else ""
 )
 def test_the_tangent_is_the_derivative_of_the_stress(law, size):
     strain = np.random.default_rng(1).normal(size=(40, 6)) * size
@@ -194,7 +206,7 @@ def test_damage_dissipates_the_fracture_energy(make, linear):
 def test_softening_is_linear_or_exponential_and_dissipates_the_fracture_energy(curve):
     """σ = σ_Y exp(-σ_Y p / g) or σ_Y (1 - σ_Y p / 2g) of a bar, to the first order in the steps."""
     errors = []
-    for steps in (400, 800) if curve else (200, 400):
+    for steps in (400, 800) if curve else (100, 200):
         law = kl.J2Softening3D(200e9, 0.3, 250e6, 4e5, curve=curve)
         g = 4e5 / 0.1
         strains = np.linspace(0, 0.1 if curve else 0.025, steps)
@@ -235,6 +247,61 @@ def test_the_apex_of_a_cone_that_softens():
     assert abs(state["plastic_dissipation"][0] / (stress @ plastic * 0.1 / 1e8) - 1) < 1e-9
 
 
+@pytest.mark.parametrize("make", [kl.CoulombSoftening3D, kl.CoulombDamage3D])
+def test_the_pyramid_meets_the_strengths_of_mohr_and_coulomb(make):
+    """Bars of both signs; in shear τ = c cos φ, with the ratio of strengths that is theirs."""
+    c, phi = 1e6, np.radians(35)
+    tension, compression = (2 * c * np.cos(phi) / (1 + sign * np.sin(phi)) for sign in (1, -1))
+    more = {"dilatancy": 35.0, "curve": 3} if make is kl.CoulombSoftening3D else {}
+    law = make(30e9, 0.2, tension, 1e3, compression=compression, friction=35.0, **more)
+    for strain in (np.linspace(0, 2e-4, 8), -np.linspace(0, 2e-3, 8)):
+        strength = tension if strain[-1] > 0 else -compression
+        assert abs(uniaxial(law, strain, law.initial_state())[0][-1] / strength - 1) < 1e-9
+    path = kl.material_point(law, {"xy": np.linspace(0, 2e-4, 9)}, confined=True)
+    if make is kl.CoulombSoftening3D:  # dilatant and confined: the larger pressure carries more
+        s = tensor(path.stress[-1].T).T
+        ends = np.linalg.eigvalsh(s)[[2, 0]]
+        assert abs((ends[0] - ends[1]) / 2 + ends.mean() * np.sin(phi) - c * np.cos(phi)) < 1e-9 * c
+    else:
+        assert abs(path.stress[-1, 3] / (c * np.cos(phi)) - 1) < 1e-9
+
+
+@pytest.mark.parametrize("steps", [1, 2])
+def test_a_bar_of_tresca_follows_points_and_falls_then(steps):
+    """σ² is linear in the work of the stress between points, so that σ is linear in the plastic strain."""
+    strains, stresses = (0.0, 1e-3, 3e-3), (1e8, 2e8, 1.5e8)
+    law = kl.TrescaSoftening3D(200e9, 0.3, 1e8, 4e5, 6, strains=strains, stresses=stresses)
+    for p in (1e-3, 2e-3):
+        expected = np.interp(p, strains, stresses)
+        stress, _ = uniaxial(law, np.linspace(0, expected / 200e9 + p, 20 * steps), start(law))
+        assert abs(stress[-1] / expected - 1) < 0.03 / steps
+    stress, _ = uniaxial(law, np.linspace(0, 0.02, 20 * steps), start(law))
+    p, rest = 0.02 - stress[-1] / 200e9, 4e6 - 0.15e6 - 0.35e6  # J/m³ that are left
+    assert abs(stress[-1] / (1.5e8 * np.exp(-1.5e8 / rest * (p - 3e-3))) - 1) < 0.2 / steps
+
+
+@pytest.mark.parametrize("curve", [0, 1, 2, 3, 5, 6])
+def test_slopes_of_curves_are_their_derivatives(curve):
+    more = {"peak": 1.5e8, "peak_at": 0.3, "strains": (0, 0.01, 0.02), "stresses": (1e8, 2e8, 1e8)}
+    law = kl.J2Softening3D(200e9, 0.3, 1e8, 1.0, curve, **more)
+    stress, slope = CURVES[curve](law, np.linspace(0.01, 0.98, 40) + 1e-30j, np.full(40, 5e6), np.zeros(40))
+    assert np.abs(stress.imag / 1e-30 - slope.real).max() < 1e-10 * 1e8
+
+
+def test_a_thrust_dissipates_the_larger_energy_of_compression():
+    law = kl.CoulombSoftening3D(30e9, 0.2, 3e6, 1e4, 3, 15e6, friction=30.0, dilatancy=30.0)
+    stress, state = uniaxial(law, [-1e-3], start(law))
+    assert abs(stress[0] + 15e6) < 1e-9 * 15e6
+    expected = stress[0] * state["plastic_strain"][0] * 0.1 / (1e4 * 5**2)
+    assert abs(state["plastic_dissipation"][0] / expected - 1) < 1e-9
+
+
+def test_a_curve_that_needs_more_than_the_fracture_energy_is_refused():
+    law = kl.J2Softening3D(20e9, 0.3, 1e8, 1.0, 6, strains=(0, 0.1), stresses=(1e8, 2e8))
+    with pytest.raises(MaterialError, match=r"fracture energy beyond 1.5e\+07 J/m³ times its radius"):
+        law.evaluate(np.full(6, 1e-3), start(law), 1.0)
+
+
 def test_a_softening_element_that_is_too_large_is_refused():
     law = kl.J2Softening3D(200e9, 0.3, 250e6, 1e3)
     state = start(law)
@@ -262,6 +329,22 @@ def test_damage_does_not_heal():
     back, again = uniaxial(law, [1e-4], state)
     assert abs(back[0] / stress[0] - 1 / 3) < 1e-9
     assert again["damage"] == state["damage"]
+
+
+@pytest.mark.parametrize("duration", [0.5, 20.0])
+@pytest.mark.parametrize("confined", [True, False])
+def test_a_point_takes_its_time_and_is_confined_or_free(duration, confined):
+    """A ramp of a Prony series: σ = M ε̇ ((1 - w) t + w τ (1 - exp(-t / τ))), M of a bar or an oedometer."""
+    E, nu, w, tau = 1e9, 0.3, 0.3, 10.0
+    law = kl.GeneralizedMaxwell3D(E, nu, w, tau)
+    path = kl.material_point(law, {"xx": [1e-3]}, duration=duration, confined=confined, steps=20)
+    assert abs(path.time[-1] - duration) < 1e-12 * duration
+    M = E * (1 - nu) / (1 + nu) / (1 - 2 * nu) if confined else E
+    t = path.time
+    exact = M * 1e-3 / duration * ((1 - w) * t + w * tau * (1 - np.exp(-t / tau)))
+    assert np.abs(path.stress[:, 0] - exact).max() < 1e-3 * exact.max()
+    lateral = nu / (1 - nu) * exact if confined else 0 * exact
+    assert np.abs(path.stress[:, 1] - lateral).max() < 1e-3 * exact.max()
 
 
 def test_relaxation_and_creep_of_order_two():
@@ -381,8 +464,22 @@ def test_a_law_cannot_use_its_own_tangent_at_rest(monkeypatch):
         (lambda: kl.IsotropicDamage3D(1.0, 0.2, 1.0, 0.0), "FRACTURE_ENERGY"),
         (lambda: kl.RankineDamage3D.from_variables({"SOFTENING_TYPE": 2.0}), "SOFTENING_TYPE must be 0"),
         (lambda: kl.J2Softening3D(1.0, 0.2, 1.0, 0.0), "FRACTURE_ENERGY"),
-        (lambda: kl.J2Softening3D(1.0, 0.2, 1.0, 1.0, curve=2), "HARDENING_CURVE"),
-        (lambda: kl.J2Softening3D(1.0, 0.2, 1.0, 1.0, compression=2.0), "YIELD_STRESS_COMPRESSION"),
+        (lambda: kl.J2Softening3D(1.0, 0.2, 1.0, 1.0, curve=7), r"HARDENING_CURVE\) must be one of .* got 7"),
+        (lambda: kl.J2Softening3D(1.0, 0.2, 1.0, 1.0, compression=-2.0), "YIELD_STRESS_COMPRESSION"),
+        (lambda: kl.J2Softening3D(1.0, 0.2, 1.0, 1.0, curve=2), "curve 2 needs peak .MAXIMUM_STRESS. > 1"),
+        (lambda: kl.J2Softening3D(1.0, 0.2, 1.0, 1.0, curve=4), "curve 4 needs two strains"),
+        (lambda: kl.J2Softening3D(1, 0.2, 1, 1, 6, strains=(0, 1), stresses=(1,)), "curve 6 needs strains"),
+        (lambda: kl.J2Softening3D(1.0, 0.2, 1.0, 1.0, linear_until=1.0), "linear_until .* must lie in 0 … 1"),
+        (lambda: kl.J2Softening3D(1, 0.2, 1, 1, potential="Treska"), "one of VonMises, .*got 'Treska'"),
+        (lambda: kl.TrescaSoftening3D(1, 0.2, 1, 1, potential="DruckerPrager"), "FRICTION_ANGLE"),
+        (lambda: kl.CoulombDamage3D(1.0, 0.2, 1.0, 1.0), r"friction \(FRICTION_ANGLE\) 0 must"),
+        (lambda: kl.J2Softening3D.from_variables({"TANGENCY_REGION2": True}), "TANGENCY_REGION2 is not"),
+        (
+            lambda: kl.SimoJuDamage3D.from_variables(
+                {"YIELD_STRESS_TENSION": 1.0, "YIELD_STRESS_COMPRESSION": 2.0}
+            ),
+            "YIELD_STRESS_COMPRESSION of SimoJuDamage3D must be",
+        ),
         (lambda: kl.GeneralizedMaxwell3D(1.0, 0.2, 0.9, 1.0, 0.2), "sum ≤ 1"),
         (lambda: kl.GeneralizedMaxwell3D(1.0, 0.2, 0.9, 0.0), "tau1"),
     ],

@@ -22,7 +22,7 @@ from kratos_lite.testing import (
     failures,
     report,
 )
-from tests.materials.test_laws import LAWS
+from tests.materials.test_laws import BY_STEPS, LAWS
 
 ORTHOTROPIC = Orthotropic3D(11e9, 0.9e9, 0.5e9, 0.45, 0.31, 0.37, 0.7e9, 0.05e9, 0.65e9, 450.0)
 MATERIALS_TO_CHECK = [
@@ -45,6 +45,11 @@ def show(name, findings):
 
 def skipped(findings):
     return {finding.check for finding in findings if finding.skipped}
+
+
+@pytest.mark.parametrize("law", [law for law, _ in BY_STEPS], ids=lambda law: type(law).__name__)
+def test_a_law_with_steps_of_kratos_conforms_but_for_its_steps(law):
+    assert {found.check for found in failures(check_material(law))} <= {"one step or two", "staying"}
 
 
 @pytest.mark.parametrize("name", list(SHAPES))
@@ -91,7 +96,7 @@ def test_each_material_conforms(material):
 
 def test_each_material_is_checked():
     shipped = {law for law in MATERIALS.values() if law.__module__.startswith("kratos_lite")}
-    assert {type(material) for material in MATERIALS_TO_CHECK} == shipped
+    assert {type(law) for law in (*MATERIALS_TO_CHECK, *(law for law, _ in BY_STEPS))} == shipped
 
 
 @pytest.mark.parametrize("subject", [ELEMENTS["KinematicLinear3D4N"], Hexahedron8, ORTHOTROPIC, LAWS[0][0]])

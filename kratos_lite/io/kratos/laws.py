@@ -22,7 +22,14 @@ ITERATIONS = 25
 """Corrections of a step that are allowed at least, as residuals are smaller than those of files."""
 
 
-def notes_on_stress(document: Document) -> list[str]:
+def notes_on_laws(document: Document) -> list[str]:
+    """Return notes on what laws of Kratos mean there, and not here."""
+    laws = {type(law).__name__ for _, law in _materials(document) if getattr(law, "has_corners", False)}
+    text = "Kratos exchanges the shears yz and zx in its flow; where both are 0 it does the same"
+    return [*_notes_on_stress(document), *(Omission(f"{name}: {text}") for name in sorted(laws))]
+
+
+def _notes_on_stress(document: Document) -> list[str]:
     """Return a note on small-strain laws of updated Lagrangian elements: Kratos means another stress."""
     names = {b.name for b in document.mesh.blocks if len(b) and b.name.startswith("UpdatedLagrangian")}
     laws = {type(law).__name__ for _, law in _materials(document) if law.strain_measure == "small"}

@@ -20,10 +20,9 @@ from kratos_lite.mesh import mask_of, with_rows
 from kratos_lite.model.loads.body import BodyForce, Gravity
 from kratos_lite.typing import Array
 
-ELASTIC = {name for law in MATERIALS.values() for name in law.variables.values()} - {
-    "DENSITY",
-    "ELASTICITY_TENSOR",
-}
+ELASTIC = {
+    name for law in MATERIALS.values() for field, name in law.variables.items() if field not in law.tables
+} - {"DENSITY"}
 """Variables that say what material a Properties block means."""
 BODY_LOADS = ("VOLUME_ACCELERATION", "GRAVITY", "BODY_FORCE")
 USED = ELASTIC | {

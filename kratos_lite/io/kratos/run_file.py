@@ -21,7 +21,7 @@ from kratos_lite.io.kratos.eigenvalues import EIGEN, EIGEN_KEYS, eigenvalue_comp
 from kratos_lite.io.kratos.expected_values import COMPARISONS
 from kratos_lite.io.kratos.initial_state import MODULE, initial_state_of
 from kratos_lite.io.kratos.keys import IN_TIME, unused_keys
-from kratos_lite.io.kratos.laws import make_linear, notes_on_stress, quasi_static_of
+from kratos_lite.io.kratos.laws import make_linear, notes_on_laws, quasi_static_of
 from kratos_lite.io.kratos.motion import add_motion
 from kratos_lite.io.kratos.outputs import OUTPUT_PROCESSES, OutputProcess
 from kratos_lite.io.kratos.point_elements import set_apart
@@ -59,7 +59,7 @@ def read_kratos_project(
     moved, dofs = moved and not eigen, _dofs(solver, dynamic)
     context = RunContext(document.mesh, root, path.parent, times, moved, allow_outside, dofs)
     _use_materials(solver, context, document, notes)
-    notes += (make_linear(document) if small else []) + notes_on_stress(document)
+    notes += (make_linear(document) if small else []) + notes_on_laws(document)
     time = None if dynamic or eigen else quasi_static_of(solver, times)
     instead = "modes are written by -o OUT" if eigen else "" if part is None else PARTS
     processes = _read_processes(settings, context, notes, eigen, instead)

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from run_files import CLAMP, box_mdpa, cube, materials, process, run_file, write
+from run_files import CLAMP, SOFTENING, box_mdpa, cube, materials, process, run_file, write
 from scenes import SHARED
 
 import kratos_lite as kl
@@ -132,6 +132,19 @@ def test_another_stress_of_kratos_is_noted(tmp_path):
         (folder / "box.mdpa").write_text(text)
         notes = " ".join(read_case(write(folder, pressed(step=0.5))).model.notes)
         assert ("Cauchy's in Kratos" in notes) == (law_name == "LinearElastic3DLaw")
+
+
+@pytest.mark.parametrize(("flow", "noted"), [("VonMises", False), ("Tresca", True)])
+def test_a_factory_names_surface_and_potential_and_a_flow_with_corners_is_noted(tmp_path, flow, noted):
+    content = law("SmallStrainIsotropicPlasticityFactory", **SOFTENING)
+    content["properties"][0]["Material"]["constitutive_law"] |= {
+        "yield_surface": "VonMises",
+        "plastic_potential": flow,
+    }
+    case = read_case(write(box(tmp_path, False, content), pressed(step=0.5)))
+    assert case.model.element_groups()[0].material.potential == (flow if noted else "")
+    notes = " ".join(case.model.notes)
+    assert ("J2Softening3D: Kratos exchanges the shears yz and zx in its flow" in notes) == noted
 
 
 def test_linear_takes_elements_and_laws_of_small_strains(tmp_path, run):
@@ -321,11 +334,8 @@ def test_softening_bar_takes_the_steps_of_kratos():
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"YIELD_STRESS_COMPRESSION": 3e6}, "must be that of tension"),
-        (
-            {"HARDENING_CURVE": 2},
-            "HARDENING_CURVE) must be 0, linear softening, 1, exponential softening, or 3",
-        ),
+        ({"HARDENING_CURVE": 7}, "HARDENING_CURVE) must be one of"),
+        ({"HARDENING_CURVE": 2}, "curve 2 needs peak (MAXIMUM_STRESS) > 2e+06 Pa"),
         ({}, ""),
     ],
 )
