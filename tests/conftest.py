@@ -1,5 +1,6 @@
 """Fixtures shared by all tests."""
 
+import gc
 import os
 import signal
 from pathlib import Path
@@ -40,6 +41,12 @@ LONGEST = (
 """Files whose tests come first: no worker begins one when the others are done, or shares its fixtures."""
 
 
+def pytest_configure():
+    """Collect no garbage while tests are collected; let processes that tests start keep what they compile."""
+    gc.disable()
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
+
 def pytest_collection_modifyitems(items):
     """Put the longest tests first; leave out those of real files where these are absent.
 
@@ -48,6 +55,10 @@ def pytest_collection_modifyitems(items):
     items.sort(key=lambda item: item.path.name not in LONGEST)
     if "shared" not in SOURCES:
         items[:] = [item for item in items if "shared" not in getattr(item, "fixturenames", ())]
+
+
+def pytest_collection_finish():
+    gc.enable()
 
 
 @pytest.fixture(scope="session", params=SOURCES)

@@ -74,10 +74,9 @@ def pardiso(A: Csr, symmetric: bool) -> Callable[[Array], Array]:
     """Factorize with MKL PARDISO: Cholesky with nested dissection, or LU if it is not symmetric."""
     # Where a pivot is not positive (Cholesky) or had to be replaced (LU), SuperLU has to say whether A is
     # singular.
-    try:
-        solvers = import_module("pypardiso.pardiso_wrapper")
-    except ImportError:
-        raise Unsuitable from None
+    solvers = _pypardiso()
+    if solvers is None:
+        raise Unsuitable
     from scipy.sparse import csr_array, triu
 
     solver = solvers.PyPardisoSolver(mtype=2 if symmetric else 11)
@@ -93,6 +92,15 @@ def pardiso(A: Csr, symmetric: bool) -> Callable[[Array], Array]:
     if solver.get_iparm(REPLACED_PIVOTS):
         raise Unsuitable
     return lambda b: solver.solve(half, b)
+
+
+@cache
+def _pypardiso() -> Any:
+    """Return the module that calls MKL PARDISO; None where it is not installed."""
+    try:
+        return import_module("pypardiso.pardiso_wrapper")
+    except ImportError:
+        return None
 
 
 def superlu(A: Csr, symmetric: bool) -> Callable[[Array], Array]:

@@ -71,6 +71,7 @@ WRONG = {
         r"a traction must be \(3,\) or \(n, 3\) in Pa",
     ),
     "constants all one": (lambda: kl.Orthotropic3D(*[1.0] * 9), "C must be positive definite"),
+    "Poisson's ratio": (lambda: kl.Isotropic3D(E=1.0, nu=-1.0), "-1 must be > -1: the shear modulus"),
     "stress component": (lambda: kl.StressAt((0, 0, 0), np.ones(3)), "component must be one of xx"),
     "picture path": (lambda: kl.plot(model().mesh, 3), "a path to a file must be text"),
     "critical rate": (lambda: kl.critical_rate("x"), "a model"),
