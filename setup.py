@@ -5,11 +5,13 @@ A machine without a compiler installs the package all the same and computes with
 Environment
 -----------
 KRATOS_LITE_BUILD : ``compiled`` makes a kernel that cannot be built an error, ``pure`` builds none: the wheel
-    then serves every platform. Else kernels are built where that is possible.
+    then serves every platform. Else kernels are built where that is possible, and for the instruction set of this
+    machine alone where the source tree itself is installed (``-e``), in two thirds of the time.
 """
 
 import os
 import shutil
+import subprocess
 from pathlib import Path
 
 from setuptools import Extension, setup
@@ -22,7 +24,7 @@ LONGEST = ("multigrid", "gauss", "stiffness")
 # -g0 because Python's own flags may ask for debug symbols, which double the time to compile.
 GCC = ["-std=c++17", "-O3", "-g0", "-fwrapv", "-pthread", "-fno-math-errno", "-fvisibility=hidden"]
 CLANG_CL = ["/std:c++17", "/EHsc", "/DNOMINMAX", "/clang:-O3", "/clang:-fwrapv", "/clang:-fno-math-errno"]
-WISHES = ("", "compiled", "pure")
+WISH, WISHES = os.environ.get("KRATOS_LITE_BUILD", ""), ("", "compiled", "pure")
 
 
 class Build(build_ext):
@@ -40,10 +42,21 @@ class Build(build_ext):
         if windows:
             self.compiler.initialize()
             self.compiler.cc = shutil.which("clang-cl") or self.compiler.cc
+        here = self._instruction_set() if self.editable_mode and not WISH else []
         for extension in self.extensions:
-            extension.extra_compile_args = CLANG_CL if windows else [*GCC, "-Wall", "-Wextra"]
+            extension.extra_compile_args = CLANG_CL if windows else [*GCC, "-Wall", "-Wextra", *here]
             extension.extra_link_args = [] if windows else ["-pthread"]
         super().build_extensions()
+
+    def _instruction_set(self) -> list[str]:
+        """Return the macro for kernels of this machine's instruction set; none where the compiler cannot tell."""
+        ask = [self.compiler.compiler_so[0], "-march=native", "-dM", "-E", "-x", "c", os.devnull]
+        try:
+            macros = subprocess.run(ask, capture_output=True, text=True, check=True).stdout
+        except (AttributeError, OSError, subprocess.CalledProcessError):
+            return []
+        wide = all(f"__AVX512{part}__" in macros for part in ("F", "DQ", "BW", "VL"))
+        return [f"-DKL_ISA={2 if wide else 1 if '__AVX2__' in macros and '__FMA__' in macros else 0}"]
 
 
 def kernels(wish: str) -> list[Extension]:
@@ -65,4 +78,4 @@ def kernels(wish: str) -> list[Extension]:
     ]
 
 
-setup(cmdclass={"build_ext": Build}, ext_modules=kernels(os.environ.get("KRATOS_LITE_BUILD", "")))
+setup(cmdclass={"build_ext": Build}, ext_modules=kernels(WISH))

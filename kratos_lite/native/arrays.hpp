@@ -180,6 +180,10 @@ inline Threads* pool() {
 inline PyObject* made_module(PyModuleDef& definition, void (*fill)(const Object&)) {
     try {
         NumPy::import();
+        if (isa_wanted() < isa()) {
+            PyErr_Format(PyExc_ImportError, "built for %s alone, as KRATOS_LITE_BUILD was not 'compiled'", isa_name());
+            throw PythonError{};
+        }
         Object m = Object::of(PyModule_Create(&definition));
         interruption() = &handle_signals;
         if (!threads()) threads() = pool();

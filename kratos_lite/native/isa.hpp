@@ -7,7 +7,8 @@
 //     dispatch<double>([&](auto V) KL_INLINE_LAMBDA { body<V>(args); });
 //
 // runs body<8> with AVX-512, body<4> with AVX2 and FMA, else body<2>.  The width follows the
-// instruction set: eight doubles at once would spill on AVX2.
+// instruction set: eight doubles at once would spill on AVX2.  With KL_ISA, which is 0, 1 or 2 of Isa,
+// only functions for that one are compiled, and modules do not load where it is too much.
 
 #pragma once
 #include <cstdint>
@@ -49,7 +50,7 @@ inline Isa best_isa() { return Isa::base; }
 #endif
 
 // KRATOS_LITE_ISA lowers the choice, never above what the machine has.
-inline Isa isa() {
+inline Isa isa_wanted() {
     static const Isa chosen = [] {
         const Isa best = best_isa();
         const char* wanted = std::getenv("KRATOS_LITE_ISA");
@@ -60,6 +61,14 @@ inline Isa isa() {
     }();
     return chosen;
 }
+
+#ifdef KL_ISA
+constexpr Isa isa() { return Isa{KL_ISA}; }
+#define KL_IF constexpr
+#else
+inline Isa isa() { return isa_wanted(); }
+#define KL_IF
+#endif
 
 inline const char* isa_name() {
     return isa() == Isa::avx512 ? "AVX-512" : isa() == Isa::avx2 ? "AVX2" : "baseline";
@@ -119,8 +128,9 @@ __attribute__((target("avx2,fma"))) inline void call_avx2(const F& f) {
 template <class T, class F>
 inline void dispatch(const F& f) {
 #if defined(__x86_64__)
-    if (isa() == Isa::avx512) return call_avx512<T>(f);
-    if (isa() == Isa::avx2) return call_avx2<T>(f);
+    if KL_IF (isa() == Isa::avx512) call_avx512<T>(f);
+    else if KL_IF (isa() == Isa::avx2) call_avx2<T>(f);
+    else
 #endif
     call<16, T>(f);
 }

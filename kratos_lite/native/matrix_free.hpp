@@ -98,7 +98,7 @@ public:
         }
         for (const ProductGroup& s : groups)
             over(s, [&](int64_t first, int64_t last) { run(s, x, room.data() + 4 * (s.first + first * s.w.k), first, last); });
-        const auto force = [&](int64_t i) {
+        const auto force = [&](int64_t i) KL_INLINE_LAMBDA {
             vec<T, 4> sum = {};
             for (int32_t p = start[i]; p < start[i + 1]; ++p)
                 sum += *reinterpret_cast<const vec<T, 4>*>(room.data() + 4 * static_cast<int64_t>(met[p]));

@@ -55,7 +55,7 @@ def random_model(seed):
     return model, bool(rng.integers(2))
 
 
-@pytest.mark.parametrize("seeds", np.split(np.arange(50), 5))
+@pytest.mark.parametrize("seeds", np.split(np.arange(100), 10))
 def test_random_models_have_the_modes_of_lapack(seeds, monkeypatch):
     for seed in seeds:
         model, lumped = random_model(seed)

