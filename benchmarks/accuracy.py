@@ -295,51 +295,122 @@ EDGES: dict[str, Callable[[str, int], kl.Model]] = {
 }
 """Scenes of singularities in space, whose exact energy nobody knows."""
 ON_EDGES = (0.1, 0.05, 0.03, 0.02)
+BY_HAND_TO, BY_HAND_MOST = 0.6, 1_000_000
+"""Fraction of the least of these to which meshes are marked by hand, and their unknowns at most."""
 SINGULAR = """
-Singular edges and corners: unknowns, and the error in percent that is reported; of bulk marking by hand,
-which cuts the 20N cells with half of the squared error and solves each mesh in full; of uniform 20N meshes.
+Singular edges and corners: unknowns, and the error in percent that is reported, and the true one; of bulk
+marking by hand, which cuts the 20N cells with half of the squared error and solves each mesh in full, the
+unknowns for the same true error, and the ratio; of uniform 20N meshes unknowns and true error. The exact
+energy is that to which those of bulk marking lead, so that true errors of the finest meshes are known to
+about a tenth.
+
+![Unknowns against true error of singular edges](../images/singular-edges.svg)
 
 """
+EDGE_PICTURE = ROOT / "docs" / "images" / "singular-edges.svg"
+Meshes = list[tuple[int, float, float]]
+"""Unknowns, reported error, and energy in J of meshes."""
 
 
-def bulk_marking(model: kl.Model, error: float) -> tuple[int, float]:
-    """Return unknowns and error of the first mesh below an error, half of its square cut on the way."""
+def of_result(result: kl.Result) -> tuple[int, float, float]:
+    """Return unknowns, estimated error and energy of a result."""
+    return result.report.unknowns, result.error().relative, result.energy()
+
+
+def bulk_marking(model: kl.Model, error: float) -> Meshes:
+    """Return meshes until the estimated error is below one, half of its square cut on the way."""
+    meshes: Meshes = []
     while True:
         result = model.solve()
-        estimate = result.error()
-        if estimate.relative <= error:
-            return result.report.unknowns, estimate.relative
-        squares = estimate.per_element**2
+        meshes.append(of_result(result))
+        if meshes[-1][1] <= error or meshes[-1][0] > BY_HAND_MOST:
+            return meshes
+        squares = result.error().per_element ** 2
         order = np.argsort(-squares)
         count = 1 + np.searchsorted(np.cumsum(squares[order]), squares.sum() / 2)
         model = refined(model, refine(model.mesh, np.sort(order[:count])))
 
 
-def edges() -> None:
-    """Measure the scenes of singularities in space and write them to the page."""
-    rows: list[Row] = []
-    for name, make in EDGES.items():
-        row: Row = {"scene": name}
-        reports = [make("8N", 2).solve(error=error).report for error in ON_EDGES]
-        row["asked"] = [(report.unknowns, report.error) for report in reports]
-        row["by_hand"] = [bulk_marking(make("20N", 2), error) for error in ON_EDGES[:-1]]
-        uniform = [make("20N", n).solve() for n in (2, 4, 8)]
-        row["uniform"] = [(result.report.unknowns, result.error().relative) for result in uniform]
-        print(row, flush=True)
-        rows.append(row)
-    save(RESULTS / "edges.json", {"set": "edges", "rows": rows})
+def limit(meshes: Meshes, last: int = 5) -> float:
+    """Return the energy from which those of the last meshes differ by a power of their unknowns.
+
+    >>> round(limit([(n, 0.0, 3 - 1 / n) for n in (100, 200, 400, 800)]), 4)
+    3.0
+    """
+    unknowns, _, energies = np.array(meshes[-last:]).T
+    limits = energies[-1] * (1 + np.geomspace(1e-7, 1, 4000))
+    off = np.log(limits[:, None] - energies)
+    x = np.log(unknowns) - np.log(unknowns).mean()
+    y = off - off.mean(axis=1, keepdims=True)
+    left = y - (y @ x / (x @ x))[:, None] * x
+    return float(limits[((left**2).sum(axis=1) / (y**2).sum(axis=1)).argmin()])
+
+
+def edges(names: Sequence[str] | None = None) -> None:
+    """Measure scenes of singularities in space and write them to the page."""
+    kept = load(RESULTS / "edges.json") or {"rows": []}
+    rows: dict[str, Row] = {row["scene"]: row for row in kept["rows"]}
+    for name in names or EDGES:
+        model = EDGES[name]
+        results = [model("8N", 2).solve(error=error) for error in ON_EDGES]
+        row: Row = {
+            "scene": name,
+            "asked": [(r.report.unknowns, r.report.error, r.energy()) for r in results],
+        }
+        row["by_hand"] = bulk_marking(model("20N", 2), BY_HAND_TO * ON_EDGES[-1])
+        row["uniform"] = [of_result(model("20N", n).solve()) for n in (2, 4, 8)]
+        print(of_edges([row]).split("\n", 2)[2], end="", flush=True)
+        rows[name] = row
+        save(RESULTS / "edges.json", {"set": "edges", "rows": [rows[key] for key in EDGES if key in rows]})
     write_page()
+    picture_of_edges([rows[name] for name in EDGES if name in rows])
+
+
+def true_errors(row: Row, label: str) -> list[Row]:
+    """Return unknowns, reported and true error of the meshes of a scene."""
+    exact = limit(row["by_hand"])
+    return [
+        {"unknowns": n, "reported": reported, "true": (max(0.0, 1 - energy / exact)) ** 0.5}
+        for n, reported, energy in row[label]
+    ]
 
 
 def of_edges(rows: Sequence[Row]) -> str:
     """Return the table of singular edges."""
     body = []
     for row in rows:
-        for label in ("asked", "by_hand", "uniform"):
-            found = [f"{unknowns}: {100 * error:.2g}" for unknowns, error in row[label]]
-            found += [""] * (len(ON_EDGES) - len(found))
-            body.append([row["scene"] if label == "asked" else "", label.replace("_", " "), *found])
+        asked, hand, uniform = (true_errors(row, label) for label in ("asked", "by_hand", "uniform"))
+        cells = [f"{a['unknowns']}: {100 * a['reported']:.2g}, {100 * a['true']:.2g}" for a in asked]
+        body.append([row["scene"], "asked", *cells])
+        same = [at_error(hand, a["true"], "unknowns") for a in asked]
+        beside = zip(same, asked, strict=True)
+        cells = [f"{n:.0f}, {a['unknowns'] / n:.2f}" if np.isfinite(n) else "-" for n, a in beside]
+        body.append(["", "by hand", *cells])
+        body.append(["", "uniform", *(f"{u['unknowns']}: {100 * u['true']:.2g}" for u in uniform), ""])
     return table(["scene", "meshes", *(f"{100 * error:g} %" for error in ON_EDGES)], body)
+
+
+def picture_of_edges(rows: Sequence[Row]) -> None:
+    """Draw unknowns against true errors of the scenes."""
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(
+        1, len(rows), figsize=(3.2 * len(rows), 3.2), sharey=True, layout="constrained"
+    )
+    for ax, row in zip(np.ravel(axes), rows, strict=True):
+        for label, look in (("uniform", "s:"), ("by_hand", ".-"), ("asked", "o")):
+            found = true_errors(row, label)
+            ax.loglog(
+                *([f[key] for f in found] for key in ("unknowns", "true")),
+                look,
+                label=label.replace("_", " "),
+            )
+        ax.set(title=row["scene"], xlabel="unknowns")
+        ax.grid(True, which="major", alpha=0.25)
+    np.ravel(axes)[0].set_ylabel("true error, energy norm")
+    np.ravel(axes)[0].legend(frameon=False)
+    figure.savefig(EDGE_PICTURE, metadata={"Date": None})
+    plt.close(figure)
 
 
 # ---- the page --------------------------------------------------------------------------------------

@@ -1,9 +1,9 @@
 """Adaptive solution: a static model solved to a requested accuracy, its mesh made finer where that pays.
 
 Linear elements become quadratic first; then, mesh by mesh, those elements are cut that hold a fraction θ of
-the squared error (bulk marking).  The estimate of a result is corrected by what the last step has changed:
-of nested meshes ‖u - u_H‖² = ‖u - u_h‖² + ‖u_h - u_H‖², so that, if estimates fall by β = η_h/η_H, the
-error is ‖u_h - u_H‖ β/√(1 - β²).
+the squared error (bulk marking).  The estimate of a result is corrected by what has changed since a clearly
+larger one: of nested meshes ‖u - u_H‖² = ‖u - u_h‖² + ‖u_h - u_H‖², so that, if estimates fall by
+β = η_h/η_H, the error is ‖u_h - u_H‖ β/√(1 - β²); over several steps squares of changes add up.
 
 Sources: Dörfler, SIAM J. Numer. Anal. 33 (1996) 1106-1124; Zienkiewicz & Zhu, Int. J. Numer. Meth. Eng. 24
 (1987) 337-357 (density of the mesh); Ainsworth & Oden, A Posteriori Error Estimation (2000), ch. 3.
@@ -22,8 +22,9 @@ import numpy as np
 from kratos_lite.analysis.adaptive_levels import Level, QuantityLevel, layer_direction
 from kratos_lite.analysis.error_estimate import curved
 from kratos_lite.analysis.peak import peak
+from kratos_lite.analysis.prepared import LoadSet
 from kratos_lite.analysis.quantities import Quantity
-from kratos_lite.analysis.report import RefinementStep
+from kratos_lite.analysis.report import RefinementStep, Report
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.static import StaticAnalysis
 from kratos_lite.elements import ELEMENTS
@@ -32,6 +33,7 @@ from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh
 from kratos_lite.mesh.refined_mesh import RefinedMesh
 from kratos_lite.mesh.refinement import quadratic, raised, refine
+from kratos_lite.model.loads.base import warnings_of
 from kratos_lite.model.refined import refined
 from kratos_lite.model.structure import Structure
 from kratos_lite.tabular import in_units
@@ -41,12 +43,12 @@ from kratos_lite.validation import fraction, short, whole_number
 Geometry: TypeAlias = Mapping[str, Callable[[Array], Array]]
 """By part, a function that takes places (k, 3) near its true surface onto it."""
 LEAST = 1e-8  # relative error that can be requested: what rounding leaves of a solution
-BULK, BULK_FAR, FAR = 0.6, 0.8, 3.0
+BULK, BULK_FAR, FAR = 0.75, 0.85, 3.0
 """Fraction θ of the squared error that is cut, and that where the error is `FAR` times the one requested."""
 GROWTH = 1.2  # how many times more elements the next mesh has at least
 FLAT = 0.05
 """Fraction of the requested error that the stress may vary along a direction in which nothing is cut."""
-ROUGH, ROUGH_FRACTION = 1e-5, 1e-3
+ROUGH, ROUGH_FRACTION = 1e-4, 1e-2
 """Relative residual of the meshes on the way at most, and as a fraction of the requested error."""
 FAIR = 1e-3  # fraction of the forces that such a mesh may miss to equilibrium; beyond it is solved in full
 STEPS = 25  # meshes after which the accuracy counts as out of reach
@@ -87,7 +89,8 @@ def solve_to(
     warnings = [] if geometry else curved(model.mesh)
     while True:
         begin, analysis = perf_counter(), StaticAnalysis(model, solver, tolerance, progress)
-        result = _solved(analysis, start, rough, seconds)
+        case = analysis.case(checked=False)
+        result = _solved(analysis, case, start, rough)
         before, known = level, (model, result, step, level)
         level = Level(*known) if quantity is None else QuantityLevel(*known, quantity)
         history.append(level.refinement_step(perf_counter() - begin))
@@ -102,36 +105,40 @@ def solve_to(
         if step is None:
             missed = _missed(history, aim, most)
             break
-        model, start = _model_on(model, step), step.interpolate(result.u)
+        seconds.update(case.phase.seconds)
         analysis.release()
+        model, start = _model_on(model, step), step.interpolate(result.u)
     if result.report.iterations and rough > tolerance:
-        result = analysis.solve(start=result.u)
-        seconds.update(result.report.seconds)
+        result = analysis.solve(case, start=result.u)
+    seconds.update(case.phase.seconds)
     analysis.release()
+    warnings += warnings_of(model.loads, model.mesh, result.groups)
     if missed:
         warnings += [
             f"the error requested, {aim:.3g}, was not reached: it may be {level.reported:.3g}; {missed}"
         ]
     if top := peak(result):
         warnings.append(in_units(f"the largest von Mises stress lies{top}", result.units))
-    report, (first, last) = result.report, (history[0].kinds, history[-1].kinds)
-    report.seconds = {**seconds, "refine": perf_counter() - clock - seconds.total()}
-    report.history, report.error, report.error_asked = history, level.reported, aim
-    report.error_of = "the energy norm" if quantity is None else str(quantity)
-    report.warnings += warnings
-    report.formulation = f"{last}, raised from {first}" if first != last else report.formulation
+    result.report.seconds = {**seconds, "refine": perf_counter() - clock - seconds.total()}
+    result.report.warnings += warnings
+    _tell(result.report, history, aim, quantity)
     return result
 
 
-def _solved(analysis: StaticAnalysis, start: Array | None, rough: float, seconds: Counter[str]) -> Result:
-    """Return a solution to a rough tolerance, or to the full one if equilibrium needs it; count seconds."""
-    result = analysis.solve(start=start, tolerance=rough)
-    seconds.update(result.report.seconds)
+def _tell(report: Report, history: list[RefinementStep], aim: float, quantity: Quantity | None) -> None:
+    """Tell in the report of the last mesh what led there."""
+    first, last = history[0].kinds, history[-1].kinds
+    report.history, report.error, report.error_asked = history, history[-1].error, aim
+    report.error_of = "the energy norm" if quantity is None else str(quantity)
+    report.formulation = f"{last}, raised from {first}" if first != last else report.formulation
+
+
+def _solved(analysis: StaticAnalysis, case: LoadSet, start: Array | None, rough: float) -> Result:
+    """Return a solution to a rough tolerance, or to the full one if equilibrium needs it."""
+    result = analysis.solve(case, start=start, tolerance=rough)
     if (result.report.force_error or 0.0) <= FAIR:
         return result
-    result = analysis.solve(start=result.u)
-    seconds.update(result.report.seconds)
-    return result
+    return analysis.solve(case, start=result.u)
 
 
 def check_quantity(quantity: Quantity | None) -> None:

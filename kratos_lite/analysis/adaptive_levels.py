@@ -19,10 +19,11 @@ from kratos_lite.model.structure import Structure
 from kratos_lite.quadrature import Rule
 from kratos_lite.typing import Array, Ints
 
-CORRECTED = 1.25  # safety of an estimate that a coarser mesh corrects
-MOST_CORRECTED = 1.3  # times that it may exceed the estimate of its own mesh: short steps say little
-SETTLED = 0.9  # fraction to which estimates must fall, so that they can be corrected
-AIM = 0.9  # fraction of the requested error at which the next mesh aims
+CORRECTED = 1.1  # safety of an estimate that coarser meshes correct
+MOST_CORRECTED = 1.4  # times that it may exceed the estimate of its own mesh
+FALLEN, SETTLED = 0.7, 0.9
+"""Fraction of an earlier estimate by which one is corrected, as short steps say little; the largest one."""
+AIM = 0.93  # fraction of the requested error at which the next mesh aims
 SINGULAR = 0.25
 """Fraction of its squared error that an element keeps when it is cut or becomes quadratic, from which the
 solution counts as singular there."""
@@ -75,16 +76,25 @@ class Level:
         return all(group.element.formulation == "standard" for group in self.result.groups)
 
     @cached_property
+    def trail(self) -> list[tuple[float, float]]:
+        """Estimates of the levels of this order up to this one, and ‖u - u_H‖² in J from their solutions."""
+        before = self.before
+        if before is None or not before.is_nested or before.is_blind or before.order < self.order:
+            return [(self.estimate, 0.0)]
+        return [*((one, far + self.change**2) for one, far in before.trail), (self.estimate, 0.0)]
+
+    @cached_property
     def corrected(self) -> float:
-        """The estimate in √J as the level before corrects it."""
-        if self.before is None or not self.before.is_nested or self.before.is_blind:
-            return self.estimate
-        ratio = self.estimate / self.before.estimate
-        if self.before.order == self.order:  # faster than cells shrink, the one before was too large
-            ratio = max(ratio, 2.0**-self.order)
-        if not ratio < SETTLED:
-            return max(self.estimate, self.change)
-        return self.change * ratio / float(np.sqrt(1 - ratio**2))
+        """The estimate in √J as the last level with a clearly larger one corrects it."""
+        *earlier, (now, _) = self.trail
+        if not earlier:
+            return now
+        larger = [k for k, (one, _) in enumerate(reversed(earlier), 1) if now <= FALLEN * one]
+        steps = larger[0] if larger else len(earlier)
+        one, far = earlier[-steps]
+        # An estimate that falls faster than cells shrink was too large before.
+        ratio = float(np.clip(now / one if one > 0 else 1.0, 2.0 ** (-self.order * steps), SETTLED))
+        return ratio * float(np.sqrt(far / (1 - ratio**2)))
 
     @cached_property
     def bound(self) -> float:

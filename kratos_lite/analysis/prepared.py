@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain
 from typing import TYPE_CHECKING, Any
@@ -104,6 +104,7 @@ class LoadSet:
     forces: Array
     moving: Mask
     phase: Phases
+    warnings: list[str] = field(default_factory=list)  # of functions that jump
 
 
 def load_set(

@@ -20,6 +20,7 @@ from kratos_lite.assembly.nonlinear_assembly import NonlinearAssembly, States, n
 from kratos_lite.errors import InputError, ModelError, SolveError, naming
 from kratos_lite.mesh.mesh import place_of
 from kratos_lite.model.free_motions import free_motions
+from kratos_lite.model.loads.base import warnings_of
 from kratos_lite.model.loads.temperature import heated
 from kratos_lite.model.structure import Structure
 from kratos_lite.model.supports import Supports
@@ -105,6 +106,7 @@ class QuasiStaticAnalysis(ModelInTime):
         if model.motion is not None:
             raise ModelError("a model with a motion has no quasi-static analysis; leave the motion out")
         self.groups, self.warnings = model.checked()
+        self.warnings += warnings_of(model.loads, model.mesh, self.groups)
         mesh, supports = model.mesh, model.supports
         what = mesh.points, self.groups, supports.constraint_map
         how: dict[str, Any] = {"patterns": model.patterns, "hanging": mesh.hanging}

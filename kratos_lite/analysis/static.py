@@ -24,7 +24,7 @@ from kratos_lite.analysis.solution_checks import Phases, check_arguments, check_
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model import checks
 from kratos_lite.model.loads import Load
-from kratos_lite.model.loads.base import equal_loads
+from kratos_lite.model.loads.base import equal_loads, warnings_of
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem, select
 from kratos_lite.solvers.linear_solver import Solution
@@ -73,7 +73,7 @@ class StaticAnalysis:
 
     def solve(
         self,
-        loads: Load | Sequence[Load] | None = None,
+        loads: Load | Sequence[Load] | LoadSet | None = None,
         *,
         start: Array | None = None,
         tolerance: float | None = None,
@@ -84,26 +84,35 @@ class StaticAnalysis:
         `tolerance` is the relative residual at which this iteration stops, in place of that of the analysis;
         how far the result is from equilibrium is in its report, and no error then.
         """
-        self._follow()
-        case = self._load(self.model.loads if loads is None else loads)
+        if not isinstance(loads, LoadSet):
+            loads = self.case(loads)
         if tolerance is not None:
             check_arguments(self.solver, tolerance)
         if start is not None:
             start = finite(start, "start", (self.model.mesh.n_nodes, 3))
-        return self._solve(case, case.moving, tolerance, start)
+        return self._solve(loads, loads.moving, tolerance, start)
+
+    def case(self, loads: Load | Sequence[Load] | None = None, *, checked: bool = True) -> LoadSet:
+        """Return some loads, or those of the model, as `solve` takes them; check functions for jumps."""
+        self._follow()
+        phase, self._phase = self._phase, Phases(self.progress)
+        loads = self.model.loads if loads is None else loads
+        case = load_set(self.model, self._state, self._dirichlet, loads, phase)
+        if checked:
+            with phase("check"):
+                case.warnings = warnings_of(case.loads, self.model.mesh, self._state.groups)
+        return case
 
     def check(self) -> list[str]:
         """Check the loads of the model, too, as a solution does, without solving; return warnings."""
-        self._follow()
-        case = self._load(self.model.loads)
+        case = self.case()
         return self._warnings(case) + self._state.free.notes(case.moving)
 
     def solve_cases(self, cases: Mapping[str, Load | Sequence[Load]]) -> dict[str, Result]:
         """Return the result of each load case by its name; see `Model.solve_cases`."""
         if not isinstance(cases, Mapping):
             raise InputError(f"load cases must map names to lists of loads; got {type(cases).__name__}")
-        self._follow()
-        loaded = {name: self._load(loads) for name, loads in cases.items()}
+        loaded = {name: self.case(loads) for name, loads in cases.items()}
         moving = np.any([case.moving for case in loaded.values()], axis=0)
         return {name: self._solve(case, moving) for name, case in loaded.items()}
 
@@ -130,14 +139,10 @@ class StaticAnalysis:
                 c = supports.constraint_map(self._equations.system.nodes).c
                 self._equations = replace(self._equations, prescribed=c)
 
-    def _load(self, loads: Load | Sequence[Load]) -> LoadSet:
-        phase, self._phase = self._phase, Phases(self.progress)
-        return load_set(self.model, self._state, self._dirichlet, loads, phase)
-
     def _warnings(self, case: LoadSet) -> list[str]:
         """Return the warnings of the model and of a load set."""
         idle = checks.check_loads(case.loads, self._state.groups, case.forces, self.model.supports)
-        return self.warnings + idle + equal_loads(case.loads, self.model.named_loads)
+        return self.warnings + case.warnings + idle + equal_loads(case.loads, self.model.named_loads)
 
     def _equations_of(self, moving: Mask) -> Equations:
         """Return the equations of the components that move, made anew only for one that is new."""

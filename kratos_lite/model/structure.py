@@ -19,7 +19,7 @@ from kratos_lite.model.attachments import AddedMass, AttachedMatrix, Attachment,
 from kratos_lite.model.free_motions import FreeMotions, free_motions
 from kratos_lite.model.joints import check_coincident, check_joints
 from kratos_lite.model.loads import Load, ScaledLoad
-from kratos_lite.model.loads.base import key_of, warnings_of
+from kratos_lite.model.loads.base import key_of
 from kratos_lite.model.local_axes import Cartesian, LocalAxes, normal_of_plane
 from kratos_lite.model.locking import check_locking
 from kratos_lite.model.matching import BoltForce, Cut, Periodic
@@ -700,6 +700,5 @@ CHECKS: tuple[Callable[[Structure, Sequence[ElementGroup]], Iterable[str]], ...]
     lambda model, groups: model.supports.check_used(),
     lambda model, groups: [text for tie in model.supports.ties for text in tie._check(groups, model.motion)],
     lambda model, groups: checks.check_attached(model.attached is not None, model.motion),
-    lambda model, groups: warnings_of(model.loads, model.mesh, groups),
 )
 """What is checked of each model with sound cells: a check returns warnings, or raises an error."""

@@ -1,11 +1,13 @@
 """Solutions to a requested accuracy: the true error is at most the reported one, and the model stays."""
 
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import kratos_lite as kl
+from kratos_lite.analysis.adaptive_levels import Level
 from kratos_lite.io.writers.results import summary
 from kratos_lite.verification import scenes
 from kratos_lite.verification.concentrations import hole
@@ -47,6 +49,13 @@ def test_the_true_error_is_at_most_the_reported_one(make, error, round_):
     for part, axes in round_.items():
         r = np.linalg.norm(result.mesh.points[result.mesh.nodes(part), :axes], axis=1)
         assert np.abs(r - 1).max() < 1e-3
+
+
+def test_changes_since_an_earlier_level_tell_the_true_error():
+    """Nested meshes: ‖u - u_H‖² = ‖u - u_h‖² + ‖u_h - u_H‖²; estimates here are half of the true errors."""
+    true = np.array([1.0, 0.8, 0.5, 0.45])
+    level = SimpleNamespace(trail=list(zip(true / 2, true**2 - true[-1] ** 2, strict=True)), order=2)
+    assert abs(Level.corrected.func(level) - 0.45) < 1e-12
 
 
 def bar(cells=(4, 1, 1), **options):

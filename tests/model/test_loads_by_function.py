@@ -96,6 +96,8 @@ def test_a_jump_inside_elements_is_a_warning_that_names_the_part(load, part):
     (warning,) = model.solve().report.warnings
     assert part in warning
     assert "jumps or peaks inside elements" in warning
+    for result in (model.solve_cases({"a": load})["a"], model.solve(error=0.9)):
+        assert sum("jumps or peaks" in text for text in result.report.warnings) == 1
     model.loads.clear()
     model.add(kl.Pressure("z+", lambda X: 1e3 * np.sin(3 * X[:, 0])), amplitude=lambda t: 2.0 + t)
     assert model.solve().report.warnings == []
