@@ -5,8 +5,8 @@ A machine without a compiler installs the package all the same and computes with
 Environment
 -----------
 KRATOS_LITE_BUILD : ``compiled`` makes a kernel that cannot be built an error, ``pure`` builds none: the wheel
-    then serves every platform. Else kernels are built where that is possible, and for the instruction set of this
-    machine alone where the source tree itself is installed (``-e``), in two thirds of the time.
+    then serves every platform. Else kernels are built where that is possible, and for the instruction set of
+    this machine alone where the source tree itself is installed (``-e``), in two thirds of the time.
 """
 
 import os
@@ -49,7 +49,7 @@ class Build(build_ext):
         super().build_extensions()
 
     def _instruction_set(self) -> list[str]:
-        """Return the macro for kernels of this machine's instruction set; none where the compiler cannot tell."""
+        """Return the macro for the instruction set of this machine; none where the compiler cannot tell."""
         ask = [self.compiler.compiler_so[0], "-march=native", "-dM", "-E", "-x", "c", os.devnull]
         try:
             macros = subprocess.run(ask, capture_output=True, text=True, check=True).stdout
