@@ -91,11 +91,6 @@ class Card:
             self.wrong(f"{name}= is missing")
         return self.options.get(name) or default or ""
 
-    @property
-    def amplitude(self) -> str:
-        """The name of its amplitude, or none."""
-        return self.options.get("AMPLITUDE", "").upper()
-
     def check_options(self, known: tuple[str, ...]) -> None:
         """Raise InputError for an option that is not known."""
         for name in self.options:

@@ -15,8 +15,8 @@ import numpy as np
 from kratos_lite.analysis.model import Model
 from kratos_lite.assembly.sparsity_pattern import dofs_of
 from kratos_lite.io.abaqus.cards import Card, Row
+from kratos_lite.io.abaqus.materials import Axes
 from kratos_lite.io.abaqus.mesh import FINITE, Cells, Geometry
-from kratos_lite.io.abaqus.supports import Axes
 from kratos_lite.mesh import Mesh
 from kratos_lite.mesh.join import split
 from kratos_lite.model.attachments import OnNodes

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, field, replace
+from copy import deepcopy
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +12,9 @@ import numpy as np
 from kratos_lite.errors import InputError, naming, nearest
 from kratos_lite.io.abaqus.cards import Card, read_cards
 from kratos_lite.io.abaqus.couplings import Connections
-from kratos_lite.io.abaqus.loads import Acting, read_load
-from kratos_lite.io.abaqus.materials import Definition, axes_of, orientation
+from kratos_lite.io.abaqus.loads import OPTIONS, Acting, read_row
+from kratos_lite.io.abaqus.materials import Axes, Definition, axes_of, orientation
 from kratos_lite.io.abaqus.mesh import Geometry
-from kratos_lite.io.abaqus.supports import Axes, Nodal, boundary
 from kratos_lite.model.local_axes import LocalAxes
 from kratos_lite.time_series import TimeSeries
 from kratos_lite.typing import Array
@@ -80,7 +80,7 @@ class Step:
     procedure: Card | None = None
     damping: Card | None = None  # *MODAL DAMPING
     outputs: list[Card] = field(default_factory=list)
-    held: Nodal = field(init=False)
+    amplitudes: list[TimeSeries] = field(default_factory=list)  # over its time
     acting: Acting = field(init=False)
 
     @property
@@ -104,6 +104,11 @@ class Step:
         """Its duration; 0 of modes and the like, which take no time."""
         numbers = [*self.numbers(), 1.0, 1.0] if len(self.numbers()) != 1 else [1.0, 1.0]
         return numbers[1] if self.kind in ("STATIC", "DYNAMIC", "MODALDYNAMIC") else 0.0
+
+    @property
+    def ends(self) -> list[float]:
+        """Its amplitudes at its end."""
+        return [series(self.period) for series in self.amplitudes]
 
     @property
     def ramps(self) -> bool:
@@ -140,7 +145,8 @@ class Deck:
         self.in_total_time = set[str]()  # amplitudes
         self.start = dict[str, Array]()  # DISPLACEMENT and VELOCITY (n, 3) at the beginning
         self.stresses = list[Card]()  # at the beginning
-        self.held, self.acting = Nodal.none(n), Acting.none(self.mesh)
+        lines = sum(card.data.count(b"\n") for card in cards if card.keyword == "DLOAD")
+        self.acting = Acting(n, self.mesh.n_elements, lines + 1)  # a line is a body at most
         self.axes = self.connections.axes = Axes(np.full(n, -1))
         self.initial = np.zeros(n)  # temperatures
         self.steps = list[Step]()
@@ -244,11 +250,6 @@ class Deck:
         """Read a card that connects nodes."""
         getattr(self.connections, card.keyword.lower())(card)
 
-    def boundary(self, card: Card) -> None:
-        """Read *BOUNDARY, of the model or of a step."""
-        card = self._checked(card, "BOUNDARY")
-        boundary(card, self.held, self.geometry)
-
     # ---- steps ----------------------------------------------------------------------------------------
 
     def step(self, card: Card) -> None:
@@ -277,19 +278,33 @@ class Deck:
             step.card.wrong(f"PERTURBATION is supported with *FREQUENCY; got *{card.keyword}")
         step.procedure = card
         if card.keyword == "BUCKLE":  # under its own loads alone
-            self.acting = Acting.none(self.mesh)
+            self.acting.clear(*(self.acting.keys() - {"BOUNDARY"}))
 
     def modal_damping(self, card: Card) -> None:
         """Read *MODAL DAMPING."""
         card.check_options(("RAYLEIGH",))
         self._in_step(card).damping = card
 
-    def load(self, card: Card) -> None:
-        """Read a card of loads."""
-        if self._in_step(card).procedure is None:
+    def act(self, card: Card) -> None:
+        """Read a card of supports or loads."""
+        kind = card.keyword.replace("DSLOAD", "DLOAD")
+        if kind != "BOUNDARY" and self._in_step(card).procedure is None:
             card.wrong("it belongs after the procedure of the step, such as *STATIC")
-        card = self._checked(card, card.keyword.replace("DSLOAD", "DLOAD"))
-        read_load(card, self.acting, self.geometry, len(self.steps) + 1)
+        card.check_options(("OP", "AMPLITUDE", *OPTIONS[card.keyword]))
+        if "FIXED" in card.options:
+            card.wrong("option FIXED is not supported; give the value")
+        if (op := card.options.get("OP", "MOD").upper()) not in ("NEW", "MOD"):
+            card.wrong(f"OP is NEW or MOD; got {op}")
+        if op == "NEW" and kind in self._given:
+            self.notes.append(f"{card.place}: OP=NEW counts on the first *{kind} of a step alone")
+        elif op == "NEW":
+            self.acting.clear(kind, *{"CLOAD": ["IMAGINARY"], "DLOAD": ["BODIES"]}.get(kind, ()))
+        self._given.add(kind)
+        known, name = ["", *self.amplitudes], card.options.get("AMPLITUDE", "").upper()
+        if name not in known:
+            card.wrong(f"there is no *AMPLITUDE {name}.{nearest(name, self.amplitudes)}")
+        for row in card.rows():
+            read_row(card, row, self.acting, self.geometry, known.index(name), len(self.steps) + 1)
 
     def output(self, card: Card) -> None:
         """Read a card that asks for results."""
@@ -305,27 +320,18 @@ class Deck:
         step = self._in_step(card)
         if step.procedure is None:
             step.card.wrong("the step has no procedure such as *STATIC")
-        if self.acting.imaginary.given.any() and step.kind != "STEADYSTATEDYNAMICS":
+        if "IMAGINARY" in self.acting and step.kind != "STEADYSTATEDYNAMICS":
             step.card.wrong(f"LOAD CASE=2 belongs to *STEADY STATE DYNAMICS; got *{step.kind}")
-        step.held, step.acting = self.held.copy(), self.acting.copy()
+        step.acting = deepcopy(self.acting)
+        step.amplitudes = [
+            TimeSeries(series.times - step.start * (name in self.in_total_time), series.values)
+            for name, series in self.amplitudes.items()
+        ]
         self.steps.append(step)
         self.open = None
         # What a later step does not give again keeps the value that it has at the end of this one.
-        end = {
-            name: self.amplitudes[name](step.period) for name in self.amplitudes.keys() - self.in_total_time
-        }
-        self.acting.settle(end)
-        self.held.settle(end)
-
-    def _checked(self, card: Card, kind: str) -> Card:
-        """Check the amplitude of a card; OP=NEW counts on the first of its kind in a step alone."""
-        if (name := card.options.get("AMPLITUDE", "").upper()) and name not in self.amplitudes:
-            card.wrong(f"there is no *AMPLITUDE {name}.{nearest(name, self.amplitudes)}")
-        if kind in self._given and card.options.get("OP", "").upper() == "NEW":
-            self.notes.append(f"{card.place}: OP=NEW counts on the first *{kind} of a step alone")
-            card = replace(card, options={**card.options, "OP": "MOD"})
-        self._given.add(kind)
-        return card
+        goes_on = [name in self.in_total_time for name in self.amplitudes]
+        self.acting.settle(np.where(goes_on, np.nan, step.ends))
 
     def _in_step(self, card: Card) -> Step:
         if self.open is None:
@@ -342,13 +348,13 @@ def _new_name(card: Card, known: Collection[str]) -> str:
 CARDS: dict[str, Callable[[Deck, Card], None]] = {
     "MATERIAL": Deck.material, "SOLIDSECTION": Deck.section, "ORIENTATION": Deck.orientation,
     "AMPLITUDE": Deck.amplitude, "TRANSFORM": Deck.transform, "INITIALCONDITIONS": Deck.initial_conditions,
-    "MODALDAMPING": Deck.modal_damping, "BOUNDARY": Deck.boundary,
+    "MODALDAMPING": Deck.modal_damping,
     "STEP": Deck.step, "ENDSTEP": Deck.end_step,
     **dict.fromkeys(PROCEDURES, Deck.procedure),
     "PRE-TENSIONSECTION": lambda deck, card: None,  # read with the mesh
     **dict.fromkeys("RIGIDBODY COUPLING KINEMATIC DISTRIBUTING".split(), Deck.connection),
     **dict.fromkeys("DISTRIBUTINGCOUPLING TIE SPRING MASS EQUATION".split(), Deck.connection),
-    **dict.fromkeys(("CLOAD", "DLOAD", "DSLOAD", "TEMPERATURE"), Deck.load),
+    **dict.fromkeys(OPTIONS, Deck.act),
     **dict.fromkeys(OUTPUTS, Deck.output),
 }  # fmt: skip
 """What reads each card."""

@@ -1,109 +1,146 @@
-"""Loads of a deck: the cards of loads, and what acts at the end of a step."""
+"""Supports and loads of a deck: the cards that give them, and what acts at the end of a step."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any, TypeAlias
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
 from kratos_lite.io.abaqus.cards import Card, Row
 from kratos_lite.io.abaqus.mesh import Geometry, face_number
-from kratos_lite.io.abaqus.supports import Nodal
-from kratos_lite.mesh import Mesh
+from kratos_lite.typing import Array, ArrayLike, Ints, Mask, Numbers
 
 Body: TypeAlias = tuple[str, str, tuple[float, ...]]
-"""A load on elements: its kind, their set, and its direction or axis."""
+"""A load on elements of size 1: GRAV or CENTRIF, their set, and its direction or axis."""
+OPTIONS = {"BOUNDARY": ("FIXED",), "CLOAD": ("LOADCASE",), "DLOAD": (), "DSLOAD": (), "TEMPERATURE": ()}
+"""Cards of supports and loads, and their options beside OP and AMPLITUDE."""
 
 
 @dataclass
-class Acting:
-    """The loads at the end of a step."""
+class Given:
+    """Values at nodes along directions, of elements on faces, or of bodies, (n, k)."""
 
-    forces: Nodal
-    imaginary: Nodal  # forces that are a quarter of a period ahead, in *STEADY STATE DYNAMICS
-    temperatures: Nodal  # (n, 1)
-    pressures: Nodal  # (m, 6) of elements on their faces
-    bodies: dict[Body, tuple[float, str, int]] = field(default_factory=dict)
-    """Size, amplitude and step of GRAV and CENTRIF."""
+    given: Mask
+    values: Array
+    amplitudes: Numbers  # from 1 in the order of the deck; 0 without
+    steps: Numbers  # in which each was given
 
-    @classmethod
-    def none(cls, mesh: Mesh) -> Acting:
-        """Return no load on a mesh."""
-        n = mesh.n_nodes
-        return cls(Nodal.none(n), Nodal.none(n), Nodal.none(n, 1), Nodal.none(mesh.n_elements, 6))
+    def put(self, rows: Ints, axes: int | slice, value: float, amplitude: int) -> None:
+        """Give a value to rows."""
+        self.given[rows, axes], self.values[rows, axes] = True, value
+        self.amplitudes[rows, axes] = amplitude
 
-    @property
-    def arrays(self) -> tuple[Nodal, ...]:
-        """What is given at nodes and faces."""
-        return self.forces, self.imaginary, self.temperatures, self.pressures
-
-    def copy(self) -> Acting:
-        """Return a copy."""
-        forces, imaginary, temperatures, pressures = (some.copy() for some in self.arrays)
-        return Acting(forces, imaginary, temperatures, pressures, dict(self.bodies))
-
-    def settle(self, factors: dict[str, float]) -> None:
-        """Let amplitudes end at factors."""
-        for some in self.arrays:
-            some.settle(factors)
-        for key, (size, name, step) in self.bodies.items():
-            if name in factors:
-                self.bodies[key] = factors[name] * size, "", step
-
-    def names(self) -> set[str]:
-        """Return the amplitudes of the loads."""
-        given = {name for some in self.arrays for name, _ in some.by_amplitude()}
-        return (given | {name for _, name, _ in self.bodies.values()}) - {""}
+    def add(self, rows: Ints, axes: Ints | int, value: float, amplitude: int, step: int) -> None:
+        """Add a value to those of the same step, and replace those of earlier ones."""
+        at = rows, np.broadcast_to(axes, rows.shape)
+        self.values[at] = np.where(self.steps[at] < step, 0.0, self.values[at])
+        np.add.at(self.values, at, value)
+        self.given[at], self.steps[at], self.amplitudes[at] = True, step, amplitude
 
 
-def read_load(card: Card, acting: Acting, geometry: Geometry, step: int) -> None:
-    """Read *CLOAD, *DLOAD, *DSLOAD or *TEMPERATURE; OP=NEW removes the loads of its kind."""
-    card.check_options(("OP", "AMPLITUDE", *["LOADCASE"] * (card.keyword == "CLOAD")))
-    forces = acting.imaginary if card.options.get("LOADCASE") == "2" else acting.forces
-    if (op := card.options.get("OP", "MOD").upper()) not in ("NEW", "MOD"):
-        card.wrong(f"OP is NEW or MOD; got {op}")
-    if op == "NEW":
-        kinds: dict[str, tuple[Any, ...]] = {"CLOAD": (forces,), "TEMPERATURE": (acting.temperatures,)}
-        kinds |= dict.fromkeys(("DLOAD", "DSLOAD"), (acting.pressures, acting.bodies))
-        for loads in kinds[card.keyword]:
-            loads.clear()
-    for row in card.rows():
-        if card.keyword == "CLOAD":
-            _force(row, forces, card.amplitude, geometry, step)
-        elif card.keyword == "TEMPERATURE":
-            nodes = geometry.nodes(row.text(0), row)
-            acting.temperatures.put(nodes, 0, row.number(1), card.amplitude)
-        else:
-            _distributed(row, acting, card, geometry, step)
+class Acting(dict[str, Given]):
+    """What acts at the end of a step, by cards; IMAGINARY are forces a quarter of a period ahead."""
+
+    def __init__(self, nodes: int, elements: int, bodies: int) -> None:
+        self.shapes = {"DLOAD": (elements, 6), "TEMPERATURE": (nodes, 1), "BODIES": (bodies, 1)}
+        self.shapes |= dict.fromkeys(("BOUNDARY", "CLOAD", "IMAGINARY"), (nodes, 3))
+
+    def __missing__(self, kind: str) -> Given:
+        """Return nothing of a kind; many do not occur in a deck."""
+        shape = self.shapes[kind]
+        none = np.zeros(shape, dtype=np.int16), np.zeros(shape, dtype=np.int16)
+        self[kind] = Given(np.zeros(shape, dtype=bool), np.zeros(shape), *none)
+        return self[kind]
+
+    def clear(self, *kinds: str) -> None:
+        """Remove what some cards gave."""
+        for kind in kinds:
+            self.pop(kind, None)
+
+    def settle(self, ends: ArrayLike) -> None:
+        """Let amplitudes end at factors, all but those of nan."""
+        for one in self.values() if np.size(ends) else ():
+            factors = np.append(np.nan, ends)[one.amplitudes]
+            over = np.isfinite(factors)
+            one.values[over] *= factors[over]
+            one.amplitudes[over] = 0
 
 
-def _force(row: Row, forces: Nodal, amplitude: str, geometry: Geometry, step: int) -> None:
-    """Read a row of *CLOAD."""
-    axis, nodes = row.integer(1), geometry.nodes(row.text(0), row)
-    if axis in (4, 5, 6):
-        nodes = geometry.rotations(nodes, row)
-    if axis not in range(1, 7) or not len(nodes):
-        row.wrong(f"a force on solids has direction 1, 2 or 3, on reference nodes 1 … 6; got {axis}")
-    forces.add(nodes, (axis - 1) % 3, row.number(2, 0.0), amplitude, step)
+def courses(each: Sequence[Given], none: int = 0) -> tuple[Mask, Ints, list[Ints]]:
+    """Return what some step gives, the number of its course, (n, k), and the amplitudes of each course.
+
+    A step that does not give it counts as having the amplitude `none`.
+    """
+    given = np.any([one.given for one in each], axis=0)
+    every = np.stack([np.where(one.given, one.amplitudes, none) for one in each], axis=-1)
+    some, numbers = given & every.any(axis=-1), np.zeros(given.shape, dtype=np.int64)
+    found, of = np.unique(every[some], axis=0, return_inverse=True)
+    numbers[some] = 1 + of.ravel()
+    return given, numbers, [np.zeros(len(each), dtype=int), *found]
 
 
-def _distributed(row: Row, acting: Acting, card: Card, geometry: Geometry, step: int) -> None:
-    """Read a row of *DLOAD or *DSLOAD."""
-    kind = row.text(1).upper()
-    if card.keyword == "DSLOAD":
-        if kind != "P":
-            row.wrong(f"a load on a surface is P, a pressure; got {row.text(1)}")
-        faces = geometry.surface_faces(row.text(0), row)
-    elif kind in ("GRAV", "CENTRIF"):
-        size, *places = row.numbers(4 if kind == "GRAV" else 7, 2)
-        key, ids = (kind, row.text(0).upper(), tuple(places)), geometry.elements_of(row.text(0), row)
-        for other in acting.bodies.keys() - {key}:
-            if kind == other[0] == "CENTRIF" and np.isin(ids, geometry.elements_of(other[1])).any():
-                row.wrong("an element turns about another axis already, and CalculiX counts one; remove one")
-        old = acting.bodies.get(key, (0.0, "", 0))
-        acting.bodies[key] = size + old[0] * (old[2] == step), card.amplitude, step
-        return
+def read_row(card: Card, row: Row, acting: Acting, geometry: Geometry, amplitude: int, step: int) -> None:
+    """Read a row of *BOUNDARY, *CLOAD, *DLOAD, *DSLOAD or *TEMPERATURE."""
+    if card.keyword == "BOUNDARY":
+        _support(row, acting["BOUNDARY"], geometry, amplitude)
+    elif card.keyword == "CLOAD":
+        axis, nodes = row.integer(1), geometry.nodes(row.text(0), row)
+        if axis in (4, 5, 6):
+            nodes = geometry.rotations(nodes, row)
+        if axis not in range(1, 7) or not len(nodes):
+            row.wrong(f"a force on solids has direction 1, 2 or 3, on reference nodes 1 … 6; got {axis}")
+        kind = "IMAGINARY" if card.options.get("LOADCASE") == "2" else "CLOAD"
+        acting[kind].add(nodes, (axis - 1) % 3, row.number(2, 0.0), amplitude, step)
+    elif card.keyword == "TEMPERATURE":
+        nodes = geometry.nodes(row.text(0), row)
+        acting["TEMPERATURE"].put(nodes, 0, row.number(1), amplitude)
+    elif card.keyword == "DLOAD" and row.text(1).upper() in ("GRAV", "CENTRIF"):
+        _body(row, acting["BODIES"], geometry, amplitude, step)
     else:
-        faces = geometry.faces(geometry.elements_of(row.text(0), row), face_number(kind, row, "P"), row)
-    acting.pressures.add(faces[:, 0], faces[:, 1], row.number(2), card.amplitude, step)
+        faces = _faces(row, card, geometry)
+        acting["DLOAD"].add(faces[:, 0], faces[:, 1], row.number(2), amplitude, step)
+
+
+def _support(row: Row, held: Given, geometry: Geometry, amplitude: int) -> None:
+    """Read a row of *BOUNDARY."""
+    rows = geometry.nodes(row.text(0), row)
+    word = row.text(1)
+    if not word.isdigit():
+        row.wrong(f"{word!r} is no number of a direction; 1, 2, 3 are x, y, z")
+    first, last = row.integer(1), row.integer(2, row.integer(1))
+    if not 1 <= first <= last:
+        row.wrong(f"directions {first} to {last}: give the first and the last of 1, 2, 3")
+    if first == 11:
+        row.wrong("temperatures are given by *TEMPERATURE; degree of freedom 11 is not supported")
+    value = row.number(3, 0.0)
+    amplitude = amplitude if value else 0
+    held.put(rows, slice(first - 1, min(last, 3)), value, amplitude)
+    if last > 3:  # rotations, which solids do not have
+        turned = geometry.rotations(rows, row)
+        held.put(turned, slice(max(first, 4) - 4, min(last, 6) - 3), value, amplitude)
+
+
+def _body(row: Row, bodies: Given, geometry: Geometry, amplitude: int, step: int) -> None:
+    """Read GRAV or CENTRIF."""
+    kind = row.text(1).upper()
+    size, *places = row.numbers(4 if kind == "GRAV" else 7, 2)
+    body, ids = (kind, row.text(0).upper(), tuple(places)), geometry.elements_of(row.text(0), row)
+    known = geometry.bodies
+    for other in (known[i] for i in np.flatnonzero(bodies.given) if known[i] != body):
+        if kind == other[0] == "CENTRIF" and np.isin(ids, geometry.elements_of(other[1])).any():
+            row.wrong("an element turns about another axis already, and CalculiX counts one; remove one")
+    if body not in known:
+        known.append(body)
+    bodies.add(np.array([known.index(body)]), 0, size, amplitude, step)
+
+
+def _faces(row: Row, card: Card, geometry: Geometry) -> Ints:
+    """Return the faces (k, 2) of a pressure."""
+    kind = row.text(1).upper()
+    if card.keyword == "DLOAD":
+        return geometry.faces(geometry.elements_of(row.text(0), row), face_number(kind, row, "P"), row)
+    if kind != "P":
+        row.wrong(f"a load on a surface is P, a pressure; got {row.text(1)}")
+    return geometry.surface_faces(row.text(0), row)

@@ -13,8 +13,9 @@ from kratos_lite.materials import Material
 from kratos_lite.materials.anisotropic3d import Anisotropic3D
 from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.materials.orthotropic3d import Orthotropic3D
+from kratos_lite.mesh import Mesh
 from kratos_lite.model.local_axes import Cartesian, Cylindrical, LocalAxes
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Ints
 
 ELASTIC = {"ISO": 2, "ORTHO": 9, "ENGINEERINGCONSTANTS": 9, "ANISO": 21}
 EXPANSION = {"ISO": 1, "ORTHO": 3, "ANISO": 6}
@@ -199,3 +200,19 @@ def axes_of(row: Row, system: str) -> LocalAxes:
     if kind not in ("R", "C"):
         row.wrong(f"axes are RECTANGULAR or CYLINDRICAL; got {system}")
     return Cartesian(a, b) if kind == "R" else Cylindrical(a, b - a)
+
+
+@dataclass
+class Axes:
+    """Local axes of nodes (*TRANSFORM)."""
+
+    of_node: Ints  # index of `each`, or -1
+    each: list[LocalAxes] = field(default_factory=list)
+
+    def directions(self, mesh: Mesh, rows: Ints) -> Array:
+        """Return the axes (m, 3, 3) of nodes."""
+        out = np.broadcast_to(np.eye(3), (len(rows), 3, 3)).copy()
+        for i, axes in enumerate(self.each):
+            of = self.of_node[rows] == i
+            out[of] = axes.directions(mesh.points[rows[of]])
+        return out

@@ -75,6 +75,9 @@ class Geometry:
         self.rotation: dict[int, int] = {}  # ids of reference nodes, and of those that are their rotations
         self.rigid: set[int] = set()  # those of rigid bodies
         self.masses: list[tuple[Ints, Ints, float]] = []  # ids of elements, rows of nodes, kg
+        self.bodies: list[
+            tuple[str, str, tuple[float, ...]]
+        ] = []  # GRAV or CENTRIF, ELSET, direction or axis
 
     def node(self, card: Card) -> None:
         """Read *NODE."""

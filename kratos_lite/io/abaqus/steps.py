@@ -3,32 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from copy import copy
+from copy import copy, deepcopy
+from dataclasses import replace
 from itertools import takewhile
 from math import ceil, pi
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
 from kratos_lite.analysis.integrators import HHT
 from kratos_lite.analysis.model import Model
 from kratos_lite.errors import naming
-from kratos_lite.io.abaqus.building import Building
-from kratos_lite.io.abaqus.cards import Row
+from kratos_lite.io.abaqus.building import MOVING, Building
+from kratos_lite.io.abaqus.cards import Card, Row
 from kratos_lite.io.abaqus.deck import Deck, Step
-from kratos_lite.io.abaqus.loads import Acting
 from kratos_lite.io.case import Case, TimeIntegration
-from kratos_lite.time_series import TimeSeries
 from kratos_lite.typing import Array
 
-Amplitudes: TypeAlias = dict[str, TimeSeries | None]
-
-AT_ONCE = 1e-9
-"""Fraction of a step in which loads act that do not grow over it."""
 GROWTH = 1.5
 """Of automatic increments, from one to the next, as in CalculiX."""
-MOVING = ("DYNAMIC", "MODALDYNAMIC")
 FINER = 20
 """Our steps in an increment of *MODAL DYNAMIC, which answers exactly to loads that are linear in it."""
 
@@ -54,9 +48,9 @@ class _Cases(Building):
         self.made = cases = list[tuple[Case, list[Step]]]()
         steps = self.deck.steps
         if not steps:
-            model = self.model()
-            self.hold(model, self.deck.held)
-            cases.append((Case(model), []))
+            rest = Step(Card("STEP", {}, str(self.deck.path), 1, b""), False, 0.0)
+            rest.acting = self.deck.acting
+            cases.append((Case(self._loaded(rest)), []))
         while steps:
             kind, many = steps[0].kind, self._takes_time(steps[0])
             alike = list(takewhile(lambda step: step.kind == kind, steps)) if many else steps[:1]  # noqa: B023
@@ -69,16 +63,12 @@ class _Cases(Building):
 
     def _loaded(self, step: Step) -> Model:
         """Return the model with the supports and loads at the end of a linear step."""
-        T, start = step.acting.temperatures, self.deck.initial
-        now = np.where(T.given[:, 0], T.values[:, 0], start) if T.given.any() else None
-        model, held = self.model(now=now), step.held.copy()
-        factor = {name: series(step.period) for name, series in self._series(step).items() if series}
-        acting = step.acting.copy()
-        held.settle(factor)
-        acting.settle(factor)
-        self.hold(model, held)
-        for load, _ in self.loads(model, acting):
-            model.add(load)
+        end, start = replace(step), self.deck.initial
+        end.acting = deepcopy(step.acting)
+        end.acting.settle(step.ends)
+        T = end.acting["TEMPERATURE"]
+        model = self.model(now=np.where(T.given[:, 0], T.values[:, 0], start) if T.given.any() else None)
+        self.act(model, [end], at_rest=True)
         return model
 
     def _static(self, *steps: Step) -> Case:
@@ -87,7 +77,8 @@ class _Cases(Building):
 
     def _frequency(self, step: Step) -> Case:
         before = self.last("STATIC", step) if step.perturbs else None
-        if before is not None and (before.held.given != step.held.given).any():
+        held = [one.acting["BOUNDARY"].given for one in (before or step, step)]
+        if (held[0] != held[1]).any():
             step.card.wrong("frequencies with other supports than their preload are not supported")
         after = self._case_of(before) if before is not None and self.is_nonlinear(before) else None
         if after is None:
@@ -138,7 +129,7 @@ class _Cases(Building):
         if len(rayleigh) > 1:
             steps[1].card.wrong("another damping than that of the step before is not supported")
         self._modes(steps[0])
-        if any(damping := rayleigh.pop()) and steps[0].held.values.any():
+        if any(damping := rayleigh.pop()) and steps[0].acting["BOUNDARY"].values.any():
             steps[0].card.wrong("supports that move with *MODAL DAMPING are not supported")
         model.notes.append("*MODAL DYNAMIC: all modes answer, not those of *FREQUENCY alone")
         return Case(model, self._time(model, steps, FINER if steps[0].is_direct else 1, None, damping))
@@ -148,14 +139,12 @@ class _Cases(Building):
         assert step.procedure is not None
         if step.procedure.option("HARMONIC", "YES").upper() != "YES":
             step.procedure.wrong("HARMONIC=NO is not supported; loads are harmonic")
-        if step.acting.names() or step.held.values.any():
+        if any(one.amplitudes.any() for one in step.acting.values()) or step.acting["BOUNDARY"].values.any():
             step.card.wrong("amplitudes over the frequency and supports that move are not supported")
         modes, model = self._modes(step), self.model()
-        self.hold(model, step.held)
-        quarter = Acting.none(model.mesh)
-        quarter.forces = step.acting.imaginary
-        loads: list[Any] = [load for load, _ in self.loads(model, step.acting)]
-        loads += [(load, 1j) for load, _ in self.loads(model, quarter)]
+        self.act(model, [step], at_rest=True)
+        loads: list[Any] = [*model.loads]
+        loads += [(load, 1j) for load, _ in self.loads(model, [step], True, {"IMAGINARY": "_forces"})]
         options: dict[str, Any] = {"loads": loads, "modes": modes}
         if step.damping is not None and "RAYLEIGH" not in step.damping.options:
             options["damping"] = damping = np.zeros(modes)
@@ -229,79 +218,14 @@ class _Cases(Building):
         for before in self.earlier(steps[0]):
             if before.period and (before.kind in MOVING or not goes_on.get(steps[0].kind)):
                 steps[0].card.wrong("to go on from the state of another kind of step is not supported")
-        given = np.any([step.acting.temperatures.given[:, 0] for step in steps], axis=0)
+        T = [step.acting["TEMPERATURE"] for step in steps]
+        if self.deck.initial.any() and any(one.amplitudes.any() for one in T):
+            steps[0].card.wrong("amplitudes of temperatures need initial temperatures of 0 in this step")
+        given = np.any([one.given[:, 0] for one in T], axis=0)
         now = np.where(given, np.nan, self.deck.initial) if given.any() else None  # those of each are several
-        model, series = self.model(large, now), [self._series(step) for step in steps]
-        self._move(model, steps, series)
-        ends = np.cumsum([step.period for step in steps]).tolist()
-        for k, step in enumerate(steps):
-            T = step.acting.temperatures
-            if self.deck.initial.any() and any(name for name, _ in T.by_amplitude()):
-                step.card.wrong("amplitudes of temperatures need initial temperatures of 0 in this step")
-            if k and step.ramps and step.acting.names():
-                step.card.wrong("amplitudes after the first of several nonlinear steps are not supported")
-            for load, name in self.loads(model, step.acting, ends[k]):
-                each = [series[k][name] if one is step else None for one in steps]
-                model.add(load, amplitude=_course(steps, np.eye(len(steps))[k], each))
+        model = self.model(large, now)
+        self.act(model, steps)
         return model
-
-    def _series(self, step: Step) -> Amplitudes:
-        """Return the amplitudes by names over the time of a step, and None for what has none."""
-        found: Amplitudes = {"": None}
-        for name, series in self.deck.amplitudes.items():
-            shift = step.start if name in self.deck.in_total_time else 0.0
-            found[name] = TimeSeries(series.times - shift, series.values)
-        return found
-
-    def _move(self, model: Model, steps: Sequence[Step], series: Sequence[Amplitudes]) -> None:
-        """Support a model in steps in turn, with the displacements that each prescribes."""
-        held, each = steps[0].held.copy(), [step.held for step in steps]
-        given: Any = np.stack([one.given for one in each], axis=-1)
-        values = np.where(given, np.stack([one.values for one in each], axis=-1), np.nan)
-        held.given = given.any(axis=-1)
-        moved = held.given & (values != 0).any(axis=-1)
-        changed = (moved & ~given.all(axis=-1)).any(axis=1)
-        if changed.any() and steps[0].kind in MOVING:
-            steps[1].card.wrong("supports that change between steps in time are not supported")
-        if (changed & ~model.mesh.used_nodes()).any() and self.deck.connections.springs:
-            steps[1].card.wrong("supports of reference nodes that change are not supported with springs")
-        numbers = np.stack([one.amplitudes for one in each], axis=-1)
-        both = np.column_stack([values[moved], np.where(given, numbers, 0)[moved]])
-        alike, of = np.unique(both, axis=0, return_inverse=True)
-        held.amplitudes[moved], held.names = 1 + of.ravel(), ["", *map(str, range(len(alike)))]
-        courses = {}
-        for i, row in enumerate(alike):
-            sizes, which = np.split(row, 2)
-            names = [s[one.names[int(n)]] for s, one, n in zip(series, each, which, strict=True)]
-            courses[str(i)] = _course(steps, sizes, names)
-        self.hold(model, held, courses)
-
-
-def _course(steps: Sequence[Step], sizes: Array, amplitudes: Sequence[TimeSeries | None]) -> Any:
-    """Return, by the time, what has a size in each of some steps, with an amplitude or without.
-
-    Without, it keeps it.  A size nan is None up to the end of its step; what follows it acts at once.
-    """
-    first = amplitudes[0](0.0) if amplitudes[0] else 0.0 if steps[0].ramps else 1.0
-    times, values, start, known = [0.0], [first * np.nan_to_num(sizes[0])], 0.0, np.isfinite(sizes)
-    for step, size, amplitude, grows in zip(steps, sizes, amplitudes, [True, *known], strict=False):
-        whole = step.period * (1.0 if step.ramps and grows else AT_ONCE)
-        inner, factors = np.zeros(0), [1.0, 1.0]
-        if amplitude is not None:
-            some = (amplitude.times > 0) & (amplitude.times < step.period)
-            whole, inner = AT_ONCE * step.period, amplitude.times[some]
-            factors = [amplitude(0.0), *amplitude.values[some], amplitude(step.period)]
-        times += [start + whole, *(start + inner), start + step.period]
-        values += [np.nan_to_num(size) * factor for factor in factors]
-        start += step.period
-    knots, at = np.unique(times, return_index=True)
-    course, ends = TimeSeries(knots, np.array(values)[at]), np.cumsum([step.period for step in steps])
-
-    def while_known(time: float) -> float | None:
-        k = min(int(np.searchsorted(ends, time * (1 - 1e-9))), len(steps) - 1)
-        return course(time) if known[k] or time <= 0 else None
-
-    return course if known.all() else while_known
 
 
 def _sweep(low: float, high: float, count: int, bias: float, modes: int) -> Callable[[Model], Array]:

@@ -95,6 +95,11 @@ STEPS: dict[str, tuple[str, str]] = {
         f"{FINE}.5,1.\n{EXACT}*BOUNDARY\nTOP,1,1,.1\n{PRINT}"
         f"{FINE}.25,1.\n{EXACT}*BOUNDARY, OP=NEW, AMPLITUDE=A\nBOTTOM,1,3\nTOP,1,1,.2\n{PRINT}",
     ),
+    "an amplitude after a step without": (
+        CUBE + AMPLITUDES,
+        f"{FINE}.5,1.\n{EXACT}*CLOAD\nTOP,1,20.\n{PRINT}"
+        f"{FINE}.25,1.\n{EXACT}*CLOAD, AMPLITUDE=A\n7,1,30.\n*DLOAD, AMPLITUDE=T\nEALL,P2,5.\n{PRINT}",
+    ),
     "rubber turns NLGEOM on": (RUBBER, f"*STEP\n*STATIC\n.5,1.\n{EXACT}*DLOAD\nEALL,P2,-50.\n{PRINT}"),
     "plastic flow and back": (
         PLASTIC,
