@@ -65,13 +65,16 @@ class Connections:
             self.geometry.surface_nodes(of.option("SURFACE"), of),
             ref,
             [axis for axis in axes if axis < 3],
-            card,
+            of,
         )
 
     def distributing(self, card: Card) -> None:
         """Read *DISTRIBUTING: a reference node moves as the nodes of faces do in the mean, by their areas."""
         # Σ w |u - u_ref - θ × (x - x_ref)|² is least, so that forces and moments go to nodes as in CalculiX.
         ref, of, axes = self._coupled(card)
+        named = [node for node, _ in self.geometry.references.values()]
+        if named.count(self.mesh.node_ids[ref]) > 1:
+            of.wrong("its reference node has another card, too; with *DISTRIBUTING give each one of its own")
         faces: Any = self.geometry.surface_blocks(of.option("SURFACE"), of)
         X = self.mesh.points
         w = Traction(faces, (1.0, 0.0, 0.0)).forces(self.mesh, [])[:, 0]
@@ -79,7 +82,7 @@ class Connections:
         R = rigid_modes(X[nodes], X[ref])
         B = R.T * np.repeat(w[nodes], 3)
         self._follow(
-            self._six(ref)[some], np.tile(dofs_of(nodes), (len(some), 1)), (np.linalg.pinv(B @ R) @ B)[some]
+            self._six(of)[some], np.tile(dofs_of(nodes), (len(some), 1)), (np.linalg.pinv(B @ R) @ B)[some]
         )
 
     def distributingcoupling(self, card: Card) -> None:
@@ -161,10 +164,9 @@ class Connections:
     def _node(self, card: Card, option: str) -> int:
         return int(self.geometry.nodes(card.option(option), card)[0])
 
-    def _six(self, ref: int) -> Ints:
-        """Return the degrees of freedom (6,) of a reference node, those of its rotations last."""
-        rotation = self.geometry.rotation[int(self.mesh.node_ids[ref])]
-        return dofs_of(np.append(ref, self.mesh.node_rows(np.array([rotation]))))
+    def _six(self, card: Card) -> Ints:
+        """Return the degrees of freedom (6,) of the reference node of a card, those of its rotation last."""
+        return dofs_of(self.mesh.node_rows(np.array(self.geometry.references[card.place])))
 
     def _coupled(self, card: Card) -> tuple[int, Card, list[int]]:
         """Return the reference node of the coupling that a card belongs to, its card, and its axes from 0."""
@@ -192,7 +194,7 @@ class Connections:
 
     def _rigid(self, nodes: Ints, ref: int, axes: list[int], card: Card) -> None:
         """Let nodes follow a reference node along some axes, u = u_ref + θ × (x - x_ref)."""
-        six = self._six(ref)
+        six = self._six(card)
         nodes = nodes[~np.isin(nodes, six // 3)]
         some = np.isin(np.tile(range(3), len(nodes)), axes)
         R = rigid_modes(self.mesh.points[nodes], self.mesh.points[ref])[some]

@@ -72,7 +72,8 @@ class Geometry:
         self.sets: dict[str, dict[str, list[Ints]]] = {"NSET": {}, "ELSET": {}}  # ids
         self._surfaces: dict[str, Card] = {}
         self.surfaces: dict[str, Ints] = {}  # rows of nodes, or faces (k, 2): rows of elements, face from 0
-        self.rotation: dict[int, int] = {}  # ids of reference nodes, and of those that are their rotations
+        # By the cards that name them, ids of a reference node and of the node that is its rotation.
+        self.references: dict[str, tuple[int, int]] = {}
         self.rigid: set[int] = set()  # those of rigid bodies
         self.masses: list[tuple[Ints, Ints, float]] = []  # ids of elements, rows of nodes, kg
         self.bodies: list[
@@ -170,13 +171,14 @@ class Geometry:
 
     def rotations(self, rows: Ints, row: Row) -> Ints:
         """Return the nodes whose displacements are the rotations of reference nodes among some nodes."""
-        known = np.array(list(self.rotation), dtype=np.int64)
+        rotation = dict(self.references.values())  # of several of a node the last, as in CalculiX
+        known = np.array(list(rotation), dtype=np.int64)
         refs = known[np.isin(known, self.mesh.node_ids[rows])].tolist()
         if alone := set(refs) & self.rigid:
             row.wrong(
                 f"rotations of the rigid body of node {min(alone)} are directions 1, 2, 3 of its ROT NODE"
             )
-        return self.mesh.node_rows(np.array([self.rotation[ref] for ref in refs], dtype=np.int64))
+        return self.mesh.node_rows(np.array([rotation[ref] for ref in refs], dtype=np.int64))
 
     def _surface(self, card: Card) -> Ints:
         """Return the nodes or faces of a surface."""
@@ -243,19 +245,16 @@ class Geometry:
         words = card.option("REFNODE"), card.option("ROTNODE", "0")
         if not all(word.isdigit() for word in words):
             card.wrong(f"REF NODE and ROT NODE are numbers of nodes; got {', '.join(words)}")
-        ref, rotation = map(int, words)
-        self.rotation[ref] = rotation or self.rotation.get(ref, 0)
+        self.references[card.place] = int(words[0]), int(words[1])
         if card.keyword == "RIGIDBODY":
-            self.rigid.add(ref)
+            self.rigid.add(int(words[0]))
 
     def _rotations(self, ids: Ints, points: Array) -> tuple[Ints, Array]:
         """Return ids and places of all nodes, with further ones where reference nodes have no ROT NODE."""
-        new = np.array([ref for ref, rotation in self.rotation.items() if not rotation], dtype=np.int64)
-        if not len(new):
-            return ids, points
-        at = rows_of_ids(ids, new)
-        more = ids.max() + 1 + np.arange(len(new))
-        self.rotation |= dict(zip(new.tolist(), more.tolist(), strict=True))
+        new = [(place, ref) for place, (ref, rotation) in self.references.items() if not rotation]
+        refs = np.array([ref for _, ref in new], dtype=np.int64)
+        at, more = rows_of_ids(ids, refs), ids.max() + 1 + np.arange(len(new))
+        self.references |= {place: (ref, i) for (place, ref), i in zip(new, more.tolist(), strict=True)}
         return np.append(ids, more), np.vstack([points, points[at]])
 
     def build(self, source: str) -> None:

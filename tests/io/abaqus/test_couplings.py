@@ -66,6 +66,14 @@ CASES = {
         REFS,
         COUPLED + "*KINEMATIC\n1,3\n*BOUNDARY\n20,4,6\n" + LARGE + "*CLOAD\n20,1,20.\n",
     ),
+    "two kinematic ones turn by themselves": (
+        REFS,
+        "*SURFACE, NAME=S, TYPE=NODE\n5\n6\n*SURFACE, NAME=T, TYPE=NODE\n7\n8\n"
+        "*COUPLING, REF NODE=20, SURFACE=S, CONSTRAINT NAME=A\n*KINEMATIC\n1,3\n"
+        "*COUPLING, REF NODE=20, SURFACE=T, CONSTRAINT NAME=B\n*KINEMATIC\n1,3\n"
+        + STATIC
+        + "*CLOAD\n20,1,1.\n20,4,.5\n20,5,.3\n20,6,.2\n",
+    ),
     "distributed": (
         REFS,
         COUPLED + "*DISTRIBUTING\n1,6\n" + STATIC + "*CLOAD\n20,1,1.\n20,3,1.\n20,4,1.\n20,6,1.\n",
@@ -215,6 +223,9 @@ WRONG = {  # text, and the message
     RIGID + LARGE + "*BOUNDARY\n20,1,1,.1\n": "with NLGEOM its rotation must be held at 0",
     RIGID.replace("=20", "=TOP"): "REF NODE and ROT NODE are numbers of nodes; got TOP, 21",
     "*KINEMATIC\n1,3\n": "it belongs after *COUPLING",
+    COUPLED + "*DISTRIBUTING\n1,6\n" + COUPLED.split("\n", 2)[2] + "*KINEMATIC\n1,3\n": (
+        "with *DISTRIBUTING give each one of its own"
+    ),
     COUPLED + "*KINEMATIC\n": "its lines have the first and the last degree of freedom, of 1 … 6",
     COUPLED.replace("STOP,", "TOP,") + "*DISTRIBUTING\n1,3\n": "there is no *SURFACE TOP of faces",
     COUPLED + "*KINEMATIC\n1,1\n" + STATIC: LOOSE,
