@@ -12,7 +12,7 @@ import numpy as np
 
 from kratos_lite.analysis.element_fields import ElementFields
 from kratos_lite.atomic import all_or_none, write_whole
-from kratos_lite.errors import naming
+from kratos_lite.errors import InputError, naming
 from kratos_lite.io.abaqus.cards import Card, Row
 from kratos_lite.io.abaqus.deck import FILES, Deck, Step
 from kratos_lite.io.abaqus.steps import cases_of
@@ -57,6 +57,8 @@ class Job:
 
     def run(self) -> None:
         """Run all steps, and write the files, or none of them."""
+        if not self.deck.steps:
+            raise InputError(f"{self.deck.path}: there is no *STEP, which says what is solved")
         for card in (card for step in self.deck.steps for card in step.outputs):
             self._rows(card)  # what is not there is told before anything is solved
         for case, steps in cases_of(self.deck):

@@ -227,11 +227,18 @@ def test_errors_of_models_name_a_line_and_leave_the_other_stream_alone(name, tmp
     assert not said
 
 
-def test_an_error_is_one_line_with_the_exit_code_of_ccx_and_leaves_no_file(tmp_path: Path, capsys) -> None:
-    (tmp_path / "job.inp").write_text(CUBE + "*STEP\n*STATIC\n*CLOAD\n99,1,1.\n*END STEP\n")
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("*STEP\n*STATIC\n*CLOAD\n99,1,1.\n*END STEP\n", "there is no node 99"),
+        ("", "job.inp: there is no *STEP"),
+    ],
+)
+def test_an_error_is_one_line_with_the_exit_code_of_ccx_and_leaves_no_file(text, words, tmp_path, capsys):
+    (tmp_path / "job.inp").write_text(CUBE + text)
     assert main(["-i", str(tmp_path / "job")]) == 201
     told, said = capsys.readouterr()
     assert "*ERROR: " in told
-    assert "there is no node 99" in told
+    assert words in told
     assert not said
     assert [path.name for path in tmp_path.iterdir()] == ["job.inp"]
