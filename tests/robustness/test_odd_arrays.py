@@ -198,6 +198,11 @@ CASES: Case = {
         lambda v: list(static().harmonic([10.0]).columns(v).values()),
         POINT,
     ),
+    ("Result.section", "part"): (lambda v: RESULT.section(("z", 0.5), part=v).force, [0]),
+    ("FiniteJ2Plasticity3D", "curve"): (
+        lambda v: np.array(kl.FiniteJ2Plasticity3D(1e9, 0.3, 1e6, curve=v).curve),
+        ((0.1, 2e6), (0.2, 3e6)),
+    ),
     ("Section.moment_about", "point"): (RESULT.section(("z", 0.5)).moment_about, VECTOR),
     ("converge", "meshes"): (
         lambda v: kl.converge(lambda h: static(), lambda result: 1.0, v).values,
@@ -355,6 +360,15 @@ CASES |= {
 for made, owner in ((lambda **v: kl.Mesh(CUBE.points, **v), "Mesh"), (CUBE.replace, "Mesh.replace")):
     for name in ("blocks", "conditions"):
         CASES[owner, name] = (lambda v, m=made, n=name: m(**{n: {BRICK.__name__: v}}).boundary, CELLS)
+for law in (kl.J2Softening3D, kl.TrescaSoftening3D, kl.CoulombSoftening3D, kl.ConeSoftening3D):
+    for name, sample in (("strains", [1e-3, 2e-3]), ("stresses", [1e6, 5e5])):
+        given = {"friction": 30.0, "curve": 4, "strains": [1e-3, 2e-3], "stresses": [1e6, 5e5]}
+        CASES[law.__name__, name] = (
+            lambda v, law=law, name=name, given=given: getattr(
+                law(1e9, 0.3, 1e6, 1e3, **{**given, name: v}), name
+            ),
+            sample,
+        )
 for axes in (kl.Cylindrical, kl.Spherical):
     for name in ("center", "axis"):
         CASES[axes.__name__, name] = (lambda v, a=axes, n=name: a(**{n: v}).directions(POINT), VECTOR)
@@ -500,5 +514,7 @@ ELSEWHERE = {
     ("plot", "point"),
     ("Block", "shape"),
     ("UMAT", "constants"),
+    ("AroundAxis", "center"),
+    ("AroundAxis", "axis"),
 }
 """Arguments of bases, of pictures, of shapes, which trust their callers, and of subroutines."""
