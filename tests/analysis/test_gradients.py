@@ -83,9 +83,7 @@ class Case:
         }[name]()
 
 
-@pytest.fixture(
-    scope="module", params=[*((kind, True) for kind in MESHES), ("8N", False), ("10N", False)], ids=str
-)
+@pytest.fixture(scope="module", params=[(kind, moves) for kind in MESHES for moves in (False, True)], ids=str)
 def case(request):
     return Case(*request.param)
 

@@ -603,12 +603,12 @@ def names_a_file(result, name):
 
 
 def cut(data, _):
-    return [data[:end] for end in range(0, len(data) + 1, 3)]
+    return [data[:end] for end in range(len(data) + 1)]
 
 
 def flipped(data, rng):
     """Return copies of data, each with one byte that is another."""
-    at = [(rng.randrange(len(data)), bytes([rng.randrange(256)])) for _ in range(100)]
+    at = [(rng.randrange(len(data)), bytes([rng.randrange(256)])) for _ in range(300)]
     return [data[:i] + byte + data[i + 1 :] for i, byte in at]
 
 

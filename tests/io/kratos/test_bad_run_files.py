@@ -251,11 +251,11 @@ JUNK = [None, True, -1, 0.5, 1e308, -(10**18), "", "x", "..", [], [[]], {}, {"a"
     ids=["one step", "checked", "materials", "reference"],
 )
 def test_a_value_of_a_wrong_kind_ends_in_a_project_or_a_clear_error(folder, name, content):
-    """Every eighth pair of a place and a value: each place and each value comes."""
+    """Every fourth pair of a place and a value: each place and each value comes several times."""
     write(folder, REFERENCE, "reference.json")
     write(folder, CHECKED)
     result, refused = by_hand().solve(), 0
-    pairs = list(product(spots(content), JUNK))[::8]
+    pairs = list(product(spots(content), JUNK))[::4]
     for path, junk in pairs:
         write(folder, replaced(content, path, junk), name)
         try:
@@ -270,11 +270,11 @@ def test_a_value_of_a_wrong_kind_ends_in_a_project_or_a_clear_error(folder, name
 
 def test_damaged_run_files_end_in_a_project_or_a_clear_error(folder):
     text, refused = json.dumps(ONE_STEP), []
-    for at in range(0, len(text), 29):
+    for at in range(0, len(text), 14):
         path = write(folder, text[:at] + text[at + 1 :])
         try:
             read_case(path)
         except KratosLiteError as error:
             refused.append(str(error).startswith(str(folder)))
-    assert len(refused) > 25
+    assert len(refused) > 50
     assert all(refused)
