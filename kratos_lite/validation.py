@@ -13,6 +13,7 @@ whole numbers          ``whole_numbers(value, what, ("n",))``, with ``size=`` fo
 one of some names      ``choice(value, what, names)``
 True or False          ``flag(value, what)``
 a function or None     ``function_or_none(value, what)``
+what one gives         ``of_places(function, X, what)``
 an instance            ``instance(value, what, cls)``
 =====================  =============================================================
 """
@@ -21,7 +22,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from os import PathLike
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
@@ -227,6 +228,19 @@ def takes(function: Any, count: int) -> bool:
     except ValueError:  # compiled functions do not tell
         pass
     return True
+
+
+def of_places(function: Callable[[Array], Any], X: Array, what: str) -> Any:
+    """Return what a user's function gives at places X (m, 3); InputError in words where it fails."""
+    try:
+        return function(X.copy())
+    except (IndexError, TypeError, ValueError) as error:
+        if isinstance(error, KratosLiteError):
+            raise
+        raise InputError(
+            f"{what}: the function fails at places X; X is (m, 3), all places at once, and x is X[:, 0]; "
+            f"numpy's functions and & take arrays: {error}"
+        ) from error
 
 
 def path_of(value: Any) -> Path:

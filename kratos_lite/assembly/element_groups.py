@@ -333,9 +333,10 @@ def _alike(mesh: Mesh, block: Block, material: Ints, rule: Ints) -> list[tuple[i
 
 
 def _without_material(mesh: Mesh, block: Block, cell: int) -> ModelError:
+    run_file = ", or solve the run file that names its materials" if mesh.source.endswith(".mdpa") else ""
     return ModelError(
         f"{mesh.place(block, cell)} has no material (property {block.properties[cell]}); "
-        "give one with Model(mesh, material), model.assign or --material"
+        f"give one with Model(mesh, material), model.assign or --material{run_file}"
     )
 
 

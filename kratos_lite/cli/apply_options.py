@@ -53,7 +53,9 @@ def case_of(options: Namespace, part: int | None = None) -> Case:
         _apply(each, options, f"-{number}" if case.then else "")
         omitted = [n for n in each.model.notes if isinstance(n, Omission)] if each.is_of_model else []
         if options.strict and omitted:
-            raise InputError("\n".join([f"{options.input}: --strict: Kratos would do more:", *omitted]))
+            raise InputError(
+                "\n".join([f"{options.input}: --strict: not all that is asked for is done:", *omitted])
+            )
     return case
 
 

@@ -34,7 +34,7 @@ class CoulombDamage3D(VonMisesDamage3D):
 
     Notes
     -----
-    Where |sin 3θ| > 0.95, with Lode's angle θ, the pyramid is a cone through its corners, as in Kratos.
+    Where sin 3θ passes ±0.95, with Lode's angle θ, the pyramid is a cone through its corners, as in Kratos.
     Source: ModifiedMohrCoulombYieldSurface of KratosConstitutiveLawsApplication.
 
     Examples

@@ -13,7 +13,8 @@ class CoulombSoftening3D(Softening):
     """J2Softening3D within a pyramid of Mohr and Coulomb, fitted to the strengths of tension and compression.
 
     It is theirs if compression / tension is tan²(45° + φ/2), and the hexagon of Tresca if they are equal.
-    Where |sin 3θ| > 0.95, with Lode's angle θ, surface and flow are cones through the corners, as in Kratos.
+    Where sin 3θ passes ±0.95, with Lode's angle θ, surface and flow are cones through the corners, as in
+    Kratos.
     The yield stress is that of compression; there the dissipated energy may be (compression / tension)²
     larger.
 

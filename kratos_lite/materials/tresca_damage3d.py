@@ -30,7 +30,7 @@ class TrescaDamage3D(VonMisesDamage3D):
 
     Notes
     -----
-    Where |sin 3θ| > 0.95, with Lode's angle θ, it is the stress of von Mises, as in Kratos.  Source:
+    Where sin 3θ passes ±0.95, with Lode's angle θ, it is the stress of von Mises, as in Kratos.  Source:
     TrescaYieldSurface of KratosConstitutiveLawsApplication.
 
     Examples

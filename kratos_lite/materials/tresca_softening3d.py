@@ -12,7 +12,7 @@ from kratos_lite.materials.softening import Softening, names_in_kratos
 class TrescaSoftening3D(Softening):
     """J2Softening3D within the hexagon of Tresca: elastic while σ₁ - σ₃ ≤ σ_Y f(κ).
 
-    Where |sin 3θ| > 0.95, with Lode's angle θ, surface and flow are the circle of von Mises through the
+    Where sin 3θ passes ±0.95, with Lode's angle θ, surface and flow are the circle of von Mises through the
     corners, as in Kratos; there the equivalent stress jumps by 5 %.
 
     Parameters

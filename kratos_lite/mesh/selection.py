@@ -11,7 +11,7 @@ from kratos_lite.errors import MeshError, nearest
 from kratos_lite.mesh.blocks import NO_ROWS, Cells, Part, distinct, mask_of, without_repeats
 from kratos_lite.tabular import in_units
 from kratos_lite.typing import Array, ArrayLike, Ints
-from kratos_lite.validation import finite, whole_numbers
+from kratos_lite.validation import finite, of_places, whole_numbers
 
 Where: TypeAlias = "str | Callable[[Array], ArrayLike] | ArrayLike"
 """Nodes by part name, by a point (x, y, z) in m, by a predicate on the points (n, 3), by rows or a mask."""
@@ -78,7 +78,7 @@ def find_nodes(where: Callable[[Array], ArrayLike] | ArrayLike, mesh: Cells) -> 
             cure = "choose that one, or read values anywhere in the mesh by result.at(points)"
             raise MeshError(f"{in_units(text, mesh.units)}; {cure}")
         return rows
-    n, chosen = len(points), where(points.copy()) if callable(where) else where
+    n, chosen = len(points), of_places(where, points, "a choice of nodes") if callable(where) else where
     if _is_mask(chosen):
         return _indices(chosen, "nodes", n)
     known = "nodes are chosen by part name, point (x, y, z), predicate, mask or indices; these"
@@ -138,7 +138,8 @@ def _is_mask(chosen: Any) -> bool:
 
 def _indices(mask: Any, what: str, n: int) -> Ints:
     if np.shape(mask) != (n,):
-        raise MeshError(f"a mask of {what} must have shape ({n},); got {np.shape(mask)}")
+        cure = "; of places X (n, 3) x is X[:, 0]" if what == "nodes" else ""
+        raise MeshError(f"a mask of {what} must have shape ({n},); got {np.shape(mask)}{cure}")
     return np.flatnonzero(mask)
 
 

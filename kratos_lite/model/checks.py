@@ -19,6 +19,7 @@ from kratos_lite.mesh import Block, Mesh
 from kratos_lite.model.loads import Load
 from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.supports import Supports
+from kratos_lite.shapes import Shape
 from kratos_lite.solvers.constraints import Constraints
 from kratos_lite.tabular import UNITS, size_in_si, unit_name
 from kratos_lite.typing import Array, Ints, Mask
@@ -107,7 +108,7 @@ def check_jacobians(mesh: Mesh, elements: Sequence[type[KinematicLinear]]) -> li
             folded += int((at_nodes < -1e-10).any(axis=1).sum())
             wrong = np.flatnonzero((inside <= 0).any(axis=1) | (at_nodes < -FOLD).any(axis=1))
             for e in wrong[:MAX_PROBLEMS]:
-                problems.add(_describe_inverted(mesh, block, int(cells[e]), det[e], g))
+                problems.add(_describe_inverted(mesh, block, int(cells[e]), det[e], g, shape))
             problems.count += len(wrong[MAX_PROBLEMS:])
             inverted += int((det < 0).all(axis=1).sum())
     if 1 < inverted == problems.count:
@@ -119,7 +120,7 @@ def check_jacobians(mesh: Mesh, elements: Sequence[type[KinematicLinear]]) -> li
     return warnings
 
 
-def _describe_inverted(mesh: Mesh, block: Block, cell: int, det: Array, g: int) -> str:
+def _describe_inverted(mesh: Mesh, block: Block, cell: int, det: Array, g: int, shape: type[Shape]) -> str:
     worst = int(np.argmax(det <= det.min() + 1e-10 * np.abs(det).max()))  # the first of equal ones
     where = f"Gauss point {worst + 1}" if worst < g else f"its node {worst - g + 1}"
     nodes = " ".join(str(i) for i in mesh.node_ids[block.nodes[cell]])
@@ -127,11 +128,24 @@ def _describe_inverted(mesh: Mesh, block: Block, cell: int, det: Array, g: int) 
         cure = "the element is inverted; mesh.reoriented() corrects the node order"
     elif (det == 0).all():
         cure = "the element has no volume; two of its nodes may coincide"
+    elif _is_curved(mesh.points[block.nodes[cell]], shape):
+        cure = "its curved edges fold it; mesh finer where the surface bends, in Gmsh by "
+        cure += "-setnumber Mesh.MeshSizeFromCurvature 12, or -optimize_ho"
     else:
         cure = "two of its nodes look swapped or one lies too far off"
     return (
         f"{mesh.place(block, cell)}: det J = {det[worst]:.3g} at {where} must be > 0; nodes {nodes}; {cure}"
     )
+
+
+def _is_curved(X: Array, shape: type[Shape]) -> bool:
+    """Return whether each edge has a node near its middle: with straight edges the element would do."""
+    start, end = (X[list(nodes)] for nodes in zip(*shape.edges, strict=True))
+    middle = X[shape.corners : shape.corners + len(start)]
+    if len(middle) < len(start):
+        return False
+    bow = np.linalg.norm(middle - (start + end) / 2, axis=1)
+    return bool((bow < np.linalg.norm(end - start, axis=1) / 4).all())
 
 
 def check_scales(mesh: Mesh, groups: Sequence[ElementGroup]) -> Iterator[str]:
@@ -149,10 +163,11 @@ def check_scales(mesh: Mesh, groups: Sequence[ElementGroup]) -> Iterator[str]:
         yield f"stiffnesses differ by a factor of {max(stiff) / min(stiff):.1e}; expect fewer digits"
     bulky, metal = BULKY / size_in_si("m³", mesh.units), METAL / size_in_si("Pa", mesh.units)
     if float((high - low).prod()) > bulky:
-        stiff_groups = (group for group in groups if young_moduli(group.material)[1] > metal)
-        volume = sum(float(volumes(mesh.points, group).sum()) for group in stiff_groups)
+        moduli = [young_moduli(group.material)[1] for group in groups]
+        stiff_ones = (g for g, E in zip(groups, moduli, strict=True) if E > metal or 1 < 1e6 * E / metal < 10)
+        volume = sum(float(volumes(mesh.points, group).sum()) for group in stiff_ones)
         if volume > bulky:
-            cure = "are lengths in mm (read with scale=1e-3, --scale mm, or units=)?"
+            cure = "are lengths in mm (read with scale=1e-3, --scale mm, or units= where E is in MPa)?"
             yield f"{volume:.3g} m³ are as stiff as metal: {cure}"
     yield from check_wave_speeds((group.material for group in groups), mesh.units)
 

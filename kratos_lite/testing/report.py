@@ -18,7 +18,9 @@ PYTHON = Path(traceback.__file__).parent
 
 CURES = {
     "truth value of an array": "many points come at once: np.where(condition, a, b) chooses for each",
+    "mismatch in its core dimension": "many points come at once, strain (…, 6): strain @ C",
     "response() takes": "a law has response(self, strain, state, dt)",
+    "local_system() takes": "an element has local_system(self, C, u)",
 }
 """What to do about errors of Python that say this."""
 
@@ -193,13 +195,10 @@ def _run_one(check: Callable[[S], Measured | str], subject: S) -> Finding:
 def describe(error: Exception) -> str:
     """Return an error as one text, with the last line of the student's own code that led to it."""
     frames = traceback.extract_tb(error.__traceback__)
-    place = ""
-    said = isinstance(error, KratosLiteError)  # where is no line of the library then
-    for ours in (Path(__file__).parent, Path(__file__).parents[1])[said:]:
-        passed = {ours, Path(np.__file__).parent}
-        files = [(Path(frame.filename), frame.lineno) for frame in frames]
-        theirs = [f for f in files if not passed & set(f[0].parents) and f[0].parent != PYTHON]
-        place = f" at {theirs[-1][0].name}:{theirs[-1][1]}" if theirs else place
+    libraries = {Path(__file__).parents[1], Path(np.__file__).parent}
+    files = [(Path(frame.filename), frame.lineno) for frame in frames]
+    theirs = [f for f in files if not libraries & set(f[0].parents) and f[0].parent != PYTHON]
+    place = f" at {theirs[-1][0].name}:{theirs[-1][1]}" if theirs else ""
     kind = "" if isinstance(error, ConformanceError) else f"{type(error).__name__}: "
     text = f"{kind}{error}{place}"
     return "; ".join([text, *(cure for sign, cure in CURES.items() if sign in text)])

@@ -169,10 +169,10 @@ def test_the_speed_of_waves_in_graphene_is_no_warning():
     assert not [text for text in model.solve().report.warnings if "waves" in text]
 
 
-def bracket(scale):
+def bracket(scale, E=210e9, density=7850.0):
     """Return a steel part of 100 x 60 x 10 mm³ under .1 MPa, in mm where the scale is 1."""
     points = kl.box((100, 60, 10), (4, 3, 1))
-    model = kl.Model(points.replace(points=scale * points.points), kl.Isotropic3D(210e9, 0.3, 7850.0))
+    model = kl.Model(points.replace(points=scale * points.points), kl.Isotropic3D(E, 0.3, density))
     model.fix("x-")
     return model
 
@@ -187,6 +187,9 @@ def test_a_mesh_in_millimetres_is_a_warning_that_names_the_cure():
     model = bracket(1e-3)
     model.add(kl.Traction("x+", (1e5, 0, 0)))
     assert not model.solve().report.warnings
+    model = bracket(1.0, E=210e3, density=0.0)  # in MPa
+    model.add(kl.Traction("x+", (0.1, 0, 0)))
+    assert "units= where E is in MPa" in "".join(model.solve().report.warnings)
 
 
 def test_meshes_are_scaled_where_they_are_read(tmp_path):

@@ -284,6 +284,24 @@ def test_both_ways_refuse_bad_shapes_alike(spoil, text, numpy_only):
     assert verdict(mesh, kl.KinematicLinear3D8N) == found
 
 
+def bowed(mesh):
+    """Return a mesh whose edge through the middle of the box is bent."""
+    middle = mesh.nodes((0.5, 0.5, 0.5))
+    return mesh.replace(points=changed_at(mesh.points, middle, [0.5, 0.5, 0.1]))
+
+
+def with_swapped_middles(mesh):
+    nodes = mesh.blocks[0].nodes
+    return with_block(mesh, nodes=changed_at(nodes, (0, [5, 9]), nodes[0, [9, 5]]))
+
+
+@pytest.mark.parametrize(
+    ("spoil", "text"), [(bowed, "its curved edges fold it"), (with_swapped_middles, "nodes look swapped")]
+)
+def test_a_fold_by_curved_edges_is_told_from_swapped_nodes(spoil, text):
+    assert text in verdict(spoil(kl.box(element="KinematicLinear3D10N")), kl.KinematicLinear3D10N)
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_both_ways_refuse_flat_elements_alike(name, numpy_only):
     kind, found = kl.ELEMENTS[name], []

@@ -592,8 +592,11 @@ def test_a_folder_is_its_run_file_of_kratos(run, folder):
     assert run("convert", "beam", "beam.vtu").code == 0
     assert kl.read("beam").mesh.n_nodes == kl.read("beam/cantilever.mdpa").mesh.n_nodes
     Path("beam/ProjectParameters.json").unlink()
+    Path("beam/beam_parameters.json").write_text("{}")
     refused = run("solve", "beam")
-    assert refused.refuses("beam: is a folder without ProjectParameters.json; name a file in it")
+    assert refused.refuses(
+        "beam: is a folder without ProjectParameters.json; name a file in it, such as beam_param"
+    )
     assert "beam: beam:" not in refused.err
 
 

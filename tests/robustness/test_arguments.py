@@ -46,6 +46,13 @@ WRONG = {
     "where row": (lambda: model().fix([99]), "node indices must lie in 0 … 26"),
     "where slip": (lambda: model().fix("Z++"), r"Did you mean z\+\?"),
     "where mask": (lambda: model().fix(np.ones(5, bool)), r"a mask of nodes must have shape \(27,\)"),
+    "where x y z": (lambda: model().fix(lambda x, y, z: x == 0), r"X is \(m, 3\), all places at once"),
+    "where and": (
+        lambda: model().fix(lambda X: X[:, 0] and X[:, 1]),
+        "functions and & take arrays",
+    ),
+    "where X[3]": (lambda: model().fix(lambda X: X[:, 3] == 0), "a choice of nodes: the function fails"),
+    "where X[0]": (lambda: model().fix(lambda X: X[0] == 0), r"x is X\[:, 0\]"),
     "where nothing": (lambda: model().fix(np.zeros(27, bool)), "cannot fix xyz: no node is chosen"),
     "where unknown": (lambda: model().fix("top"), "there is no part 'top'"),
     "link negative": (lambda: model().constrain((-1, "x"), {TOP: 1.0}), "a degree of freedom is"),

@@ -559,6 +559,15 @@ def test_an_exception_in_an_element_is_a_finding():
     assert not_run(findings)["rank"] == "stops at the same error as 'stiffness'"
 
 
+def test_arguments_that_are_missing_name_no_line_of_the_library():
+    class Broken(BRICK):
+        def local_system(self, C):
+            return C
+
+    detail = failed(check_element(Broken))["stiffness"].detail
+    assert detail.endswith("given; an element has local_system(self, C, u)")
+
+
 @pytest.mark.parametrize(
     ("changes", "text"),
     [

@@ -180,7 +180,12 @@ def test_a_material_is_checked_as_the_instance_that_the_file_makes(checked, text
             "",
             "'plastic_strain', which .* declared are none; add it to internal_variables",
         ),
-        ("state, dt)", "state)", r"a law has response\(self, strain, state, dt\)"),
+        ("state, dt)", "state)", r"were given; a law has response\(self, strain, state, dt\)"),
+        (
+            '(strain - state["plastic_strain"]) @ elastic.C',
+            "elastic.C @ strain",
+            r"mine.py:\d+; .* strain @ C$",
+        ),
         (', {"plastic_strain": new}', "", "got 2 values$"),
         ("return stress - excess * s", "return stress * (1 - excess)", "is a factor 2 of shear missing"),
     ],

@@ -80,7 +80,8 @@ def read_document(path: str | Path, *, strict: bool = True) -> Document:
         if not path.exists():
             raise InputError(f"{path}: there is no such file")
         if path.is_dir():
-            raise InputError(f"{path}: is a folder without {PROJECT}; name a file in it")
+            such = "".join(f", such as {file.name}" for file in sorted(path.glob("*arameters*.json"))[:1])
+            raise InputError(f"{path}: is a folder without {PROJECT}; name a file in it{such}")
         from kratos_lite.io.formats.foreign import GEOMETRY, meshing
 
         if kind in GEOMETRY:

@@ -112,7 +112,9 @@ def _notes_on_keys(settings: Settings, dynamic: bool, eigen: bool, small: bool) 
     """Return a note on keys that change nothing; InputError for those that Kratos refuses."""
     unused = unused_keys(settings, IN_TIME if dynamic else EIGEN_KEYS if eigen else {}, small or eigen)
     are = "key {} is" if len(unused) == 1 else "keys {} are"
-    return [f"{are.format(', '.join(unused))} not used"] if unused else []
+    note = f"{are.format(', '.join(unused))} not used"
+    misspelt = any("Did you mean" in key for key in unused if "." not in key)  # a whole section is left out
+    return [Omission(note) if misspelt else note] if unused else []
 
 
 def _note_on_linearity(document: Document) -> str:

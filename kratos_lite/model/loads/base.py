@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeAlias, TypeVar
 import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup, add_nodal
-from kratos_lite.errors import InputError, KratosLiteError, ModelError
+from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.local_axes import LocalAxes
 from kratos_lite.time_series import Factor, TimeSeries, function_of
 from kratos_lite.typing import Array, ArrayLike, Ints, Rows
-from kratos_lite.validation import finite, instance, short, takes
+from kratos_lite.validation import finite, instance, of_places, short, takes
 
 if TYPE_CHECKING:
     from kratos_lite.mesh.refined_mesh import RefinedMesh
@@ -368,15 +368,7 @@ def at_places(function: OfPlace, what: str, width: tuple[int, ...]) -> Callable[
     """Return a function of places (..., 3) that checks what the given one of (m, 3) returns."""
 
     def checked(X: Array) -> Array:
-        try:
-            given = function(X.reshape(-1, 3).copy())
-        except (IndexError, TypeError, ValueError) as error:
-            if isinstance(error, KratosLiteError):
-                raise
-            hint = (
-                f"X is (m, 3), all places at once, and x is X[:, 0]; numpy's functions take arrays: {error}"
-            )
-            raise InputError(f"{what}: the function fails at places X; {hint}") from error
+        given = of_places(function, X.reshape(-1, 3), what)
         values, m = finite(given, what), X[..., 0].size
         if values.shape not in ((m, *width), width):
             shape = "(m, 3)" if width else "(m,)"

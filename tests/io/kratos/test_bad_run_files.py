@@ -205,6 +205,8 @@ def test_elements_without_material_are_named(folder):
     (folder / "box.mdpa").write_text(without_element_8())
     with pytest.raises(ModelError, match=r"element 8 \(SmallDisplacementElement3D8N\) has no material"):
         read_case(write(folder, changed()))
+    with pytest.raises(ModelError, match="solve the run file that names its materials"):
+        read_case(folder / "box.mdpa").model.solve()
 
 
 def test_a_later_material_takes_the_elements_of_an_earlier_one(folder):

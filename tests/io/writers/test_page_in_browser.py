@@ -197,6 +197,7 @@ def test_every_component_is_that_of_the_result(page, result):
 
 def test_the_legend_has_unit_and_range(page, result):
     page.set("field", "2:xx")
+    assert page("return document.title").endswith(": stress, xx")
     assert page("return [quantity.textContent, unit.textContent]") == ["stress, xx", "MPa"]
     ticks = [float(text) for text in page("return [...ticks.children].map((tick) => tick.textContent)")]
     xx = result.stress("node")[:, 0] / 1e6

@@ -151,7 +151,9 @@ class Page {
     const factor = data.kind === "modes" ? Number($("scale").value) : Number(scale.toPrecision(3));
     $("scale-name").textContent = data.kind === "modes" ? `${factor}` : `× ${factor}`;
     this.cut();
-    this.legend.show(named(this.field, this.chosen[1]), this.field.unit, this.range);
+    const shown = named(this.field, this.chosen[1]);
+    this.legend.show(shown, this.field.unit, this.range);
+    document.title = `${this.data.title}: ${shown}`;
     this.unpoint();
     this.stage.draw();
   }
