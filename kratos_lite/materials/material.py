@@ -273,7 +273,7 @@ class Material:
         if not tangent:
             return stress, np.zeros(0), new
         if D is None:
-            D = self._tangent_by_differences(strain, state, dt, stress)
+            D = self._tangent(strain, state, dt, stress)
         D = np.broadcast_to(D, (*strain.shape, 6)) if np.shape(D) == (6, 6) else D
         self._check_shape("tangent", D, (*strain.shape, 6))
         return stress, D, new
@@ -306,7 +306,7 @@ class Material:
                 "return new arrays, as a step that fails is taken again"
             ) from None
 
-    def _tangent_by_differences(self, strain: Array, state: GaussState, dt: float, stress: Array) -> Array:
+    def _tangent(self, strain: Array, state: GaussState, dt: float, stress: Array) -> Array:
         """Return ∂σ/∂ε (..., 6, 6) from one-sided differences, six more evaluations."""
         size = np.maximum(np.abs(strain).max(axis=-1), STRAIN_STEP)
         h = np.finfo(float).eps ** 0.5 * size

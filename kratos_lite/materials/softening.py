@@ -88,9 +88,9 @@ class Softening(IsotropicLaw, family=True):
     @property
     def symmetric_tangent(self) -> bool:  # type: ignore[override]
         """Whether the flow is that of a round surface, and what softens it is symmetric, too."""
-        is_alike = self.surface == "VonMises" and self.curve != POLYNOMIAL and self._ratio == 1
         surface, flow = self._surfaces
-        return surface.is_round and surface == flow and (is_alike or self.curve == PERFECT)
+        is_alike = self._is_radial and self.surface == "VonMises"
+        return is_alike or (surface.is_round and surface == flow and self.curve == PERFECT)
 
     @property
     def has_corners(self) -> bool:
@@ -101,6 +101,12 @@ class Softening(IsotropicLaw, family=True):
     def strength(self) -> float:
         """The equivalent stress in Pa at which a bar begins to flow."""
         return self.yield_stress * self._surfaces[0].of_tension
+
+    @property
+    def _is_radial(self) -> bool:
+        """Whether the return only shrinks the deviator."""
+        surface, flow = self._surfaces
+        return surface.is_round and surface == flow and self.curve != POLYNOMIAL and self._ratio == 1
 
     @property
     def _potential(self) -> str:
@@ -159,20 +165,37 @@ class Softening(IsotropicLaw, family=True):
             raise MaterialError(f"curve 6 needs strains from 0 that grow, and as many stresses; got {rows}")
 
     def response(self, strain: Array, state: GaussState, dt: float) -> Response:
-        """Return stress, consistent tangent and internal variables; SolveError for what would snap back."""
-        C, names = self.elastic.C, self.internal_variables
-        stress = voigt.times(strain - state["plastic_strain"], C)
-        new = {name: state[name].copy() for name in names}
-        D = np.broadcast_to(C, (*strain.shape, 6)).copy()
-        q, limit, *_ = self._yielding(Invariants(stress), *self._variables(state))
+        """Return stress and internal variables; SolveError for what would snap back."""
+        stress = voigt.times(strain - state["plastic_strain"], self.elastic.C)
+        new, variables = {n: state[n].copy() for n in self.internal_variables}, self._variables(state)
+        q, limit, *_ = self._yielding(Invariants(stress), *variables)
         flows = q > limit * (1 + FLOWING)
         if flows.any():
-            moved = stress[flows] + 1j * STEP * C[:, None]
-            there, flowed, kappa = self._return(moved, *self._variables({n: state[n][flows] for n in names}))
-            stress[flows], D[flows] = there[0].real, np.moveaxis(there.imag / STEP, 0, -1)
-            new["plastic_strain"][flows] = flowed[0].real
-            new["plastic_dissipation"][flows] = kappa[0, :, None].real
-        return stress, D, new
+            found = self._return(stress[flows], *(values[flows] for values in variables))
+            stress[flows], new["plastic_strain"][flows], new["plastic_dissipation"][flows, 0] = found
+        return stress, None, new
+
+    def _tangent(self, strain: Array, state: GaussState, dt: float, stress: Array) -> Array:
+        """Return the consistent tangent (..., 6, 6), where it is asked for."""
+        C, variables = self.elastic.C, self._variables(state)
+        trial = voigt.times(strain - state["plastic_strain"], C)
+        flows = (stress != trial).any(axis=-1)
+        D = np.broadcast_to(C, (*strain.shape, 6)).copy()
+        at, (lam, G) = Invariants(trial[flows]), self.elastic.lame
+        ways = np.stack([at.s + voigt.UNIT - at.s, at.s]) if self._is_radial else C[:, None]
+        moved: Any = at.stress + 1j * STEP * ways
+        there = self._return(moved, *(values[flows] for values in variables))[0]
+        slopes = there.imag / STEP
+        if not self._is_radial:
+            D[flows] = np.moveaxis(slopes, 0, -1)
+            return D
+        # σ = β s + (tr σ / 3) 1 with β and tr σ of tr and |s| of the trial: what turns s comes out β times.
+        square = np.where(at.some, at.s**2 @ voigt.SHEAR_TWICE, 1.0)[:, None]
+        beta = (there[0].real * at.s) @ voigt.SHEAR_TWICE / square[:, 0]
+        by_trace, by_size = slopes - beta[:, None] * ways
+        normal = (lam + 2 / 3 * G) * by_trace[..., None] * voigt.UNIT
+        D[flows] = beta[:, None, None] * C + normal + (2 * G * by_size / square)[..., None] * at.s[:, None]
+        return D
 
     def _variables(self, state: GaussState) -> tuple[Array, Array, Array]:
         """Return plastic strain, κ and the fracture energy in J/m³ of points."""

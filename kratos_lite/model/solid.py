@@ -175,8 +175,8 @@ class Solid(Tabular):
             laws = {type(law).__name__ for law in self._used_materials() if not law.is_linear}
             raise ModelError(
                 f"{what} takes linear laws and small displacements; got "
-                f"{', '.join(sorted(laws)) or 'large displacements'}; take model.solve() or "
-                "model.quasi_static() of the model as it is"
+                f"{', '.join(sorted(laws)) or 'large displacements or a load that follows'}; take "
+                "model.solve() or model.quasi_static() of the model as it is"
             )
 
     @property

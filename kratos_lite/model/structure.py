@@ -70,6 +70,12 @@ class Structure(Solid):
             self.notes.append(f"units: {', '.join(units.split())} (recognized from E and density of {named})")
 
     @property
+    def is_nonlinear(self) -> bool:
+        """Whether a law is not linear, an element has large displacements, or a load follows the body."""
+        loads = (getattr(load, "load", load) for load in self.loads)  # that of one with an amplitude
+        return super().is_nonlinear or any(getattr(load, "follower", False) for load in loads)
+
+    @property
     def version(self) -> tuple[int, int]:
         """Change counters of everything that affects the equations except prescribed values and loads."""
         return self._changes, self.supports.version

@@ -19,6 +19,8 @@ Changes: TypeAlias = list[tuple[Ints, Array]]
 """Tangent of a load: for nodes (m, k) the derivatives (m, k, 3, k, 3) of their forces."""
 WORN = 6.0
 """Iterations for a digit from which a multigrid of an older tangent is made anew."""
+SMALL = 1e-3
+"""Part of a residual that a constant K alone may leave; beyond it loads that follow add their tangent."""
 
 
 class Tangents:
@@ -57,7 +59,7 @@ class Tangents:
         The residuals of the step so far say how far a correction is worth being solved.
         """
         iterates = self.plan.iterates
-        if self._constant and not changes:
+        if self._constant and (not changes or _fall(residuals) <= SMALL):
             left = 1.0 if jump.any() else max(residuals[-1], tolerance)
             enough = 0.1 * tolerance / left  # so that one correction is the solution
             return [self._rest.solve(each, enough, None, jump, jump).x for each in forces]
@@ -81,6 +83,11 @@ class Tangents:
             K = BlockMatrix(K.data.copy(), K.indices, K.indptr)
             system.pattern.add_tangents(K.data, [(nodes, -k) for nodes, k in changes])
         return LinearSolver(K, system.constraint_map, system.points, self.plan, symmetric)
+
+
+def _fall(residuals: list[float]) -> float:
+    """Return what the last correction left of a residual; nothing before the first."""
+    return residuals[-1] / (residuals[-2] or 1.0) if len(residuals) > 1 else 0.0
 
 
 def turned(tangent: Array) -> Array:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.errors import InputError
+from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model.loads.surface import ConditionLoads
 from kratos_lite.shapes import SHAPES
 
@@ -106,6 +106,22 @@ def test_amplitudes_and_functions_of_time_follow_too():
     dead.fix("z-")
     dead.add(kl.Pressure("z+", 1e5))
     assert abs(found[0].u - dead.solve().u).max() > 1e-3
+
+
+@pytest.mark.parametrize("more", [{}, {"amplitude": lambda t: t}])
+def test_a_follower_makes_a_model_of_small_displacements_a_nonlinear_one(more):
+    """The pressed face grows with its sides: ε = -p/E (1 - ν ε)²; it ends after two corrections."""
+    for pressure, corrections in ((20.0, 2), (2e5, 4)):
+        model = kl.Model(kl.box(cells=(2, 2, 2)), kl.Isotropic3D(E, 0.3))
+        for axis in "xyz":
+            model.fix(f"{axis}-", axis)
+        model.add(kl.Pressure("x+", pressure, follower=True), **more)
+        result = model.solve()
+        strain = result.u[:, 0].max() + result.u[:, 0].min()
+        assert abs(strain + pressure / E * (1 - 0.3 * strain) ** 2) < 1e-7 * abs(strain)
+        assert result.report.iterations <= corrections
+    with pytest.raises(ModelError, match="or a load that follows"):
+        model.static()
 
 
 def test_a_follower_by_places_is_refused():

@@ -62,6 +62,10 @@ OLD_LISTS = (
 )
 CRITERIA = ("residual_criterion", "displacement_criterion", "and_criterion", "or_criterion")
 STRATEGIES = ("newton_raphson", "line_search")
+ARC = (
+    "in Kratos the length of a step depends on the number of corrections before, so that its states would "
+    "be others: take model.quasi_static(arc_length=True) in Python, or prescribe displacements"
+)
 BUILDERS = ("block", "block_lagrange", "elimination", "p_multigrid")
 OLD_BUILDERS = ("use_block_builder", "use_lagrange_BS", "type", "advanced_settings")
 ITERATIVE = "solver_type tolerance max_iteration preconditioner_type scaling"
@@ -148,7 +152,8 @@ def _solution(solver: Settings, linear: bool) -> list[str]:
     )
     for section, key, what, known in words:
         word = section.text(key, known[0])
-        text = f"{what} {word!r} is not supported; take one of {', '.join(known)}"
+        cure = ARC if word == "arc_length" else f"take one of {', '.join(known)}"
+        text = f"{what} {word!r} is not supported; {cure}"
         section.expect(word in known or linear, key, text)
         unused += [] if word in known else [f"{section.name(key)} {word!r}"]
     builder = solver.section("builder_and_solver_settings")

@@ -70,8 +70,9 @@ def read_kratos_project(
     in_time = ProcessesInTime(processes.actions, context, dynamic) if in_steps else None
     act = in_time.prepare if in_time else partial(run, processes.actions, context, notes)
     displaced = initial_displacement and in_time is None
-    model = model_from(document, initial_displacement=displaced, processes=act)
-    notes += [] if small or eigen or model.is_nonlinear else [_note_on_linearity(document)]
+    follows = moved and not (small or dynamic)
+    model = model_from(document, initial_displacement=displaced, processes=act, follows=follows)
+    notes += [_note_on_linearity(document)] if dynamic and not (small or model.is_nonlinear) else []
     _finish(model, settings, processes, in_time, times[-1], notes)
     if in_time and dynamic:
         time = time_integration_of(settings, in_time)

@@ -39,8 +39,12 @@ def model_from(
     materials: bool = True,
     initial_displacement: bool = True,
     processes: Callable[[Variables], None] | None = None,
+    follows: bool = False,
 ) -> Model:
-    """Return the model that a document describes; `processes` may change the values, as a run file does."""
+    """Return the model that a document describes; `processes` may change the values, as a run file does.
+
+    Loads of conditions follow the body that they act on if this is nonlinear, or `follows`.
+    """
     if not document.mesh.n_nodes:
         raise InputError(f"{document.mesh.source}: {NO_NODES}")
     document = set_apart(document)
@@ -54,7 +58,7 @@ def model_from(
     for properties in document.used_properties():
         apply_properties(model, properties, materials, problems)
     problems.raise_if_any()
-    values = Variables(document.mesh, expanding(document, materials), model.is_nonlinear)
+    values = Variables(document.mesh, expanding(document, materials), follows or model.is_nonlinear)
     _fill(values, document, model)
     u0 = values.nodal.vector("DISPLACEMENT")
     if processes:

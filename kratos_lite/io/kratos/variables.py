@@ -159,7 +159,9 @@ class Variables:
         values = (force, *nodal_force.values(), pressure, nodal_pressure)
         is_loaded = len(carriers) > 0 and any(value.any() for value in values)
         given = force, nodal_force, pressure, nodal_pressure
-        return ConditionLoads(*given, follower=self.follows) if is_loaded else None
+        kinds = ConditionLoads.following
+        follower = self.follows and any(block.name.startswith(kinds) for block, _ in conditions)
+        return ConditionLoads(*given, follower) if is_loaded else None
 
     def note_idle(self, notes: list[str]) -> None:
         """Note loads where nothing carries them, and pressures that follow deformed faces in Kratos only."""

@@ -143,7 +143,7 @@ class Pressure(FaceLoad):
         returns (m,), taken at quadrature points.
     normal : ``"outward"`` takes the outward normal of the body; ``"nodes"`` the normal about which
         the nodes of each condition run counter-clockwise, as Kratos does.
-    follower : whether it acts on the deformed faces where displacements are large.
+    follower : whether it acts on the deformed faces, which makes any model a nonlinear one.
 
     Raises
     ------

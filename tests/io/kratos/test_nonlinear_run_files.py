@@ -280,7 +280,7 @@ def test_tables_of_steps_that_cannot_be_taken_are_refused(tmp_path, table, words
 
 
 BAD = [
-    ({"solving_strategy_settings": {"type": "arc_length"}}, "strategy 'arc_length' is not supported"),
+    ({"solving_strategy_settings": {"type": "arc_length"}}, "quasi_static(arc_length=True) in Python"),
     ({"convergence_criterion": "energy"}, "convergence_criterion 'energy' is not supported"),
     ({"max_iteration": 0}, "must be > 0; got 0"),
     ({"residual_relative_tolerance": -1.0}, "must be > 0; got -1"),
