@@ -19,7 +19,7 @@ from kratos_lite.solvers.complex_eigen import Pencil, unresisted_modes
 from kratos_lite.solvers.constraints import ConstraintMap, rigid_modes
 from kratos_lite.solvers.eigen import Operator, Problem, dense_modes, is_small, modes_near
 from kratos_lite.solvers.linear_solver import LinearSolver
-from kratos_lite.solvers.plan import DENSE_MODES, FALLBACK_LIMIT, stepped
+from kratos_lite.solvers.plan import DENSE_MODES, FALLBACK_LIMIT, of_modes, stepped
 from kratos_lite.typing import Array, Complexes, Progress
 from kratos_lite.validation import instance, number, whole_number
 
@@ -39,7 +39,8 @@ def natural_modes(
     solver = "auto" if near is None else "direct"
     phase = Phases(progress)
     with phase("check"):
-        e = EquationsOfMotion(model, lumped=lumped, free=preload is None, solver=solver, progress=progress)
+        options: Any = {"solver": solver, "planned": of_modes, "progress": progress}
+        e = EquationsOfMotion(model, lumped=lumped, free=preload is None, **options)
     constraints, n = e.system.constraint_map, len(e.system.constraint_map.free)
     if near is not None and n > FALLBACK_LIMIT:
         raise InputError(
@@ -90,7 +91,7 @@ def _by_iteration(
 
 
 def _preconditioner(e: EquationsOfMotion, solver: LinearSolver) -> Callable[[Array], Array]:
-    """Return about K⁻¹ of free degrees of freedom (q,), rigid motions that are free being held."""
+    """Return about K⁻¹ of free degrees of freedom (k, q), rigid motions that are free being held."""
     constraints = e.system.constraint_map
     held = constraints.holding(e.free_motions.constrained[e.system.nodes])
     kept = np.searchsorted(constraints.free, held.free)
@@ -98,7 +99,7 @@ def _preconditioner(e: EquationsOfMotion, solver: LinearSolver) -> Callable[[Arr
 
     def precondition(r: Array) -> Array:
         out = np.zeros_like(r)
-        out[kept] = firm.precondition(r[kept])
+        out[:, kept] = firm.precondition(r[:, kept])
         return out
 
     return precondition

@@ -125,6 +125,7 @@ public:
 
     // z = M r, the V-cycle on a right side of any size.
     void cycle(const double* r, double* z) {
+        for (Level& level : levels) level.set_together(1);
         Level& top = levels.front();
         double norm = 0;
         for (int64_t i = 0; i < top.size(); ++i) norm = std::max(norm, std::fabs(r[i]));
@@ -136,6 +137,19 @@ public:
         for_each(top.size(), [&](int64_t i) { top.c[i] = static_cast<float>(r[i] / norm); });
         descend(0);
         for_each(top.size(), [&](int64_t i) { z[i] = norm * top.x[i]; });
+    }
+
+    // The same for `count` right sides, each behind the other: several at once where all levels allow it.
+    void cycles(const double* r, double* z, int64_t count) {
+        const int64_t size = levels.front().size();
+        const bool serves = std::all_of(levels.begin(), levels.end(), [](const Level& l) { return l.serves_several(); });
+        while (count > 0) {
+            const int64_t done = serves ? std::min<int64_t>(count, SEVERAL) : 1;
+            done > 1 ? cycle_several(r, z, static_cast<int>(done)) : cycle(r, z);
+            count -= done;
+            r += done * size;
+            z += done * size;
+        }
     }
 
     double complexity() const {
@@ -181,6 +195,23 @@ private:
         return coarse;
     }
 
+    void cycle_several(const double* r, double* z, int count) {
+        Level& top = levels.front();
+        const int64_t size = top.size();
+        for (Level& level : levels) level.set_together(count);
+        double norms[SEVERAL] = {};
+        for (int v = 0; v < SEVERAL; ++v)
+            for (int64_t i = 0; v < count && i < size; ++i) norms[v] = std::max(norms[v], std::fabs(r[v * size + i]));
+        for_rows(size, [&](int64_t i) KL_INLINE_LAMBDA {
+            for (int v = 0; v < SEVERAL; ++v)
+                top.c[i * SEVERAL + v] = norms[v] > 0 ? static_cast<float>(r[v * size + i] / norms[v]) : 0.0f;
+        });
+        descend(0);
+        for_rows(size, [&](int64_t i) KL_INLINE_LAMBDA {
+            for (int v = 0; v < count; ++v) z[v * size + i] = norms[v] * top.x[i * SEVERAL + v];
+        });
+    }
+
     void descend(size_t l) {
         Level& level = levels[l];
         if (l + 1 == levels.size()) {
@@ -204,9 +235,13 @@ private:
     void solve_coarsest(Level& level) {
         if (level.halo->solve(level.c.data(), level.x.data())) return;
         if (coarsest.at.empty()) return level.smooth(20, 400, true);  // aggregation came to a halt
-        Doubles x(level.c.begin(), level.c.begin() + level.size());
-        dispatch<double>([&](auto V) KL_INLINE_LAMBDA { substitute_rows<V>(coarsest, 0, level.size(), x.data()); });
-        for (int64_t i = 0; i < level.size(); ++i) level.x[i] = static_cast<float>(x[i]);
+        const int64_t size = level.size(), step = level.together > 1 ? SEVERAL : 1;
+        Doubles x(size);
+        for (int v = 0; v < level.together; ++v) {
+            for (int64_t i = 0; i < size; ++i) x[i] = level.c[i * step + v];
+            dispatch<double>([&](auto V) KL_INLINE_LAMBDA { substitute_rows<V>(coarsest, 0, size, x.data()); });
+            for (int64_t i = 0; i < size; ++i) level.x[i * step + v] = static_cast<float>(x[i]);
+        }
     }
 
     void factorize(const double* data, const Bytes& fixed) {

@@ -5,6 +5,7 @@
 
 #include "matrix_free.hpp"
 #include "patches.hpp"
+#include "several.hpp"
 
 namespace kl {
 
@@ -91,6 +92,7 @@ public:
     bool thin = false;  // energies so unlike that sums take double precision
     const double* exact = nullptr;  // in place of A, where energies are still more unlike
     Bytes held;                     // fixed components, which neither of them leaves out
+    int together = 1;               // vectors of a cycle; where they are more, x, y, d and c hold SEVERAL
 
     int64_t size() const { return n * b; }
     int64_t grain() const { return b == 3 ? 1024 : 128; }
@@ -162,6 +164,7 @@ public:
     // next = x + d with d = alpha d + beta D^-1 (c - A x); or next = c - A x without smoothing.
     void step(float* from, float* to, float alpha, float beta, bool smooth) {
         halo->update(from);
+        if (together > 1) return step_several(from, to, alpha, beta, smooth);
         if (elements) return step_elements(from, to, alpha, beta, smooth);
         const bool single = clusters.empty() && patches.empty();
         const float* inverse = smooth && single ? Dinv.data() : nullptr;
@@ -186,6 +189,7 @@ public:
 
     // d = beta D^-1 c and x = d: a first step from zero needs no product.
     void first_step(float beta) {
+        if (together > 1) return change_several(of(c), nullptr, of(x), 0, beta);
         if (!patches.empty()) return patches.step(b, c.data(), nullptr, d.data(), x.data(), 0, beta);
         if (!clusters.empty()) return clusters.step(b, c.data(), nullptr, d.data(), x.data(), 0, beta);
         parallel_ranges(n, 8 * grain(), [&](int64_t first, int64_t last) {
@@ -215,9 +219,23 @@ public:
         }
     }
 
+    // Whether a cycle takes several vectors at once.
+    bool serves_several() const { return !thin && !exact && clusters.empty() && patches.empty(); }
+
+    // Let the next cycle be one of `count` vectors.
+    void set_together(int count) {
+        together = count;
+        for (Floats* v : {&x, &y, &d, &c})
+            if (count > 1) v->resize(SEVERAL * size() + 8);
+    }
+
+    static Several* of(Floats& v) { return reinterpret_cast<Several*>(v.data()); }
+
     void residual(Floats& out) { step(x.data(), out.data(), 0, 0, false); }
 
 private:
+    Floats apart;  // several vectors, each behind the other
+
     void allocate(int64_t own, int block, const Bytes& fixed) {
         n = own;
         b = block;
@@ -248,6 +266,45 @@ private:
                 change = alpha * change + beta * (D[j] * r[0] + D[3 + j] * r[1] + D[6 + j] * r[2]);
                 to[3 * i + j] = from[3 * i + j] + change;
             }
+        });
+    }
+
+    void step_several(const float* from, float* to, float alpha, float beta, bool smooth) {
+        const Several* x = reinterpret_cast<const Several*>(from);
+        Several* next = reinterpret_cast<Several*>(to);
+        if (elements)
+            residual_of_elements(x, next);
+        else
+            with_size(b, [&](auto B) {
+                for_rows(n, [&](int64_t i) KL_INLINE_LAMBDA {
+                    residual_row<decltype(B)::value>(graph, A.data(), of(c), x, i, next);
+                });
+            });
+        if (smooth) change_several(next, x, next, alpha, beta);
+    }
+
+    // r = c - A x with the elements, one vector after another: in vectors of their own they take fewer bytes.
+    void residual_of_elements(const Several* x, Several* r) {
+        const int64_t N = size() + 1;  // a number behind the last is read
+        apart.resize(N * together);
+        for_rows(size(), [&](int64_t i) KL_INLINE_LAMBDA {
+            for (int v = 0; v < together; ++v) apart[v * N + i] = x[i][v];
+        });
+        for (int v = 0; v < together; ++v) elements->multiply(&apart[v * N], &apart[v * N]);
+        for_rows(size(), [&](int64_t i) KL_INLINE_LAMBDA {
+            Several sum = {};
+            for (int v = 0; v < together; ++v) sum[v] = apart[v * N + i];
+            r[i] = held[i] ? Several{} : of(c)[i] - sum;
+        });
+    }
+
+    // d = alpha d + beta D^-1 r and next = from + d, or both = beta D^-1 r without from.
+    void change_several(const Several* r, const Several* from, Several* next, float alpha, float beta) {
+        with_size(b, [&](auto B) {
+            for_rows(n, [&](int64_t i) KL_INLINE_LAMBDA {
+                constexpr int b = decltype(B)::value;
+                change<b>(&Dinv[i * b * b], r + i * b, from ? from + i * b : nullptr, of(d) + i * b, next + i * b, alpha, beta);
+            });
         });
     }
 

@@ -116,9 +116,10 @@ public:
         });
     }
 
-    // x has a number behind its last.
-    void multiply(const double* x, double* y, bool tied = true) const {
-        multiply(x, [&](int64_t i, const double* sum) { std::copy(sum, sum + 3, y + 3 * i); }, tied);
+    // x has a number behind its last; y may be x.
+    template <class T>
+    void multiply(const T* x, T* y, bool tied = true) const {
+        multiply(x, [&](int64_t i, const T* sum) { std::copy(sum, sum + 3, y + 3 * i); }, tied);
     }
 
     // The diagonal blocks, row-major; they are kept from `norm` on until they are taken.  Those of ties are

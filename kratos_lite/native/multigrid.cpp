@@ -105,14 +105,16 @@ public:
         });
     }
 
+    // Of one vector r (n), or of several (k, n).
     Array<double> cycle(Array<double> r) {
-        require(r.size() == static_cast<int64_t>(fixed.size()), "r must have one number for each unknown");
-        Array<double> z(r.size());
+        const int64_t size = static_cast<int64_t>(fixed.size()), count = r.ndim() == 2 ? r.shape(0) : 1;
+        require(r.size() == count * size && r.shape(r.ndim() - 1) == size, "r must have one number for each unknown");
+        Array<double> z = r.ndim() == 2 ? Array<double>({count, size}) : Array<double>(size);
         const double* from = r.data();
         double* to = z.mutable_data();
         GilReleased release;
         const auto turn = at_work();
-        hierarchy.cycle(from, to);
+        hierarchy.cycles(from, to, count);
         return z;
     }
 

@@ -70,7 +70,8 @@ struct Transfer {
     }
 
     // c of the coarse level = P^T y of the fine one
-    void restrict_to(const Level& fine, Level& coarse) const {
+    void restrict_to(Level& fine, Level& coarse) const {
+        if (coarse.together > 1) return restrict_several(fine, coarse);
         const float* from = fine.y.data();
         float* to = coarse.c.data();
         parallel_ranges(static_cast<int64_t>(columns.indptr.size()) - 1, 64, [&](int64_t first, int64_t last) {
@@ -95,6 +96,7 @@ struct Transfer {
     // x of the fine level += P x of the coarse one
     void prolong(Level& coarse, Level& fine) const {
         coarse.halo->update(coarse.x.data());
+        if (coarse.together > 1) return prolong_several(coarse, fine);
         const float* from = coarse.x.data();
         float* to = fine.x.data();
         parallel_ranges(fine.n, 1024, [&](int64_t first, int64_t last) {
@@ -111,6 +113,41 @@ struct Transfer {
                 for (int c = 0; c < 3; ++c)
                     if (!fine_fixed[3 * i + c]) to[3 * i + c] += sum[c];
             }
+        });
+    }
+
+private:
+    // f(b, m) with the size of the blocks; weights count as blocks 3 x 3.
+    template <class F>
+    void with_blocks(const Level& fine, const F& f) const {
+        if (weights) return f(std::integral_constant<int, 3>(), std::integral_constant<int, 3>());
+        with_size(fine.b, [&](auto b) { f(b, std::integral_constant<int, MODES>()); });
+    }
+
+    void restrict_several(Level& fine, Level& coarse) const {
+        with_blocks(fine, [&](auto B, auto M) {
+            for_rows(coarse.n, [&](int64_t i) KL_INLINE_LAMBDA {
+                constexpr int m = decltype(M)::value;
+                Several* to = Level::of(coarse.c) + i * m;
+                transfer_row<decltype(B)::value, m, true>(columns.indptr.data(), columns.rows.data(),
+                                                          columns.entries.data(), P.data.data(), weights == 1,
+                                                          Level::of(fine.y), i, to);
+                for (int c = 0; weights && c < m; ++c)
+                    if (coarse_fixed[3 * i + c]) to[c] = Several{};
+            });
+        });
+    }
+
+    void prolong_several(Level& coarse, Level& fine) const {
+        with_blocks(fine, [&](auto B, auto M) {
+            for_rows(fine.n, [&](int64_t i) KL_INLINE_LAMBDA {
+                constexpr int b = decltype(B)::value;
+                Several sum[b], *to = Level::of(fine.x) + i * b;
+                transfer_row<b, decltype(M)::value, false>(P.indptr.data(), P.indices.data(), nullptr, P.data.data(),
+                                                           weights == 1, Level::of(coarse.x), i, sum);
+                for (int c = 0; c < b; ++c)
+                    if (!weights || !fine_fixed[3 * i + c]) to[c] += sum[c];
+            });
         });
     }
 };

@@ -51,7 +51,7 @@ class Pencil:
     K: Csr
     rigid: Array
     start: Callable[[int], Array]  # makes of a number so many real modes (k, n), and rigid motions
-    precondition: Callable[[Array], Array]  # about K⁻¹, of one vector (n,)
+    precondition: Callable[[Array], Array]  # about K⁻¹, of vectors (k, n)
 
     def modes(self, count: int) -> tuple[Complexes, Complexes]:
         """Return λ (count,) in 1/s, nearest to 0 first, and shapes (n, count) of length 1."""
@@ -96,7 +96,7 @@ class Pencil:
             values, Y = values[chosen], Y[:, chosen].T
             MV, CV, KV = products
             residual = values[:, None] ** 2 * (Y @ MV) + values[:, None] * (Y @ CV) + Y @ KV
-            W = [np.stack([self.precondition(r) for r in part]) for part in (residual.real, residual.imag)]
+            W = [self.precondition(part) for part in (residual.real, residual.imag)]
             energies = (residual.real * W[0] + residual.imag * W[1]).sum(axis=1)
             sizes = (np.abs(values) + SMALL * np.abs(values).max()) ** 2
             errors = np.abs(energies) / (sizes * (np.abs(Y) ** 2).sum(axis=1))

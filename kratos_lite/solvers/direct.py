@@ -46,6 +46,10 @@ class Factorization:
         x = self.apply(b)
         return x + self.apply(b - self.A @ x)
 
+    def rows(self, b: Array) -> Array:
+        """Return x without refinement of one b (n,), or of several (k, n)."""
+        return self.apply(b.T).T
+
 
 def factorize_dense(A: Array) -> Factorization:
     """Return a full matrix (n, n) factorized: its inverse, as NumPy keeps no other factors."""

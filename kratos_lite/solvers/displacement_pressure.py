@@ -66,8 +66,8 @@ class DisplacementPressure:
         self._kernel = self._cycle.with_pressures(_arrays(K.D), _arrays(self._S), *vectors)
 
     def precondition(self, r: Array) -> Array:
-        """Return about K⁻¹ r: a rough solution."""
-        return self.solve(r, ROUGH, 0.0)[0]
+        """Return about K⁻¹ r (3n,), or that of several vectors (k, 3n): rough solutions."""
+        return np.apply_along_axis(lambda each: self.solve(each, ROUGH, 0.0)[0], -1, r)
 
     def solve(
         self, b: Array, tolerance: float, norm: float, each: GoOn | None = None

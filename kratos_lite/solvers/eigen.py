@@ -58,8 +58,8 @@ def modes(K: Csr, M: Csr, count: int, progress: Progress | None = None) -> tuple
     shift = 1e-2 * first_shift(K, M)  # motions that nothing holds have λ = 0
     A = (K + shift * M).tocsr()
     norms = float(abs(A).sum(axis=1).max()), float(abs(M).sum(axis=1).max())
-    solve = direct.factorize(A).apply
-    problem = Problem(n, lambda X: (A @ X.T).T, lambda X: (M @ X.T).T, solve, norms, progress=progress)
+    factors = direct.factorize(A)
+    problem = Problem(n, lambda X: (A @ X.T).T, lambda X: (M @ X.T).T, factors.rows, norms, progress=progress)
     squares, shapes = problem.lowest(count)
     return np.sqrt(np.maximum(squares - shift, 0.0)), shapes.T
 
@@ -147,7 +147,7 @@ class Problem:
     n: int
     K: Operator
     M: Operator
-    precondition: Callable[[Array], Array]  # about K⁻¹, of one vector (n,)
+    precondition: Operator  # about K⁻¹
     norms: tuple[float, float]  # largest row sums of |K| and |M|
     known: tuple[Array, Array] | None = None  # R (k, n) with R M R^T = 1, and R M
     progress: Progress | None = None
@@ -185,10 +185,7 @@ class Problem:
 
     def _start(self, count: int) -> Array:
         """Return vectors (count, n) in which low modes are large, the same each time."""
-        return self._preconditioned(self.M(_random(count, self.n)))
-
-    def _preconditioned(self, X: Array) -> Array:
-        return np.stack([self.precondition(x) for x in X])
+        return self.precondition(self.M(_random(count, self.n)))
 
     def _descend(self, X: Array, done: Done) -> tuple[Array, Array, Array]:
         """Return λ, x and M x of as many vectors as X has, from these, when `done`."""
@@ -212,7 +209,7 @@ class Problem:
             for V in (S, KS, MS):
                 _combine(V, both)
             residual = KS[active] - squares[active, None] * MS[active]
-            W = self._preconditioned(residual)
+            W = self.precondition(residual)
             gaps = (squares[-1] - squares[active]) / np.abs(squares[-1])  # beyond which others mix in
             errors[active] = self._errors(residual, W, S[active], squares[active], allowed)
             errors[active] /= np.clip(gaps, NEAR, 1.0)

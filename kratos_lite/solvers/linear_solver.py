@@ -103,14 +103,14 @@ class LinearSolver:
         return self.K.times(u) if isinstance(self.K, BlockMatrix) else np.stack([self.K @ each for each in u])
 
     def precondition(self, r: Array) -> Array:
-        """Return about K⁻¹ r of free degrees of freedom (q,): a cycle of multigrid, or a solution."""
+        """Return about K⁻¹ r of free degrees of freedom (q,), or (k, q): a multigrid cycle, or a solution."""
         if not self.plan.iterates:
-            return self.factors.apply(r)
+            return self.factors.rows(r)
         if self._without_means is not None:
             return self._without_means.precondition(r)
-        forces = np.zeros(len(self.constraint_map.c))
-        forces[self.constraint_map.free] = r
-        return self._multigrid.precondition(forces)[self.constraint_map.free]
+        forces = np.zeros((*r.shape[:-1], len(self.constraint_map.c)))
+        forces[..., self.constraint_map.free] = r
+        return self._multigrid.precondition(forces)[..., self.constraint_map.free]
 
     def _fraction(self, f: Array, c: Array, size: float) -> float:
         """Return the fraction of |b|, a `size`, that tolerances refer to."""

@@ -43,7 +43,7 @@ class Solver(Protocol):
     levels: list[int]
 
     def precondition(self, r: Array) -> Array:
-        """Return about A⁻¹ r (3n,)."""
+        """Return about A⁻¹ r (3n,), or that of several vectors (k, 3n)."""
 
     def solve(
         self, b: Array, tolerance: float, norm: float, each: GoOn | None = None
@@ -128,7 +128,7 @@ class Compiled:
         )
 
     def precondition(self, r: Array) -> Array:
-        """Return one V-cycle on r (3n,)."""
+        """Return one V-cycle on r (3n,), or on several vectors (k, 3n), for which matrices are read once."""
         return self._kernel.cycle(r)
 
     def with_pressures(self, *matrices: Any) -> Any:
@@ -164,8 +164,8 @@ class Pyamg:
         self.levels: list[int] = [level.A.shape[0] for level in hierarchy.levels]
 
     def precondition(self, r: Array) -> Array:
-        """Return one V-cycle on r (3n,)."""
-        return self._cycle @ r
+        """Return one V-cycle on r (3n,), or on several vectors (k, 3n)."""
+        return (self._cycle @ r.T).T
 
     def solve(
         self, b: Array, tolerance: float, norm: float, each: GoOn | None = None

@@ -63,8 +63,11 @@ def test_smoothing_is_that_of_the_matrix(kind, material):
     free = system.constraint_map.is_free
     linear = p_coarse_level(system.points, system.groups)
     r[~free] = 0.0
-    z = [multigrid(A, free, model.mesh.points, linear).precondition(r) for A in (product, K)]
+    solvers = [multigrid(A, free, model.mesh.points, linear) for A in (product, K)]
+    z = [solver.precondition(r) for solver in solvers]
     close(*z, 1e-4)  # in single precision
+    for solver in solvers:
+        close(solver.precondition(np.stack([r, -2 * r])), np.stack([z[0], -2 * z[0]]), 1e-4)
 
 
 def test_groups_of_several_kinds_and_a_last_group_that_is_not_full():

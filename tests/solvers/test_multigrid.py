@@ -276,6 +276,10 @@ def test_the_preconditioner_is_symmetric_and_positive(path, name):
         assert x @ My == pytest.approx(y @ Mx, rel=0, abs=1e-5 * size)
         assert x @ Mx > 0
         np.testing.assert_array_equal(Mx[~free], 0.0)
+        for k in (2, 9):  # at once, as one by one
+            several = solver.precondition(np.stack([(i + 1) * x - i * y for i in range(k)]))
+            expected = np.stack([(i + 1) * Mx - i * My for i in range(k)])
+            np.testing.assert_allclose(several, expected, rtol=0, atol=2e-5 * k * np.abs([Mx, My]).max())
 
 
 THREADED = ["clamped 8N", "clamped 20N", "clamped 10N", "partly fixed", "periodic", "large"]
