@@ -324,7 +324,7 @@ def test_folders_of_kratos_that_are_refused_say_why(tmp_path, monkeypatch):
     refused = "refused |  |  | 'Clay' is not a law that kratos_lite has |"
     assert f"| below/box | {element} | Clay |  | {refused}\n" in page
     assert "| below/none |  | Clay |  | file not at hand |  |  | none |\n" in page
-    assert " 1 refused, 1 file not at hand.\n" in page
+    assert "\n1 refused, 1 file not at hand.\n" in page
 
 
 @pytest.mark.skipif(not CONSTITUTIVE_LAWS, reason="KratosConstitutiveLawsApplication is not installed")

@@ -99,7 +99,7 @@ class StaticAnalysis:
         loads = self.model.loads if loads is None else loads
         case = load_set(self.model, self._state, self._dirichlet, loads, phase)
         if checked:
-            with phase("check"):
+            with phase("load"):
                 case.warnings = warnings_of(case.loads, self.model.mesh, self._state.groups)
         return case
 

@@ -84,7 +84,8 @@ class FiniteJ2Plasticity3D(J2Plasticity3D):
         J = square[..., 0] ** 0.5
         dp = self._increment(q / J, p, mu * mean / J)[0]
         s *= (1 - 3 * mu * mean * dp / np.where(q > 0, q, 1.0))[..., None]
-        metric = square ** (1 / 3) * (s / mu + mean[..., None] * inverse) - voigt.UNIT
+        flown = square ** (1 / 3) * (s / mu + mean[..., None] * inverse) - voigt.UNIT
+        metric = np.where(dp[..., None] > 0, flown, state["plastic_metric"])
         new = {"plastic_metric": metric, "accumulated_plastic_strain": (p + dp)[..., None]}
         return s + (lam + 2 / 3 * mu) / 2 * (square - 1) * inverse, None, new
 
@@ -92,7 +93,8 @@ class FiniteJ2Plasticity3D(J2Plasticity3D):
         """Return the elastic part; see `Material.energy`."""
         lam, mu = self.elastic.lame
         C = voigt.UNIT + 2 * strain * voigt.HALF_SHEAR
-        square = voigt.determinant(C)
-        trace = ((voigt.UNIT + state["plastic_metric"]) * C) @ voigt.SHEAR_TWICE
+        square, metric = voigt.determinant(C), voigt.UNIT + state["plastic_metric"]
+        # The return keeps the trace of b̄_e, not the volume of F_p: without it, energy would grow.
+        trace = (metric * C) @ voigt.SHEAR_TWICE * voigt.determinant(metric) ** (-1 / 3)
         volume = (lam + 2 / 3 * mu) / 4 * (square - 1 - np.log(square))
         return np.asarray(volume + mu / 2 * (square ** (-1 / 3) * trace - 3))

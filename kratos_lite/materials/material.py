@@ -309,7 +309,8 @@ class Material:
     def _tangent(self, strain: Array, state: GaussState, dt: float, stress: Array) -> Array:
         """Return ∂σ/∂ε (..., 6, 6) from one-sided differences, six more evaluations."""
         size = np.maximum(np.abs(strain).max(axis=-1), STRAIN_STEP)
-        h = np.finfo(float).eps ** 0.5 * size
+        # Rounding is that of the strain, or at large strains that of 1 + 2 E.
+        h = np.sqrt(np.finfo(float).eps * size * (size if self.strain_measure == "small" else 1.0))
         D = np.empty((*strain.shape, 6))
         for column in range(6):
             moved = strain.copy()

@@ -153,8 +153,12 @@ class Solid(Tabular):
     def is_nonlinear(self) -> bool:
         """Whether a law is not linear, or an element has large displacements."""
         laws = self._used_materials()
-        if not all(law.is_linear and law.strain_measure == "small" for law in laws):
-            return True
+        small = all(law.is_linear and law.strain_measure == "small" for law in laws)
+        return not small or self._has_large_displacements
+
+    @property
+    def _has_large_displacements(self) -> bool:
+        """Whether an element has them."""
         if self.formulation is not None:
             return self.formulation in ("total_lagrangian", "f_bar")
         return any(len(b) and b.name in ELEMENTS and ELEMENTS[b.name].finite for b in self.mesh.blocks)
@@ -173,10 +177,10 @@ class Solid(Tabular):
         """
         if self.is_nonlinear:
             laws = {type(law).__name__ for law in self._used_materials() if not law.is_linear}
+            large = "large displacements" if self._has_large_displacements else "a load that follows the body"
             raise ModelError(
-                f"{what} takes linear laws and small displacements; got "
-                f"{', '.join(sorted(laws)) or 'large displacements or a load that follows'}; take "
-                "model.solve() or model.quasi_static() of the model as it is"
+                f"{what} takes linear laws and small displacements; got {', '.join(sorted(laws)) or large}; "
+                "take model.solve() or model.quasi_static() of the model as it is"
             )
 
     @property
