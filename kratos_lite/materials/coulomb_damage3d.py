@@ -18,12 +18,7 @@ class CoulombDamage3D(VonMisesDamage3D):
 
     Parameters
     ----------
-    E, nu : Young's modulus in Pa and Poisson's ratio.
-    strength : stress in Pa at which a bar under tension begins to soften, > 0.
-    fracture_energy : J/m², > 0.
-    linear : 1 for linear softening, 0 for exponential one; SOFTENING_TYPE of files is 0 and 1.
-    density : kg/m³.
-    alpha : thermal expansion in 1/K; see `Temperature`.
+    E, nu, strength, fracture_energy, linear, density, alpha : as of `VonMisesDamage3D`.
     friction : angle φ in degrees, 0 < φ < 90.
     compression : strength of compression in Pa; 0 for that of tension.
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from kratos_lite import voigt
 from kratos_lite.errors import MaterialError
-from kratos_lite.materials.isotropic_law import ELASTIC, VonMises
+from kratos_lite.materials.isotropic_law import ELASTIC, IsotropicLaw
 from kratos_lite.materials.material import GaussState, Response
 from kratos_lite.typing import Array, ArrayLike
 from kratos_lite.validation import Axes
@@ -22,7 +22,7 @@ MOST_ITERATIONS = 50
 
 
 @dataclass(frozen=True)
-class J2Plasticity3D(VonMises):
+class J2Plasticity3D(IsotropicLaw):
     """Elastic up to the yield stress of von Mises, then plastic flow without change of volume.
 
     The yield stress grows with the accumulated plastic strain p, and its center, the back stress, with the
@@ -83,6 +83,7 @@ class J2Plasticity3D(VonMises):
     alpha: float = 0.0
     curve: ArrayLike = ()
 
+    keeps_volume: ClassVar[bool] = True
     positive: ClassVar[Mapping[str, str]] = {"yield_stress": "Pa"}
     not_negative: ClassVar[Mapping[str, str]] = {
         "hardening": "Pa; for softening take J2Softening3D",
@@ -144,7 +145,7 @@ class J2Plasticity3D(VonMises):
     def response(self, strain: Array, state: GaussState, dt: float) -> Response:
         """Return stress, consistent tangent and internal variables; see `Material.response`."""
         G = self.elastic.lame[1]
-        stress, n, q = self.trial(strain, state, state["back_stress"])
+        stress, n, q = self._trial(strain, state)
         p = state["accumulated_plastic_strain"][..., 0]
         dp, slope = self._increment(q, p, G)
         flow = (1.5**0.5 * dp)[..., None] * n
@@ -156,7 +157,24 @@ class J2Plasticity3D(VonMises):
         if not dp.any():
             return stress, self.elastic.C, new
         growth = np.where(dp > 0, 1 / (3 * G + self.kinematic + slope), 0.0)
-        return stress - 2 * G * flow, self.tangent(n, q, dp, growth), new
+        return stress - 2 * G * flow, self._consistent(n, q, dp, growth), new
+
+    def _trial(self, strain: Array, state: GaussState) -> tuple[Array, Array, Array]:
+        """Return the elastic trial stress (..., 6), s/|s| and √(3/2) |s| (...), s from its center."""
+        center = state["back_stress"]
+        stress = voigt.times(strain - state["plastic_strain"], self.elastic.C)
+        s = voigt.deviator(stress) - center
+        norm = np.sqrt(s**2 @ voigt.SHEAR_TWICE)
+        return stress, s / np.where(norm > 0, norm, 1.0)[..., None], 1.5**0.5 * norm
+
+    def _consistent(self, n: Array, q: Array, dp: Array, slope: Array) -> Array:
+        """Return ∂σ/∂ε of a return by Δp from the trial q along n, where Δp grows with q by a slope (...)."""
+        G = self.elastic.lame[1]
+        beta = 6 * G**2 * dp / np.where(q > 0, q, 1.0)
+        D = np.einsum("...i,...j->...ij", (beta - 6 * G**2 * slope)[..., None] * n, n)
+        D += self.elastic.C
+        D -= beta[..., None, None] * voigt.DEVIATOR
+        return D
 
     def _increment(self, q: Array, p: Array, G: float) -> tuple[Array, Array]:
         """Return the increment of p at which q - (3G + kinematic) Δp = σ_Y(p + Δp), and the slope of σ_Y."""

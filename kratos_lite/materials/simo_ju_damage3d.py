@@ -19,12 +19,7 @@ class SimoJuDamage3D(VonMisesDamage3D):
 
     Parameters
     ----------
-    E, nu : Young's modulus in Pa and Poisson's ratio.
-    strength : stress in Pa at which a bar under tension begins to soften, > 0.
-    fracture_energy : J/m², > 0.
-    linear : 1 for linear softening, 0 for exponential one; SOFTENING_TYPE of files is 0 and 1.
-    density : kg/m³.
-    alpha : thermal expansion in 1/K; see `Temperature`.
+    E, nu, strength, fracture_energy, linear, density, alpha : as of `VonMisesDamage3D`.
 
     Raises
     ------

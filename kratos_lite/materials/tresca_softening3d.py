@@ -17,21 +17,8 @@ class TrescaSoftening3D(Softening):
 
     Parameters
     ----------
-    E, nu : Young's modulus in Pa and Poisson's ratio.
-    yield_stress : σ_Y of tension in Pa, > 0.
-    fracture_energy : J/m², > 0.
-    curve : of the yield stress, 0 to 6: linear softening; exponential; to a peak, then exponential; perfect
-        plasticity; a polynomial of the plastic strain; linear, then exponential; through points.
-    compression : yield stress of compression in Pa; 0 for that of tension.
-    density : kg/m³.
-    alpha : thermal expansion in 1/K; see `Temperature`.
-    friction, dilatancy : angles in degrees, 0 ≤ ψ ≤ φ < 90, of a cone or pyramid as surface or potential.
-    peak, peak_at : of curve 2, stress in Pa and κ, 0 … 1.
-    linear_until : of curves 0 and 5, κ from which on softening is exponential; 0 for 0.99 and 0.9.
-    strains, stresses : of curve 6, plastic strains from 0 and stresses in Pa; of curve 4, the two strains
-        where the polynomial and the constant after it end, and its coefficients in Pa.
-    potential : of the flow, ``VonMises``, ``DruckerPrager``, ``Tresca`` or ``ModifiedMohrCoulomb``; that of
-        the surface if not given.
+    E, nu, yield_stress, fracture_energy, curve, compression, density, alpha : as of `J2Softening3D`.
+    friction, dilatancy, peak, peak_at, linear_until, strains, stresses, potential : as of `J2Softening3D`.
 
     Raises
     ------
