@@ -22,7 +22,7 @@ from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.linear_solver import LinearSolver
 from kratos_lite.solvers.mass import Mass
-from kratos_lite.solvers.plan import LIGHT, Facts, Plan, choose, stepped
+from kratos_lite.solvers.plan import LIGHT, Facts, Plan, choose
 from kratos_lite.typing import Array, Mask, Progress
 from kratos_lite.validation import finite
 
@@ -53,7 +53,7 @@ class EquationsOfMotion:
         steady: bool = False,
         massless: bool = False,
         solver: str = "direct",
-        planned: Callable[[str, Facts], Plan] = choose,
+        use: str = "once",
         progress: Progress | None = None,
     ) -> None:
         self.model, self._steady = model, steady
@@ -81,7 +81,7 @@ class EquationsOfMotion:
             self.groups,
             model.supports.constraint_map,
             solver=solver,
-            planned=planned,
+            use=use,
             hanging=model.mesh.hanging,
             patterns=model.patterns,
             progress=progress,
@@ -307,7 +307,8 @@ class EquationsOfMotion:
         alpha, beta = self.rayleigh
         size = k + c * beta  # of K, by which the equations are divided
         mass, factors = (m + c * alpha) / size, (m / size, c / size, k / size)
-        made, plan = self.system.equations, stepped(len(self.system.constraint_map.free))
+        made, n = self.system.equations, len(self.system.constraint_map.free)
+        plan = choose("auto", Facts(n, use="steps"))
         nodal, symmetric = mass * self.mass.nodal, self.is_symmetric(time, c)
         made = replace(made, plan=plan, mass=nodal, symmetric=symmetric)
         if isinstance(self.K, BlockMatrix) or np.abs(nodal).max() > LIGHT * self.system.norm:

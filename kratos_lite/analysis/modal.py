@@ -19,7 +19,7 @@ from kratos_lite.solvers.complex_eigen import Pencil, unresisted_modes
 from kratos_lite.solvers.constraints import ConstraintMap, rigid_modes
 from kratos_lite.solvers.eigen import Operator, Problem, dense_modes, is_small, modes_near
 from kratos_lite.solvers.linear_solver import LinearSolver
-from kratos_lite.solvers.plan import DENSE_MODES, FALLBACK_LIMIT, of_modes, stepped
+from kratos_lite.solvers.plan import DENSE_MODES, FALLBACK_LIMIT, Facts, choose
 from kratos_lite.typing import Array, Complexes, Progress
 from kratos_lite.validation import instance, number, whole_number
 
@@ -39,7 +39,7 @@ def natural_modes(
     solver = "auto" if near is None else "direct"
     phase = Phases(progress)
     with phase("check"):
-        options: Any = {"solver": solver, "planned": of_modes, "progress": progress}
+        options: Any = {"solver": solver, "use": "modes", "progress": progress}
         e = EquationsOfMotion(model, lumped=lumped, free=preload is None, **options)
     constraints, n = e.system.constraint_map, len(e.system.constraint_map.free)
     if near is not None and n > FALLBACK_LIMIT:
@@ -127,7 +127,8 @@ def complex_modes(
     with phase("assemble"):
         M, C, K = (reduced(e, e.matrix(0.0, *factors)) for factors in ((1, 0, 0), (0, 1, 0), (0, 0, 1)))
     with phase("modes"):
-        solver = replace(e.system.equations, plan=stepped(len(e.system.constraint_map.free)))
+        plan = choose("auto", Facts(len(e.system.constraint_map.free), use="steps"))
+        solver = replace(e.system.equations, plan=plan)
 
         def start(number: int) -> Array:
             return _by_iteration(e, solver, number + len(_free_motions(e)), progress)[1].T

@@ -21,7 +21,7 @@ from kratos_lite.assembly.gauss_point_fields import totals
 from kratos_lite.assembly.nonlinear_assembly import States, named, unnamed
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.newton import newton
-from kratos_lite.solvers.plan import stepped
+from kratos_lite.solvers.plan import Facts, choose
 from kratos_lite.solvers.tangents import Changes, Tangents
 from kratos_lite.typing import Array
 
@@ -76,10 +76,10 @@ class NonlinearMotion(EquationsOfMotion):
     def solver(self, time: float, m: float, c: float, k: float, h: float) -> Solve:
         """Return what solves m M u + c C u + k (r(u₀ + u) - r(u₀)) = f + reactions, u₀ of the history."""
         # Tangents are solved with the multigrid of the body at rest.
-        plan, made = stepped(len(self.system.constraint_map.free)), super().solver
+        n, made = len(self.system.constraint_map.free), super().solver
         tangents = Tangents(
             self.system,
-            plan,
+            choose("auto", Facts(n, use="steps")),
             self.assembly.symmetric,
             lambda: made(time, m, c, k, h).args[0],  # type: ignore[attr-defined]
         )

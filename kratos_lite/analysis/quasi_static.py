@@ -29,7 +29,7 @@ from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.direct import one_thread
 from kratos_lite.solvers.linear_solver import LinearSolver
 from kratos_lite.solvers.newton import SMALLEST_PART, in_parts, newton
-from kratos_lite.solvers.plan import Plan, stepped
+from kratos_lite.solvers.plan import Facts, Plan, choose
 from kratos_lite.solvers.tangents import Changes, Tangents
 from kratos_lite.typing import Array, Progress
 from kratos_lite.validation import number, whole_number
@@ -141,7 +141,7 @@ class QuasiStaticAnalysis(ModelInTime):
         free_motions(mesh.replace(points=x), supports, self.groups).check((), moving=False)
         self.system.constraint_map = supports.constraint_map(self.system.nodes)
         self.prescribed = PrescribedMotion(supports, self.system)
-        plan = stepped(len(self.system.constraint_map.free), self.solver)
+        plan = choose(self.solver, Facts(len(self.system.constraint_map.free), use="steps"))
         if self.arc_length:
             plan = Plan("direct", "tangents beyond a limit point are not positive definite")
         symmetric, constant = self.assembly.symmetric and not self.arc_length, self.assembly.constant

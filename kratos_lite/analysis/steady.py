@@ -13,7 +13,7 @@ from kratos_lite.model.checks import check_loads, equilibrium
 from kratos_lite.model.loads.base import equal_loads
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.linear_solver import LinearSolver
-from kratos_lite.solvers.plan import repeated
+from kratos_lite.solvers.plan import Facts, choose
 from kratos_lite.typing import Progress
 
 
@@ -39,8 +39,9 @@ def solve_steady(
     with phase("assemble"):
         A, symmetric = e.matrix(0.0, 0.0, 0.0, 1.0), e.is_symmetric(0.0, 0.0)
     with phase("solve"):
-        plan = repeated(solver, len(e.system.constraint_map.free), symmetric)
-        equations = LinearSolver(A, e.system.constraint_map, e.system.points, plan, symmetric=symmetric)
+        n, constraints = len(e.system.nodes), e.system.constraint_map
+        plan = choose(solver, Facts(len(constraints.free), 3 * n, symmetric, "motion"))
+        equations = LinearSolver(A, constraints, e.system.points, plan, symmetric=symmetric)
         solution = equations.solve(forces, tolerance, progress)
     with phase("verify"):
         u = solution.x

@@ -29,7 +29,7 @@ from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.direct import one_thread
 from kratos_lite.solvers.linear_solver import Solution
 from kratos_lite.solvers.newton import SMALLEST_PART, in_parts
-from kratos_lite.solvers.plan import REPEATED_LIMIT, of_motion
+from kratos_lite.solvers.plan import REPEATED_LIMIT
 from kratos_lite.typing import Array, ArrayLike, Progress
 from kratos_lite.validation import finite, flag, function_or_none
 
@@ -96,7 +96,7 @@ class TransientAnalysis(ModelInTime):
         lumped = flag(lumped, "lumped") or self.integrator.lumps_mass
         kind = NonlinearMotion if model.is_nonlinear else EquationsOfMotion
         plain = not model.is_nonlinear and model.motion is None
-        how: dict[str, Any] = {"solver": "auto", "planned": of_motion} if plain else {}
+        how: dict[str, Any] = {"solver": "auto", "use": "steps"} if plain else {}
         e = kind(model, lumped=lumped, rayleigh=rayleigh, progress=progress, **how)
         self.equations = e
         e.warnings += equal_loads(model.loads, model.named_loads)

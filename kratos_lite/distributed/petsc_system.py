@@ -54,7 +54,7 @@ class PetscSystem(ConstrainedSystem):
         self._ranks, self._options = ranks, parsed(options)
         super().__init__(points, groups, constraints, solver=solver, tolerance=tolerance, progress=progress)
 
-    def _planned(self, solver: str) -> Plan:
+    def _planned(self, solver: str, use: str) -> Plan:
         ratios = [bulk_over_shear(group.material.C) for group in self.groups]
         return plan_of(solver, len(self.constraint_map.free), max(ratios, default=0.0), self._options)
 

@@ -43,7 +43,7 @@ class ConstrainedSystem:
         constraints: Callable[[Ints], ConstraintMap],
         *,
         solver: str = "auto",
-        planned: Callable[[str, Facts], Plan] = choose,
+        use: str = "once",
         tolerance: float = 1e-10,
         patterns: PatternCache | None = None,
         progress: Progress | None = None,
@@ -60,13 +60,13 @@ class ConstrainedSystem:
         self.skipped: list[str] = []
         self.warnings: list[str] = []
         self._patterns = patterns or PatternCache()
-        self._choose = planned
-        self.plan = self._planned(solver)
+        self.plan = self._planned(solver, use)
 
-    def _planned(self, solver: str) -> Plan:
+    def _planned(self, solver: str, use: str) -> Plan:
         facts = Facts(
             len(self.constraint_map.free),
             3 * len(self.nodes),
+            use=use,
             bulk_over_shear=lambda: largest_bulk_over_shear(self.groups),
             bandwidth=self._bandwidth,
             has_product=lambda: not self.attached and all(map(MatrixFree.takes, self.groups)),
@@ -75,7 +75,7 @@ class ConstrainedSystem:
             is_plate=self._is_plate,
             nodes=lambda: min(len(group.element.shape.nodes) for group in self.groups),
         )
-        return self._choose(solver, facts)
+        return choose(solver, facts)
 
     def _bandwidth(self) -> float:
         width = nodal_width(self.pattern, self.pattern.rows(), cuthill_mckee(self.pattern)[1])

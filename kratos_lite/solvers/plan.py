@@ -6,7 +6,7 @@ All thresholds of such choices stand here, each with what it means and, in paren
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from kratos_lite.elements.formulations import NEAR_HALF
 from kratos_lite.errors import InputError, SolveError
@@ -48,6 +48,11 @@ BAND_NUMBERS = 50_000_000  # a band of more numbers (0.4 GB) is not made
 
 METHODS = ("auto", "dense", "direct", "amg")
 REQUESTED = "requested"
+MANY_TIMES = {
+    "steps": (STEPPED_LIMIT, "factors are fastest over many steps", "few iterations from the last state"),
+    "motion": (REPEATED_LIMIT, "the factors give critical rates, too", "multigrid takes least memory"),
+}
+"""Uses of a matrix that serves many times: unknowns up to which it is factorized, why, and why not."""
 
 
 @dataclass(frozen=True)
@@ -71,6 +76,7 @@ class Facts:
     unknowns: int  # free degrees of freedom
     dofs: int = 0  # all degrees of freedom
     symmetric: bool = True  # whether the matrix is symmetric positive definite
+    use: str = "once"  # or for several vectors at once, ``modes``; one of `MANY_TIMES`
     # whether there are kernels of multigrid
     compiled: Callable[[], bool] = lambda: kernels("multigrid") is not None
     # largest ratio among elements that can have pressures of their own, and among plain ones
@@ -85,7 +91,10 @@ class Facts:
 
 def choose(solver: str, facts: Facts) -> Plan:
     """Return how to solve a system."""
-    plan = _by_size(facts) if choice(solver, "solver", METHODS) == "auto" else Plan(solver, REQUESTED)
+    choice(solver, "solver", METHODS)
+    if facts.use in MANY_TIMES:
+        return _many_times(solver, facts)
+    plan = _by_size(facts) if solver == "auto" else Plan(solver, REQUESTED)
     if plan.method == "dense" and facts.dofs > DENSE_MAX:
         raise InputError(f"solver='dense' is for up to {DENSE_MAX} degrees of freedom; got {facts.dofs}")
     if not plan.iterates:
@@ -114,6 +123,16 @@ def _by_size(facts: Facts) -> Plan:
     return Plan("amg", f"{n} unknowns > {limit}: multigrid is fastest and takes least memory")
 
 
+def _many_times(solver: str, facts: Facts) -> Plan:
+    n, (limit, few, many) = facts.unknowns, MANY_TIMES[facts.use]
+    if not facts.symmetric:
+        return Plan("direct", "the matrix of a motion with damping is not symmetric")
+    if solver not in ("auto", "amg") or (solver == "auto" and n <= limit):
+        return Plan("direct", f"{n} unknowns ≤ {limit}: {few}" if solver == "auto" else REQUESTED)
+    reason = f"{n} unknowns > {limit}: {many}" if solver == "auto" else REQUESTED
+    return Plan("amg", reason, max(facts.bulk_over_shear()) <= NEAR_HALF and needs_no_matrix(facts))
+
+
 def _is_soon_factorized(facts: Facts, plain: float) -> bool:
     n = facts.unknowns
     if n <= QUICK or (n <= SLOW and n * facts.bandwidth() ** 2 <= QUICK_BAND):
@@ -122,9 +141,13 @@ def _is_soon_factorized(facts: Facts, plain: float) -> bool:
 
 
 def needs_no_matrix(facts: Facts) -> bool:
-    """Return whether multigrid smooths well without a matrix: like stiffnesses, compact cells, no plate."""
+    """Return whether multigrid smooths well without a matrix: like stiffnesses, compact cells, no plate.
+
+    Several vectors and many steps take a matrix of elements with few nodes (8N: 0.73 s, without 1.07).
+    """
     return (
-        facts.has_product()
+        (facts.use == "once" or facts.nodes() >= MANY_NODES)
+        and facts.has_product()
         and facts.contrast() <= LARGEST_CONTRAST
         and not facts.is_stretched()
         and not facts.is_plate()
@@ -159,40 +182,6 @@ def after(iterations: int, tolerance: float, unknowns: int, slow: bool) -> Plan:
             "solver='direct'"
         )
     return Plan("direct", why)
-
-
-def repeated(solver: str, unknowns: int, symmetric: bool) -> Plan:
-    """Return how to solve the equations of a motion, whose matrix serves many times."""
-    if not symmetric:
-        return Plan("direct", "the matrix of a motion with damping is not symmetric")
-    if solver in ("direct", "amg"):
-        return Plan(solver, REQUESTED)
-    if unknowns <= REPEATED_LIMIT:
-        return Plan("direct", f"{unknowns} unknowns ≤ {REPEATED_LIMIT}: the factors give critical rates, too")
-    return Plan("amg", f"{unknowns} unknowns > {REPEATED_LIMIT}: multigrid takes least memory")
-
-
-def stepped(unknowns: int, solver: str = "auto") -> Plan:
-    """Return how to solve the equations of a step in time, whose matrix serves many times."""
-    if choice(solver, "solver", METHODS) != "auto":
-        return Plan("amg" if solver == "amg" else "direct", REQUESTED)
-    if unknowns <= STEPPED_LIMIT:
-        return Plan("direct", f"{unknowns} unknowns ≤ {STEPPED_LIMIT}: factors are fastest over many steps")
-    return Plan("amg", f"{unknowns} unknowns > {STEPPED_LIMIT}: few iterations from the last state")
-
-
-def of_modes(solver: str, facts: Facts) -> Plan:
-    """Return how to solve for several vectors at once: few nodes take a matrix (8N: 0.73 s, without 1.07)."""
-    plan = choose(solver, facts)
-    return replace(plan, matrix_free=plan.matrix_free and facts.nodes() >= MANY_NODES)
-
-
-def of_motion(solver: str, facts: Facts) -> Plan:
-    """Return how to solve the equations of a step without what a motion of the material adds."""
-    plan = stepped(facts.unknowns, solver)
-    if not plan.iterates or facts.nodes() < MANY_NODES or max(facts.bulk_over_shear()) > NEAR_HALF:
-        return plan
-    return replace(plan, matrix_free=needs_no_matrix(facts))
 
 
 def of_band(unknowns: int, width: int, height: int) -> Plan:

@@ -14,7 +14,7 @@ STEEL = kl.Isotropic3D(E=2e11, nu=0.3, density=7850.0)
 
 def facts(unknowns, **known):
     """Return facts; those that are found by functions are given as values."""
-    plain = {name: known.pop(name) for name in ("dofs", "symmetric") if name in known}
+    plain = {name: known.pop(name) for name in ("dofs", "symmetric", "use") if name in known}
     known = {"compiled": True} | known
     return Facts(unknowns, **plain, **{name: lambda value=value: value for name, value in known.items()})
 
@@ -152,7 +152,8 @@ def test_bands_are_narrow_and_small(band, method, reason):
     ],
 )
 def test_matrices_of_motions(solver, unknowns, symmetric, method):
-    assert plan.repeated(solver, unknowns, symmetric).method == method
+    known = facts(unknowns, use="motion", symmetric=symmetric)
+    assert plan.choose(solver, known).method == method
 
 
 @pytest.mark.parametrize(
