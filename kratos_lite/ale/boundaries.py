@@ -10,7 +10,7 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.elements.surface import area_vectors, face_rule, surface_mass
 from kratos_lite.errors import ModelError
 from kratos_lite.materials import Material
-from kratos_lite.mesh import Mesh, WhereElements, mask_of, with_rows
+from kratos_lite.mesh import Mesh, WhereElements, mask_of
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.typing import Array, Ints, Mask
@@ -94,10 +94,7 @@ def moving_nodes(mesh: Mesh, part: WhereElements) -> Mask:
     in_part = mask_of(mesh.elements(part), mesh.n_elements)
     if not in_part.any():
         raise ModelError("a part in motion needs one element at least; got none")
-    moving, resting = np.zeros((2, mesh.n_nodes), dtype=bool)
-    for block, at in with_rows(mesh.blocks):
-        moving[block.nodes[in_part[at]]] = True
-        resting[block.nodes[~in_part[at]]] = True
+    moving, resting = mesh.used_nodes(in_part), mesh.used_nodes(~in_part)
     shared = np.flatnonzero(moving & resting)
     if len(shared):
         raise ModelError(

@@ -17,7 +17,6 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model.free_motions import FreeMotions
-from kratos_lite.model.loads.base import warnings_of
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.linear_solver import LinearSolver
@@ -60,7 +59,6 @@ class EquationsOfMotion:
         self.step = 0.0  # s, over which an acceleration is taken from the rate; 0 for its slope
         self.rayleigh = _checked_rayleigh(rayleigh)
         self.groups, self.warnings = model.checked()  # elements on all nodes of the mesh
-        self.warnings += warnings_of(model.loads, model.mesh, self.groups)
         if model.motion is not None:
             model.require_linear("a motion of the material")
             if model.stiffness_factors is not None:

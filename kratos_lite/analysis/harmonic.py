@@ -152,10 +152,7 @@ class HarmonicResponse(Tabular):
         (f,) each by headers with units: rad/s, m and rad.
         """
         u = self.at(finite(point, "a point", (3,)))
-        made = {"frequency [rad/s]": self.frequencies}
-        for i, axis in enumerate("xyz"):
-            made |= {f"amplitude {axis} [m]": np.abs(u[:, i]), f"phase {axis} [rad]": np.angle(u[:, i])}
-        return labelled(made, self.units)
+        return labelled({"frequency [rad/s]": self.frequencies, **amplitudes(u)}, self.units)
 
     def plot(self, point: ArrayLike, axis: str = "z", path: str | Path | None = None) -> Any:
         """Draw the amplitude of a point against the frequency, on logarithmic scales.
@@ -177,6 +174,14 @@ class HarmonicResponse(Tabular):
         amplitude = np.abs(self.at(finite(point, "a point", (3,)))[:, component])
         unit = unit_name("m", self.units)
         return saved(response_figure(self.frequencies, amplitude, unit, f"amplitude of u{axis}"), path)
+
+
+def amplitudes(u: Complexes) -> dict[str, Array]:
+    """Return amplitudes and phases of complex displacements (k, 3) by headers."""
+    made = dict[str, Array]()
+    for i, axis in enumerate("xyz"):
+        made |= {f"amplitude {axis} [m]": np.abs(u[:, i]), f"phase {axis} [rad]": np.angle(u[:, i])}
+    return made
 
 
 def harmonic_response(

@@ -57,7 +57,7 @@ class Prepared:
 def prepared(model: Structure) -> Prepared:
     """Return a structure checked; MeshError, ModelError or InputError where it is broken."""
     version = model.version
-    groups, warnings = model.checked()
+    groups, warnings = model.checked(loads=False)
     return Prepared(version, groups, warnings, model.free_motions(groups))
 
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from kratos_lite.analysis.nodal_loads import AppliedLoads, Temperatures, temperatures
 from kratos_lite.analysis.prescribed_motion import PrescribedMotion
-from kratos_lite.analysis.report import Report, StepReport
-from kratos_lite.analysis.result import Result
+from kratos_lite.analysis.report import StepReport
+from kratos_lite.analysis.result import Result, result_of
 from kratos_lite.analysis.state import ModelInTime, State, check_state
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.gauss_point_fields import internal_load
@@ -20,14 +20,13 @@ from kratos_lite.assembly.nonlinear_assembly import NonlinearAssembly, States, n
 from kratos_lite.errors import InputError, ModelError, SolveError, naming
 from kratos_lite.mesh.mesh import place_of
 from kratos_lite.model.free_motions import free_motions
-from kratos_lite.model.loads.base import warnings_of
 from kratos_lite.model.loads.temperature import heated
 from kratos_lite.model.structure import Structure
 from kratos_lite.model.supports import Supports
 from kratos_lite.solvers.arc_length import along_path
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.direct import one_thread
-from kratos_lite.solvers.linear_solver import LinearSolver
+from kratos_lite.solvers.linear_solver import LinearSolver, Solution
 from kratos_lite.solvers.newton import SMALLEST_PART, in_parts, newton
 from kratos_lite.solvers.plan import Facts, Plan, choose
 from kratos_lite.solvers.tangents import Changes, Tangents
@@ -106,7 +105,6 @@ class QuasiStaticAnalysis(ModelInTime):
         if model.motion is not None:
             raise ModelError("a model with a motion has no quasi-static analysis; leave the motion out")
         self.groups, self.warnings = model.checked()
-        self.warnings += warnings_of(model.loads, model.mesh, self.groups)
         mesh, supports = model.mesh, model.supports
         what = mesh.points, self.groups, supports.constraint_map
         how: dict[str, Any] = {"patterns": model.patterns, "hanging": mesh.hanging}
@@ -114,6 +112,8 @@ class QuasiStaticAnalysis(ModelInTime):
         self.applied = AppliedLoads(model, self.system, self.groups, initial=False)
         self.assembly = assembly_of(model, self.system)
         self.solver, self.arc_length = solver, arc_length
+        self._kept = ["load", "internal", "work", "rate", "curvature", "last"]  # in states, beside u
+        self._kept += ["increment", "speed"] if arc_length else []
         super().__init__(model)
         self.u = np.zeros(3 * len(self.system.nodes))
         self._hold(supports)
@@ -369,12 +369,8 @@ class QuasiStaticAnalysis(ModelInTime):
 
     def state(self) -> State:
         """Return the model as it is now."""
-        values = {"u": self._whole(self.u).copy(), "reactions": self._reactions(), "load": self.load.copy()}
-        values |= {"internal": self.internal.copy(), "work": np.array(self.work)}
-        values |= {"rate": self.rate.copy(), "curvature": self.curvature.copy(), "last": np.array(self.last)}
-        if self.arc_length:
-            values |= {"increment": self.increment.copy(), "speed": np.array(self.speed)}
-        values |= named(self.states)
+        values = {"u": self._whole(self.u).copy(), "reactions": self._reactions()}
+        values |= {name: np.array(getattr(self, name)) for name in self._kept} | named(self.states)
         return State("model", "quasi_static", self.time, self.step, values, self.parts)
 
     def check_state(self, state: State) -> State:
@@ -398,10 +394,8 @@ class QuasiStaticAnalysis(ModelInTime):
         """Go on from a state of a model of the same mesh, elements and laws."""
         get = self.check_state(state).values
         self.u = self.system.gather(get["u"]).copy()
-        self.load, self.internal, self.work = get["load"].copy(), get["internal"].copy(), float(get["work"])
-        self.rate, self.curvature, self.last = get["rate"].copy(), get["curvature"].copy(), float(get["last"])
-        if self.arc_length:
-            self.increment, self.speed = get["increment"].copy(), float(get["speed"])
+        for name in self._kept:
+            setattr(self, name, get[name].copy() if get[name].ndim else float(get[name]))
         self.states = unnamed(get, self.states)
         self.time, self.step = float(state.time), int(state.step)
         self._heat(temperatures(self.model, self.time) if self.last else [])
@@ -423,28 +417,15 @@ class QuasiStaticAnalysis(ModelInTime):
                 self.restore(now)
         model, loads, reactions = self.model, self._whole(self.load).copy(), self._reactions()
         steps = [report for report in self.reports if report.time <= self.time]
-        report = Report(
-            unknowns=len(self.system.constraint_map.free),
-            total_load=loads.sum(axis=0),
-            total_reaction=reactions.sum(axis=0),
-            solver="newton",
-            reason=f"{self.step} {'step' if self.step == 1 else 'steps'} to t = {self.time:g} s",
-            iterations=sum(step.iterations for step in steps),
-            backward_error=steps[-1].residuals[-1] if steps else None,
-            force_error=None,
-            moment_error=None,
-            seconds={},
-            warnings=list(self.warnings),
-            notes=model.remarks(),
-            formulation=model.chosen(self.groups),
-            steps=steps,
-            work=self.work,
-        )
+        way = f"{self.step} {'step' if self.step == 1 else 'steps'} to t = {self.time:g} s"
+        solution = Solution(self.u, "newton", way, sum(step.iterations for step in steps), 0.0)
+        report: dict[str, Any] = {"unknowns": len(self.system.constraint_map.free), "seconds": {}}
+        report |= {"warnings": list(self.warnings), "steps": steps, "work": self.work}
         groups = [replace(g, states=s) for g, s in zip(self.groups, self.states, strict=True)]
         groups = heated(model.mesh, groups, self.temperatures)
-        u0 = model.initial_displacement
-        result = Result(model.mesh, groups, self._whole(self.u).copy(), reactions, loads, report, u0)
-        result._springs, result._ties = model.supports.springs, model.supports.ties
+        fields = self._whole(self.u).copy(), reactions, loads
+        result = result_of(Result, None, model, groups, fields, solution, **report)
+        result.report.backward_error = steps[-1].residuals[-1] if steps else None
         return result
 
 

@@ -171,9 +171,7 @@ def _by_plane(mesh: Mesh, plane: Plane, part: WhereElements) -> tuple[str, Array
     n, offset = plane.normal, plane.offset
     d = mesh.points @ n - offset
     d[np.abs(d) <= ON_PLANE * np.linalg.norm(np.ptp(mesh.extent, axis=0))] = 0.0
-    used = np.zeros(mesh.n_nodes, dtype=bool)
-    for block, at in with_rows(mesh.blocks):
-        used[block.nodes[inside[at]]] = True
+    used = mesh.used_nodes(inside)
     low, high = float(d[used].min(initial=np.inf)), float(d[used].max(initial=-np.inf))
     axis = "xyz"[int(n.argmax())] if n.max() == 1 else f"({', '.join(f'{c:.4g}' for c in n)})·X"
     name, spans = (
@@ -209,10 +207,7 @@ def _around(mesh: Mesh, where: Any, ties: Sequence[Coupling]) -> tuple[str, Arra
     """Return the cut around a part: its nodes count 1, those that others share half, tied ones 0."""
     name = f"around {where!r}" if isinstance(where, (str, int)) else "around some elements"
     inside = mask_of(mesh.elements(where), mesh.n_elements)
-    own, others = np.zeros((2, mesh.n_nodes), dtype=bool)
-    for block, at in with_rows(mesh.blocks):
-        own[block.nodes[inside[at]]] = True
-        others[block.nodes[~inside[at]]] = True
+    own, others = mesh.used_nodes(inside), mesh.used_nodes(~inside)
     tied = np.zeros(mesh.n_nodes, dtype=bool)
     for pair in chain.from_iterable(zip(tie.nodes_of[::2], tie.nodes_of[1::2], strict=True) for tie in ties):
         for a, b in (pair, pair[::-1]):

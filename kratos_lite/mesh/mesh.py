@@ -261,9 +261,21 @@ class Mesh(Tabular):
         where = f"{self.source}{line}: " if self.source else ""
         return f"{where}element {block.ids[cell]} ({block.name})"
 
-    def used_nodes(self) -> Mask:
-        """Return which nodes belong to an element, (n,) bool."""
-        return self._used_nodes
+    def used_nodes(self, elements: Mask | None = None) -> Mask:
+        """Return which nodes belong to an element.
+
+        Parameters
+        ----------
+        elements : mask (m,) of those that count; all if not given.
+
+        Returns
+        -------
+        (n,) bool
+        """
+        if elements is None:
+            return self._used_nodes
+        nodes = [block.nodes[elements[at]].ravel() for block, at in with_rows(self.blocks)]
+        return mask_of(np.concatenate([NO_ROWS, *nodes]), self.n_nodes)
 
     @cached_property
     def _used_nodes(self) -> Mask:

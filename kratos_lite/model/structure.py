@@ -19,7 +19,7 @@ from kratos_lite.model.attachments import AddedMass, AttachedMatrix, Attachment,
 from kratos_lite.model.free_motions import FreeMotions, free_motions
 from kratos_lite.model.joints import check_coincident, check_joints
 from kratos_lite.model.loads import Load, ScaledLoad
-from kratos_lite.model.loads.base import key_of
+from kratos_lite.model.loads.base import key_of, warnings_of
 from kratos_lite.model.local_axes import Cartesian, LocalAxes, normal_of_plane
 from kratos_lite.model.locking import check_locking
 from kratos_lite.model.matching import BoltForce, Cut, Periodic
@@ -630,8 +630,16 @@ class Structure(Solid):
         """
         return checks.check_geometry(self.mesh, self.formulation)
 
-    def checked(self) -> tuple[list[ElementGroup], list[str]]:
+    def checked(self, *, loads: bool = True) -> tuple[list[ElementGroup], list[str]]:
         """Return element groups and warnings of a model that passes all checks but that of `free_motions`.
+
+        Parameters
+        ----------
+        loads : whether functions of its loads are checked for jumps, too.
+
+        Returns
+        -------
+        list of ElementGroup, list of str
 
         Raises
         ------
@@ -643,7 +651,8 @@ class Structure(Solid):
             raise ModelError(
                 "a stress-free displacement is for small strains; move the nodes of the mesh instead"
             )
-        return groups, [*warnings, *(text for check in CHECKS for text in check(self, groups))]
+        warnings += [text for check in CHECKS for text in check(self, groups)]
+        return groups, warnings + (warnings_of(self.loads, self.mesh, groups) if loads else [])
 
     def free_motions(self, groups: list[ElementGroup]) -> FreeMotions:
         """Return the rigid motions that supports leave free, part by part.

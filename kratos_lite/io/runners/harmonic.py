@@ -9,7 +9,7 @@ import numpy as np
 
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.fields import labelled
-from kratos_lite.analysis.harmonic import HarmonicResponse
+from kratos_lite.analysis.harmonic import HarmonicResponse, amplitudes
 from kratos_lite.io.case import Case
 from kratos_lite.io.runners.outcome import Outcome
 from kratos_lite.io.writers.table import write_table
@@ -44,8 +44,5 @@ def _columns(response: HarmonicResponse) -> dict[str, Any]:
     """Return amplitudes and phases by headers, of all nodes at the first frequency and so on."""
     mesh, omega = response.mesh, response.frequencies
     u = np.concatenate([response.displacement(i) for i in range(len(omega))])
-    made: dict[str, Any] = {"frequency [rad/s]": np.repeat(omega, mesh.n_nodes)}
-    made["node"] = np.tile(mesh.node_ids, len(omega))
-    for i, axis in enumerate("xyz"):
-        made |= {f"amplitude {axis} [m]": np.abs(u[:, i]), f"phase {axis} [rad]": np.angle(u[:, i])}
-    return labelled(made, response.units)
+    nodes = {"frequency [rad/s]": omega.repeat(mesh.n_nodes), "node": np.tile(mesh.node_ids, len(omega))}
+    return labelled({**nodes, **amplitudes(u)}, response.units)
