@@ -16,6 +16,7 @@ from kratos_lite.io.case import Case
 from kratos_lite.io.runners.in_time import Kept, begun, follow
 from kratos_lite.io.runners.outcome import Outcome
 from kratos_lite.io.writers.pictures import write_picture
+from kratos_lite.io.writers.recorded import Totals
 from kratos_lite.io.writers.series import SeriesWriter
 from kratos_lite.typing import Array, Progress
 
@@ -57,7 +58,7 @@ class _Summary(Kept):
     def __init__(self, body: Body, keep: bool) -> None:
         super().__init__(keep)
         self.body, self.largest = body, 0.0
-        self.start = self.end = _Totals(body)
+        self.start = Totals(body)
 
     def add(self, state: State) -> None:
         """Take a state."""
@@ -69,7 +70,7 @@ class _Summary(Kept):
         """Return the rows of the table."""
         # What kinetic and internal energy gain beyond the external work is an error of the integrator, unless
         # damping takes it; potential energy stays out of this, as its loss is external work already.
-        start, end = self.start, _Totals(self.body)
+        start, end = self.start, Totals(self.body)
         steps = end.step - start.step
         gained = end.kinetic - start.kinetic + end.internal - start.internal - (end.work - start.work)
         drift = gained / self.largest if self.largest else 0.0
@@ -82,28 +83,15 @@ class _Summary(Kept):
             ("kinetic energy", f"{end.kinetic:.7g} J"),
             ("internal energy", f"{end.internal:.7g} J"),
             ("potential energy", f"{end.potential:.7g} J"),
-            ("sum of energies", f"{end.kinetic + end.internal + end.potential:.7g} J"),
+            ("sum of energies", f"{end.energy:.7g} J"),
             ("external work", f"{end.work - start.work:.7g} J, of all loads, gravity too, and of reactions"),
             balance,
             ("linear momentum", f"{_vector(end.linear)} kg m/s"),
             ("angular momentum", f"{_vector(end.angular)} kg m²/s about the mass center"),
         ]
-        if end.center is not None:
+        if self.body.q.ndim == 1:
             rows.append(("mass center", f"{_vector(end.center)} m"))
         return [*rows, ("time per step", f"{seconds / max(steps, 1):.3g} s, {seconds:.3g} s in all")]
-
-
-class _Totals:
-    """Energies and momenta of a body, or of many together."""
-
-    def __init__(self, body: Body) -> None:
-        self.time, self.step = body.time, body.step
-        energies = body.kinetic_energy(), body.internal_energy(), body.potential_energy()
-        self.kinetic, self.internal, self.potential = (float(np.sum(energy)) for energy in energies)
-        self.work = float(np.sum(body.external_work))
-        self.center = body.mass_center() if body.q.ndim == 1 else None
-        momenta = body.linear_momentum(), body.angular_momentum()
-        self.linear, self.angular = (momentum.reshape(-1, 3).sum(axis=0) for momentum in momenta)
 
 
 def rows_of(body: Body) -> list[tuple[str, str]]:

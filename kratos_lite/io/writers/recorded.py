@@ -31,6 +31,20 @@ OF_MODELS = (*TOTALS, *(f"total reaction {axis} [N]" for axis in "xyz"))
 """Columns of a table of a transient."""
 
 
+class Totals:
+    """Energies and momenta of a body, or of many together; their mass center is the mean one."""
+
+    def __init__(self, body: Body) -> None:
+        self.time, self.step = body.time, body.step
+        energies = body.kinetic_energy(), body.internal_energy(), body.potential_energy()
+        self.kinetic, self.internal, self.potential = (float(np.sum(energy)) for energy in energies)
+        self.energy = self.kinetic + self.internal + self.potential
+        self.work = float(np.sum(body.external_work))
+        self.center = body.mass_center().reshape(-1, 3).mean(axis=0)
+        momenta = body.linear_momentum(), body.angular_momentum()
+        self.linear, self.angular = (momentum.reshape(-1, 3).sum(axis=0) for momentum in momenta)
+
+
 class RecordedBody:
     """A body, or many as arrays only."""
 
@@ -70,15 +84,12 @@ class RecordedBody:
 
     def row(self, state: State) -> Array:
         """Return time, energies, work, mass center and momenta."""
-        body = self.body
-        check_single(body, self.path)
-        with at(body, state):
-            energies = [
-                float(e) for e in (body.kinetic_energy(), body.internal_energy(), body.potential_energy())
-            ]
-            vectors = (body.mass_center(), body.linear_momentum(), body.angular_momentum())
-            work = float(state.external_work)
-            return np.concatenate([[state.time, *energies, sum(energies), work], *vectors])
+        check_single(self.body, self.path)
+        with at(self.body, state):
+            now = Totals(self.body)
+        energies = now.kinetic, now.internal, now.potential, now.energy
+        work = float(state.external_work)
+        return np.array([state.time, *energies, work, *now.center, *now.linear, *now.angular])
 
 
 class RecordedModel:
@@ -90,17 +101,8 @@ class RecordedModel:
     extra: ClassVar[dict[str, Array]] = {}
 
     def __init__(self, transient: Any) -> None:
-        self.transient = transient
+        self.transient, self.now, self.checked = transient, transient.state, transient.check_state
         self.units = self.mesh().units
-
-    def now(self) -> Any:
-        """Return the state of the model as it is now."""
-        return self.transient.state()
-
-    def checked(self, state: Any) -> State:
-        """Return a state of the model; InputError for another."""
-        checked: State = self.transient.check_state(state)
-        return checked
 
     def mesh(self) -> Mesh:
         """Return the mesh of the model."""
