@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Mapping
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -84,12 +85,8 @@ class Supports:
             self._hangs[mesh.hanging.nodes] = True
         self.conditions: list[DirichletCondition] = []
         self.ties: list[Coupling] = []
-        self._every: tuple[int, Constraints] = (-1, Constraints.none())
-        self._of_parts = self._followers = Constraints.none()  # those of ties of parts; of reference nodes
         self.version = self.value_version = 0  # changes but for values and functions of time; all changes
         self.springs: Csr | None = None  # (3n, 3n) N/m
-        self._independent: tuple[int, Constraints, Redundant | None] = (-1, Constraints.none(), None)
-        self._dependents: tuple[int, Constraints] = (-1, Constraints.none())
 
     def __str__(self) -> str:
         tied = [f"{len(self.constraints)} constraints"] if len(self.constraints) else []
@@ -184,8 +181,7 @@ class Supports:
         at = nodes, axes
         if not override:
             self._check_prescribed_once(at, new, function)
-        self.version += not self.fixed[at].all()
-        self.value_version += 1
+        self.changed(values_only=bool(self.fixed[at].all()))
         self._fixed[at], self._values[at], self._function[at] = True, new, function
 
     def _incline(self, nodes: Ints, a: Array, values: Array, override: bool) -> None:
@@ -266,7 +262,7 @@ class Supports:
     @property
     def constraints(self) -> Constraints:
         """All constraints: of hanging nodes, those added, of local axes, of ties and remote points."""
-        return self._updated()._every[1]
+        return self._every[0]
 
     @constraints.setter
     def constraints(self, constraints: Constraints) -> None:
@@ -274,36 +270,34 @@ class Supports:
         self._inclined, self.ties = Constraints.none(), []
         self.add_constraints(constraints)
 
-    def _updated(self) -> Supports:
-        """Return itself with the constraints of what is prescribed now."""
-        if self._every[0] != self.value_version:
-            every, self._of_parts = self._of_elements(), Constraints.none()
-            known = self.fixed.copy()
-            if self.ties:
-                known.flat[independent(every, known)[0].dependents] = True
-            # What moves all nodes of a part comes first, then ties, which leave out what others hold.
-            for tie in sorted(self.ties, key=lambda tie: (not tie.moves_all, not isinstance(tie, PartTie))):
-                new = tie.constraints(self.fixed, known)
-                every += new
-                known.flat[new.dependents] = True
-                if isinstance(tie, PartTie):
-                    self._of_parts += new
-                for nodes in tie.moves_all:
-                    known[nodes] = True
-            self._every = self.value_version, every
-        return self
+    @cached_property
+    def _every(self) -> tuple[Constraints, Constraints, Constraints]:
+        """All constraints, those of ties of parts among them, and those that reference nodes follow."""
+        (every, followers), of_parts, known = self._of_elements(), Constraints.none(), self.fixed.copy()
+        if self.ties:
+            known.flat[independent(every, known)[0].dependents] = True
+        # What moves all nodes of a part comes first, then ties, which leave out what others hold.
+        for tie in sorted(self.ties, key=lambda tie: (not tie.moves_all, not isinstance(tie, PartTie))):
+            new = tie.constraints(self.fixed, known)
+            every += new
+            known.flat[new.dependents] = True
+            if isinstance(tie, PartTie):
+                of_parts += new
+            for nodes in tie.moves_all:
+                known[nodes] = True
+        return every, of_parts, followers
 
-    def _of_elements(self) -> Constraints:
-        """Return the constraints of nodes that elements use; reference nodes, of no element, follow them."""
-        every, mesh, self._followers = self._constraints + self._inclined, self.mesh, Constraints.none()
+    def _of_elements(self) -> tuple[Constraints, Constraints]:
+        """Return the constraints of nodes that elements use, and those that others, of no element, follow."""
+        every, mesh, followers = self._constraints + self._inclined, self.mesh, Constraints.none()
         if len(every) and mesh.whole and not mesh.used_nodes().all():
             from kratos_lite.mesh.hanging import is_corner  # a quick start without reference nodes
 
             gone = ~np.repeat(mesh.used_nodes(), 3) & ~self.fixed.ravel()
             # They follow supported nodes first, then corners: the coarse level of multigrid has these alone.
             order = np.where(self.fixed.ravel(), 0, np.repeat(2 - is_corner(mesh.blocks, mesh.n_nodes), 3))
-            every, self._followers = without(every, gone, order)
-        return every
+            every, followers = without(every, gone, order)
+        return every, followers
 
     @property
     def added(self) -> Constraints:
@@ -316,31 +310,36 @@ class Supports:
         self.changed()
 
     def changed(self, values_only: bool = False) -> None:
-        """Count a change of what is prescribed, or of its values alone."""
+        """Count a change of what is prescribed, or of its values alone; what follows is found anew."""
         self.version += not values_only
         self.value_version += 1
+        for name in ("_every", "_independent", "_dependents"):
+            vars(self).pop(name, None)
 
     def add_tie(self, tie: Coupling) -> None:
         """Add a tie, or replace the one between the same parts."""
         old = [other for other in self.ties if other.place == tie.place]
         self.ties = [tie if other in old else other for other in self.ties] + [tie] * (not old)
-        self.version += not old or old[0].equations != tie.equations
-        self.value_version += 1
+        self.changed(values_only=bool(old) and old[0].equations == tie.equations)
 
     def independent(self) -> Constraints:
         """Return equal constraints whose dependents are one once, not fixed, without cycles."""
-        if self._independent[0] != self.value_version:
-            self._independent = self.value_version, *independent(self.constraints, self.fixed)
-        return self._independent[1]
+        return self._independent[0]
+
+    @cached_property
+    def _independent(self) -> tuple[Constraints, Redundant | None]:
+        return independent(self.constraints, self.fixed)
 
     def dependents(self) -> Constraints:
         """Return all constraints by free degrees of freedom alone; ModelError where they contradict."""
-        if self._dependents[0] != self.value_version:
-            eliminated = self._eliminated(self.values)
-            if self._independent[2] is not None:
-                self._check_redundant(self._independent[2])
-            self._dependents = self.value_version, eliminated
-        return self._dependents[1]
+        return self._dependents
+
+    @cached_property
+    def _dependents(self) -> Constraints:
+        eliminated = self._eliminated(self.values)
+        if self._independent[1] is not None:
+            self._check_redundant(self._independent[1])
+        return eliminated
 
     def _check_redundant(self, redundant: Redundant) -> None:
         """Raise ModelError where what is redundant contradicts, at rest or for a function of time."""
@@ -399,7 +398,7 @@ class Supports:
 
     def check_used(self) -> list[str]:
         """Raise ModelError where constraints leave a node free that no element uses."""
-        dofs = np.append(self.dependents().independents, self._followers.independents)
+        dofs = np.append(self.dependents().independents, self._every[2].independents)
         for dof in dofs[~self.mesh.used_nodes()[dofs // 3] & ~self.fixed.flat[dofs]][:1]:
             raise ModelError(
                 f"equations leave {self.name(int(dof))} free, which no element uses; hold it and, if it is a "
@@ -413,7 +412,7 @@ class Supports:
         """Return P (3n, 3n) and c: all displacements are P u + c with reference nodes held at values."""
         from scipy.sparse import diags_array
 
-        known, held = self._updated()._followers, self.fixed & ~self.mesh.used_nodes()[:, None]
+        known, held = self._every[2], self.fixed & ~self.mesh.used_nodes()[:, None]
         P = known.following(held.size)
         c = P @ np.where(held, values, 0.0).ravel()
         c[known.dependents] += known.constants
@@ -456,7 +455,7 @@ class Supports:
 
     def past_ties(self, reactions: Array) -> Array:
         """Return reactions (n, 3) with the forces in ties of parts passed on to what tied nodes follow."""
-        ties = self._updated()._of_parts
+        ties = self._every[1]
         if not len(ties):
             return reactions
         none = np.zeros_like(self.fixed)
