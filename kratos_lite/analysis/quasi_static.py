@@ -23,11 +23,10 @@ from kratos_lite.model.free_motions import free_motions
 from kratos_lite.model.loads.temperature import heated
 from kratos_lite.model.structure import Structure
 from kratos_lite.model.supports import Supports
-from kratos_lite.solvers.arc_length import along_path
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.direct import one_thread
 from kratos_lite.solvers.linear_solver import LinearSolver, Solution
-from kratos_lite.solvers.newton import SMALLEST_PART, in_parts, newton
+from kratos_lite.solvers.newton import SMALLEST_PART, along_path, in_parts, newton
 from kratos_lite.solvers.plan import Facts, Plan, choose
 from kratos_lite.solvers.tangents import Changes, Tangents
 from kratos_lite.typing import Array, Progress

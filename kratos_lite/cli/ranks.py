@@ -88,7 +88,7 @@ def part_files_of(options: Namespace) -> dict[int, Path]:
     if getattr(options, "backend", None) != "petsc":
         return {}
     from kratos_lite.io.formats import ending, input_file
-    from kratos_lite.io.formats.part_files import check_part_files, part_files
+    from kratos_lite.io.formats.mdpa.reader import check_part_files, part_files
     from kratos_lite.io.kratos.run_file import part_files_of as of_project
 
     path = input_file(options.input)

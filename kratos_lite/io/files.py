@@ -10,7 +10,7 @@ from kratos_lite.errors import InputError
 from kratos_lite.io.case import Case
 from kratos_lite.io.formats import describes_case, ending, input_file, read_document, write_document
 from kratos_lite.io.formats.document import Document
-from kratos_lite.io.formats.part_files import part_files, read_part
+from kratos_lite.io.formats.mdpa.reader import part_files, read_part
 from kratos_lite.io.kratos.to_model import model_from
 from kratos_lite.mesh import SIDES, Mesh
 from kratos_lite.model.supports import hanging_constraints
@@ -150,9 +150,8 @@ def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
     from kratos_lite.analysis.result import Result
     from kratos_lite.analysis.section import Section
     from kratos_lite.analysis.state import State
-    from kratos_lite.io.writers.results import write_result
+    from kratos_lite.io.writers.results import write_result, write_table
     from kratos_lite.io.writers.state import write_state
-    from kratos_lite.io.writers.table import write_table
 
     path = path_of(path)
     if isinstance(thing, Result):

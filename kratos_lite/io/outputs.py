@@ -1,10 +1,11 @@
-"""Outputs: what a case writes is checked here before any work, and written here after it."""
+"""Outputs: what a case writes, pictures too, is checked here before any work, and written after it."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 from kratos_lite.analysis.result import Result
 from kratos_lite.atomic import all_or_none
@@ -12,7 +13,6 @@ from kratos_lite.errors import InputError
 from kratos_lite.io.case import Case, Outputs
 from kratos_lite.io.formats import ELEM_SET, ending
 from kratos_lite.io.writers.endings import check_ending, check_modes, check_result, check_series
-from kratos_lite.io.writers.pictures import check_picture, write_picture
 from kratos_lite.io.writers.results import write_json, write_result
 
 
@@ -119,3 +119,37 @@ def _set_of(path: Path) -> list[Path]:
     gz = ".gz" if path.suffix.lower() == ".gz" else ""
     stem = path.with_suffix("") if gz else path
     return [stem.with_suffix(suffix + gz) for suffix in ELEM_SET]
+
+
+def is_film(path: str | Path | None) -> bool:
+    """Return whether a path is that of a film, and no picture."""
+    if path is None:
+        return False
+    from kratos_lite.view.animation import ENDINGS  # rarely needed
+
+    return Path(path).suffix.lower() in ENDINGS
+
+
+def check_picture(path: str | Path) -> None:
+    """Raise, before any work is done, for a picture or film that cannot be written.
+
+    Raises InputError for another ending, KratosLiteError where matplotlib or ffmpeg is missing.
+    """
+    if is_film(path):
+        from kratos_lite.view.animation import check_animation
+
+        check_animation(path)
+        return
+    from kratos_lite.view import canvas
+
+    canvas.check_picture(path)
+
+
+def write_picture(path: str | Path, thing: Any, **options: Any) -> None:
+    """Write a picture or a film of a thing, with options that both have."""
+    from kratos_lite.analysis.plot import animate, plot  # rarely needed
+
+    if is_film(path):
+        animate(path, thing, **options)
+    else:
+        plot(thing, path, **options)

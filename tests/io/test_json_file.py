@@ -5,7 +5,7 @@ import json
 import pytest
 
 from kratos_lite.errors import InputError
-from kratos_lite.io.json_file import parse_json, read_json
+from kratos_lite.io.settings import parse_json, read_json
 
 
 @pytest.mark.parametrize(

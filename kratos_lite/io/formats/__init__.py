@@ -95,7 +95,7 @@ def read_document(path: str | Path, *, strict: bool = True) -> Document:
 
 def _refuse_part_files(path: Path) -> None:
     """Raise InputError where a path stands for part files, which one process does not read."""
-    from kratos_lite.io.formats.part_files import part_files  # rarely needed
+    from kratos_lite.io.formats.mdpa.reader import part_files  # rarely needed
 
     if files := part_files(path):
         raise InputError(

@@ -1,4 +1,4 @@
-"""Document: what a file says, before anything is made of it.
+"""Document: what a file says, before anything is made of it, and what no file may say of nodes and cells.
 
 The readers of `.mdpa` and `.elem` fill one, the `.mdpa` writer writes one, and
 ``kratos_lite.io.kratos.to_model`` turns it into a Model.
@@ -6,8 +6,12 @@ The readers of `.mdpa` and `.elem` fill one, the `.mdpa` writer writes one, and
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from kratos_lite.mesh import Block, Mesh, distinct
 from kratos_lite.typing import Array, Ints, Mask
@@ -92,3 +96,52 @@ class Document:
         """Return the Properties of elements, by number."""
         used = {int(number) for block in self.mesh.blocks for number in distinct(block.properties)}
         return [self.properties[number] for number in sorted(used & self.properties.keys())]
+
+
+MOST = 1000
+"""Problems of one kind that are reported; the rest would only repeat them."""
+
+
+def already(what: str, line: int, how: str = "") -> str:
+    """Return the message about what a file defines for the second time.
+
+    >>> already("node 7", 3)
+    'node 7 is already defined at line 3'
+    """
+    return f"{what} is already defined at line {line}{how}"
+
+
+def repeated(ids: Ints) -> list[tuple[int, int]]:
+    """Return (row, row of the first) for every id that stands there again.
+
+    >>> repeated(np.array([4, 7, 4]))
+    [(2, 0)]
+    """
+    if len(ids) < 2 or (ids[1:] > ids[:-1]).all():
+        return []
+    _, first, inverse = np.unique(ids, return_index=True, return_inverse=True)
+    first = first[inverse]
+    again = np.flatnonzero(first != np.arange(len(ids)))
+    return [(int(row), int(first[row])) for row in again]
+
+
+def repeated_nodes(ids: Ints, points: Array, lines: NDArray[np.int32]) -> Iterator[tuple[int, str, bool]]:
+    """Yield row, message and whether it is only odd for every node that stands there again."""
+    for row, first in repeated(ids):
+        is_same = bool((points[row] == points[first]).all())
+        there, here = (" ".join(f"{x:.12g}" for x in points[i]) for i in (first, row))
+        how = ", the same" if is_same else f" at {there}; found {here}; give each node its own id"
+        yield row, already(f"node {ids[row]}", int(lines[first]), how), is_same
+
+
+def wrong_nodes(ids: Ints, rows: Ints) -> Iterator[tuple[int, str]]:
+    """Yield cell and message for each node of `ids` (m, k) that is missing (row -1), or twice in a cell."""
+    if not rows.size:
+        return
+    for i, k in np.argwhere(rows < 0)[:MOST] if rows.min() < 0 else ():
+        yield int(i), f": there is no node {ids[i, k]}"
+    ordered = np.sort(rows, axis=1)
+    twice = (ordered[:, 1:] == ordered[:, :-1]) & (ordered[:, 1:] >= 0)
+    for i in np.flatnonzero(twice.any(axis=1))[:MOST]:
+        node = ids[i, np.argmax(rows[i] == ordered[i, 1:][twice[i]][0])]
+        yield int(i), f" names node {node} twice; its nodes must differ"

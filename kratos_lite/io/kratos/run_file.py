@@ -15,17 +15,23 @@ from kratos_lite.errors import Problems, nearest
 from kratos_lite.io.case import Case, Outputs
 from kratos_lite.io.formats import read_document
 from kratos_lite.io.formats.document import Document
-from kratos_lite.io.formats.part_files import part_files, read_part
+from kratos_lite.io.formats.mdpa.reader import part_files, read_part
 from kratos_lite.io.kratos.context import Omission, RunContext, module_of, times_of
 from kratos_lite.io.kratos.eigenvalues import EIGEN, EIGEN_KEYS, eigenvalue_comparisons, modes_of
 from kratos_lite.io.kratos.expected_values import COMPARISONS
-from kratos_lite.io.kratos.initial_state import MODULE, initial_state_of
 from kratos_lite.io.kratos.keys import IN_TIME, unused_keys
 from kratos_lite.io.kratos.laws import make_linear, notes_on_laws, quasi_static_of
 from kratos_lite.io.kratos.motion import add_motion
 from kratos_lite.io.kratos.outputs import OUTPUT_PROCESSES, OutputProcess
 from kratos_lite.io.kratos.point_elements import set_apart
-from kratos_lite.io.kratos.processes import PROCESSES, Action, actions_of, run
+from kratos_lite.io.kratos.processes import (
+    INITIAL_STATE,
+    PROCESSES,
+    Action,
+    actions_of,
+    initial_state_of,
+    run,
+)
 from kratos_lite.io.kratos.properties import NO_EXPANSION, expanding, use_materials
 from kratos_lite.io.kratos.time_dependent import DYNAMIC, ProcessesInTime, time_integration_of
 from kratos_lite.io.kratos.to_model import model_from
@@ -216,7 +222,7 @@ def _read_process(
 ) -> None:
     """Add what a process is for to what is found, or to the notes or the problems."""
     module, compare = module_of(entry), {CHECK: eigenvalue_comparisons} if eigen else COMPARISONS
-    known = [*PROCESSES, *COMPARISONS, CHECK, MODULE, *OUTPUT_PROCESSES]
+    known = [*PROCESSES, *COMPARISONS, CHECK, INITIAL_STATE, *OUTPUT_PROCESSES]
     omitted = ""
     if module in PROCESSES:
         found.actions.extend(actions_of(entry, module, context))
@@ -225,7 +231,7 @@ def _read_process(
     elif module not in known:
         text = f"unknown process {module!r}.{nearest(module, known)} Known are {', '.join(known)}"
         problems.add(str(entry.error("", text)))
-    elif module == MODULE:
+    elif module == INITIAL_STATE:
         found.states.append(initial_state_of(entry.section("Parameters", required=True), context))
     elif module in compare:
         found.checks.extend(compare[module](entry.section("Parameters", required=True), context))

@@ -13,9 +13,9 @@ from kratos_lite.analysis.stepping import integrate
 from kratos_lite.bodies import Body
 from kratos_lite.bodies.body import Deformable
 from kratos_lite.io.case import Case
+from kratos_lite.io.outputs import write_picture
 from kratos_lite.io.runners.in_time import Kept, begun, follow
 from kratos_lite.io.runners.outcome import Outcome
-from kratos_lite.io.writers.pictures import write_picture
 from kratos_lite.io.writers.recorded import Totals
 from kratos_lite.io.writers.series import SeriesWriter
 from kratos_lite.typing import Array, Progress

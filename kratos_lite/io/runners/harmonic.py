@@ -12,7 +12,7 @@ from kratos_lite.analysis.fields import labelled
 from kratos_lite.analysis.harmonic import HarmonicResponse, amplitudes
 from kratos_lite.io.case import Case
 from kratos_lite.io.runners.outcome import Outcome
-from kratos_lite.io.writers.table import write_table
+from kratos_lite.io.writers.results import write_table
 from kratos_lite.typing import Progress
 
 

@@ -10,9 +10,9 @@ import numpy as np
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.errors import SolveError
 from kratos_lite.io.case import Case
+from kratos_lite.io.outputs import write_picture
 from kratos_lite.io.runners.outcome import Outcome
 from kratos_lite.io.writers.modes import names_of_modes, write_modes, write_modes_json
-from kratos_lite.io.writers.pictures import write_picture
 from kratos_lite.typing import Array, Progress
 
 DRAWN = 6

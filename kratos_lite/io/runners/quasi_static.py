@@ -9,9 +9,9 @@ from kratos_lite.analysis.quasi_static import QuasiStaticAnalysis
 from kratos_lite.analysis.state import State
 from kratos_lite.analysis.stepping import integrate
 from kratos_lite.io.case import Case
+from kratos_lite.io.outputs import is_film, write_picture
 from kratos_lite.io.runners.in_time import Kept, begun, follow
 from kratos_lite.io.runners.outcome import Outcome
-from kratos_lite.io.writers.pictures import is_film, write_picture
 from kratos_lite.typing import Progress
 
 

@@ -14,9 +14,9 @@ from kratos_lite.analysis.state import State
 from kratos_lite.analysis.stepping import integrate
 from kratos_lite.analysis.transient import TransientAnalysis
 from kratos_lite.io.case import Case
+from kratos_lite.io.outputs import is_film, write_picture
 from kratos_lite.io.runners.in_time import Kept, begun, follow
 from kratos_lite.io.runners.outcome import Outcome
-from kratos_lite.io.writers.pictures import is_film, write_picture
 from kratos_lite.model.loads import TimeDependentLoad
 from kratos_lite.model.loads.nodal import NodalForces
 from kratos_lite.model.structure import Structure

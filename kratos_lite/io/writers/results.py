@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,10 +12,10 @@ from kratos_lite import __version__
 from kratos_lite.analysis.fields import fields
 from kratos_lite.analysis.peak import peak
 from kratos_lite.analysis.report import element_counts
-from kratos_lite.atomic import write_whole
+from kratos_lite.atomic import refuse_nan, write_whole
 from kratos_lite.errors import SolveError
-from kratos_lite.io.writers.endings import check_result
-from kratos_lite.io.writers.table import write_table
+from kratos_lite.io.writers.endings import check_ending, check_result
+from kratos_lite.typing import Numbers
 
 if TYPE_CHECKING:
     from kratos_lite.analysis.result import Result
@@ -138,3 +138,22 @@ def _by_node(result: Result) -> dict[str, Any]:
             zip([ids[row] for row in supported], result.reactions[supported].tolist(), strict=True)
         ),
     }
+
+
+def write_table(path: str | Path, columns: Mapping[str, Numbers]) -> None:
+    """Write columns (k,) by their headers, as a whole or not at all; numbers are not rounded.
+
+    >>> path = getfixture("tmp_path") / "two.csv"
+    >>> write_table(path, {"node": np.array([1, 2]), "x [m]": np.array([0.1, 1.0])})
+    >>> print(path.read_text())
+    node,x [m]
+    1,0.1
+    2,1.0
+    <BLANKLINE>
+    """
+    check_ending(path, ".csv")
+    for name, values in columns.items():
+        refuse_nan(path, name, values)
+    cells = [map(repr, np.asarray(values).tolist()) for values in columns.values()]
+    lines = [",".join(columns), *map(",".join, zip(*cells, strict=True))]
+    write_whole(path, ("\n".join(lines) + "\n").encode())

@@ -17,7 +17,7 @@ from kratos_lite.errors import InputError
 from kratos_lite.io.formats.vtu import check_mode, write_pvd, write_vtu
 from kratos_lite.io.writers.endings import check_series
 from kratos_lite.io.writers.recorded import Recorded, arrays_of, recorded
-from kratos_lite.io.writers.table import write_table
+from kratos_lite.io.writers.results import write_table
 from kratos_lite.typing import Array
 from kratos_lite.validation import path_of
 

@@ -11,7 +11,7 @@ import pytest
 
 import kratos_lite as kl
 from kratos_lite.errors import InputError, SolveError
-from kratos_lite.io.writers.page.lattices import TETRAHEDRA, lattice_of_cell, lattice_of_face
+from kratos_lite.io.writers.page.content import TETRAHEDRA, lattice_of_cell, lattice_of_face
 from kratos_lite.shapes import LINEAR, SHAPES
 from kratos_lite.view.facets import sharp_edges
 

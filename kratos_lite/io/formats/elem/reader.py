@@ -12,8 +12,16 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from kratos_lite.errors import InputError, Problems
-from kratos_lite.io.formats.cells import already, repeated, repeated_nodes, wrong_nodes
-from kratos_lite.io.formats.document import Data, Document, Note, Properties
+from kratos_lite.io.formats.document import (
+    Data,
+    Document,
+    Note,
+    Properties,
+    already,
+    repeated,
+    repeated_nodes,
+    wrong_nodes,
+)
 from kratos_lite.io.formats.elem.grammar import FIX, FORMS, INIT, MATRIX, VECTOR, Form, Source, Statement
 from kratos_lite.io.names import condition_shape, element_shape
 from kratos_lite.mesh import Block, Mesh

@@ -10,8 +10,7 @@ import numpy as np
 
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import InputError
-from kratos_lite.io.formats.cells import MOST, already, repeated_nodes, wrong_nodes
-from kratos_lite.io.formats.document import Document
+from kratos_lite.io.formats.document import MOST, Document, already, repeated_nodes, wrong_nodes
 from kratos_lite.io.formats.mdpa.rows import Layout, first_line, read_rows
 from kratos_lite.io.formats.mdpa.scan import LISTS, Frame, Source
 from kratos_lite.io.formats.mdpa.values import read_values

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import NoReturn, TypeVar
 
 from kratos_lite.errors import Problems
-from kratos_lite.io.formats.cells import already, repeated
+from kratos_lite.io.formats.document import already, repeated
 from kratos_lite.io.text import Source as TextSource
 from kratos_lite.io.text import shown
 from kratos_lite.native import kernels

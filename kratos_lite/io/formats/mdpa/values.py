@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from kratos_lite.io.formats.cells import already
+from kratos_lite.io.formats.document import already
 from kratos_lite.io.formats.mdpa.rows import TRUTH, Layout, read_rows
 from kratos_lite.io.formats.mdpa.scan import NAME, WORD, Frame, Source, Span
 from kratos_lite.io.names import nearest_variable

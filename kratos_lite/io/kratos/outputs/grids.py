@@ -9,8 +9,7 @@ import numpy as np
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.state import State
 from kratos_lite.io.case import Case
-from kratos_lite.io.formats.legacy_vtk import write_legacy_vtk
-from kratos_lite.io.formats.vtu import write_vtu
+from kratos_lite.io.formats.vtu import write_legacy_vtk, write_vtu
 from kratos_lite.io.kratos.context import Omission, RunContext
 from kratos_lite.io.kratos.outputs.process import OutputProcess
 from kratos_lite.io.kratos.outputs.values import at_nodes, cells_of, means, nodal_means
