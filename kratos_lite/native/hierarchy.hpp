@@ -125,7 +125,7 @@ public:
 
     // z = M r, the V-cycle on a right side of any size.
     void cycle(const double* r, double* z) {
-        for (Level& level : levels) level.set_together(1);
+        for (Level& level : levels) level.set_vectors(1);
         Level& top = levels.front();
         double norm = 0;
         for (int64_t i = 0; i < top.size(); ++i) norm = std::max(norm, std::fabs(r[i]));
@@ -198,7 +198,7 @@ private:
     void cycle_several(const double* r, double* z, int count) {
         Level& top = levels.front();
         const int64_t size = top.size();
-        for (Level& level : levels) level.set_together(count);
+        for (Level& level : levels) level.set_vectors(count);
         double norms[SEVERAL] = {};
         for (int v = 0; v < SEVERAL; ++v)
             for (int64_t i = 0; v < count && i < size; ++i) norms[v] = std::max(norms[v], std::fabs(r[v * size + i]));
@@ -235,9 +235,9 @@ private:
     void solve_coarsest(Level& level) {
         if (level.halo->solve(level.c.data(), level.x.data())) return;
         if (coarsest.at.empty()) return level.smooth(20, 400, true);  // aggregation came to a halt
-        const int64_t size = level.size(), step = level.together > 1 ? SEVERAL : 1;
+        const int64_t size = level.size(), step = level.vectors > 1 ? SEVERAL : 1;
         Doubles x(size);
-        for (int v = 0; v < level.together; ++v) {
+        for (int v = 0; v < level.vectors; ++v) {
             for (int64_t i = 0; i < size; ++i) x[i] = level.c[i * step + v];
             dispatch<double>([&](auto V) KL_INLINE_LAMBDA { substitute_rows<V>(coarsest, 0, size, x.data()); });
             for (int64_t i = 0; i < size; ++i) level.x[i * step + v] = static_cast<float>(x[i]);

@@ -92,7 +92,7 @@ public:
     bool thin = false;  // energies so unlike that sums take double precision
     const double* exact = nullptr;  // in place of A, where energies are still more unlike
     Bytes held;                     // fixed components, which neither of them leaves out
-    int together = 1;               // vectors of a cycle; where they are more, x, y, d and c hold SEVERAL
+    int vectors = 1;                // of a cycle; where they are more, x, y, d and c hold SEVERAL
 
     int64_t size() const { return n * b; }
     int64_t grain() const { return b == 3 ? 1024 : 128; }
@@ -164,7 +164,7 @@ public:
     // next = x + d with d = alpha d + beta D^-1 (c - A x); or next = c - A x without smoothing.
     void step(float* from, float* to, float alpha, float beta, bool smooth) {
         halo->update(from);
-        if (together > 1) return step_several(from, to, alpha, beta, smooth);
+        if (vectors > 1) return step_several(from, to, alpha, beta, smooth);
         if (elements) return step_elements(from, to, alpha, beta, smooth);
         const bool single = clusters.empty() && patches.empty();
         const float* inverse = smooth && single ? Dinv.data() : nullptr;
@@ -189,7 +189,7 @@ public:
 
     // d = beta D^-1 c and x = d: a first step from zero needs no product.
     void first_step(float beta) {
-        if (together > 1) return change_several(of(c), nullptr, of(x), 0, beta);
+        if (vectors > 1) return change_several(of(c), nullptr, of(x), 0, beta);
         if (!patches.empty()) return patches.step(b, c.data(), nullptr, d.data(), x.data(), 0, beta);
         if (!clusters.empty()) return clusters.step(b, c.data(), nullptr, d.data(), x.data(), 0, beta);
         parallel_ranges(n, 8 * grain(), [&](int64_t first, int64_t last) {
@@ -223,8 +223,8 @@ public:
     bool serves_several() const { return !thin && !exact && clusters.empty() && patches.empty(); }
 
     // Let the next cycle be one of `count` vectors.
-    void set_together(int count) {
-        together = count;
+    void set_vectors(int count) {
+        vectors = count;
         for (Floats* v : {&x, &y, &d, &c})
             if (count > 1) v->resize(SEVERAL * size() + 8);
     }
@@ -286,14 +286,14 @@ private:
     // r = c - A x with the elements, one vector after another: in vectors of their own they take fewer bytes.
     void residual_of_elements(const Several* x, Several* r) {
         const int64_t N = size() + 1;  // a number behind the last is read
-        apart.resize(N * together);
+        apart.resize(N * vectors);
         for_rows(size(), [&](int64_t i) KL_INLINE_LAMBDA {
-            for (int v = 0; v < together; ++v) apart[v * N + i] = x[i][v];
+            for (int v = 0; v < vectors; ++v) apart[v * N + i] = x[i][v];
         });
-        for (int v = 0; v < together; ++v) elements->multiply(&apart[v * N], &apart[v * N]);
+        for (int v = 0; v < vectors; ++v) elements->multiply(&apart[v * N], &apart[v * N]);
         for_rows(size(), [&](int64_t i) KL_INLINE_LAMBDA {
             Several sum = {};
-            for (int v = 0; v < together; ++v) sum[v] = apart[v * N + i];
+            for (int v = 0; v < vectors; ++v) sum[v] = apart[v * N + i];
             r[i] = held[i] ? Several{} : of(c)[i] - sum;
         });
     }

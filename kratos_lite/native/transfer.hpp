@@ -71,7 +71,7 @@ struct Transfer {
 
     // c of the coarse level = P^T y of the fine one
     void restrict_to(Level& fine, Level& coarse) const {
-        if (coarse.together > 1) return restrict_several(fine, coarse);
+        if (coarse.vectors > 1) return restrict_several(fine, coarse);
         const float* from = fine.y.data();
         float* to = coarse.c.data();
         parallel_ranges(static_cast<int64_t>(columns.indptr.size()) - 1, 64, [&](int64_t first, int64_t last) {
@@ -96,7 +96,7 @@ struct Transfer {
     // x of the fine level += P x of the coarse one
     void prolong(Level& coarse, Level& fine) const {
         coarse.halo->update(coarse.x.data());
-        if (coarse.together > 1) return prolong_several(coarse, fine);
+        if (coarse.vectors > 1) return prolong_several(coarse, fine);
         const float* from = coarse.x.data();
         float* to = fine.x.data();
         parallel_ranges(fine.n, 1024, [&](int64_t first, int64_t last) {
