@@ -300,6 +300,11 @@ class Supports:
         return every, followers
 
     @property
+    def followers(self) -> Constraints:
+        """The constraints that reference nodes follow."""
+        return self._every[2]
+
+    @property
     def added(self) -> Constraints:
         """The constraints that are neither of hanging nodes nor of supports."""
         return self._constraints.take(np.arange(len(self._constraints)) >= len(self.hanging))
@@ -398,39 +403,13 @@ class Supports:
 
     def check_used(self) -> list[str]:
         """Raise ModelError where constraints leave a node free that no element uses."""
-        dofs = np.append(self.dependents().independents, self._every[2].independents)
+        dofs = np.append(self.dependents().independents, self.followers.independents)
         for dof in dofs[~self.mesh.used_nodes()[dofs // 3] & ~self.fixed.flat[dofs]][:1]:
             raise ModelError(
                 f"equations leave {self.name(int(dof))} free, which no element uses; hold it and, if it is a "
                 "reference node, its rotations"
             )
         return []
-
-    # ---- reference nodes ---------------------------------------------------------------------------------
-
-    def followed(self, values: Array) -> tuple[Any, Array]:
-        """Return P (3n, 3n) and c: all displacements are P u + c with reference nodes held at values."""
-        from scipy.sparse import diags_array
-
-        known, held = self._every[2], self.fixed & ~self.mesh.used_nodes()[:, None]
-        P = known.following(held.size)
-        c = P @ np.where(held, values, 0.0).ravel()
-        c[known.dependents] += known.constants
-        return P @ diags_array(1.0 * ~held.ravel()), c
-
-    def displacements(self, u: Array, time: float = 0.0) -> Array:
-        """Return displacements (n, 3) at a time with those of reference nodes."""
-        if self.mesh.used_nodes().all():
-            return u
-        now = self.at(time)
-        P, c = now.followed(now.values)
-        return np.asarray(P @ u.ravel() + c).reshape(-1, 3)
-
-    def carried(self, forces: Array) -> Array:
-        """Return forces (n, 3) with those on reference nodes passed on to what they follow."""
-        if self.mesh.used_nodes().all():
-            return forces
-        return np.asarray(self.followed(self.values)[0].T @ forces.ravel()).reshape(-1, 3)
 
     # ---- for the equations ------------------------------------------------------------------------------
 

@@ -21,6 +21,7 @@ from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.loads.nodal import NodalForces
 from kratos_lite.model.loads.surface import ConditionLoads
 from kratos_lite.model.loads.temperature import Temperature
+from kratos_lite.model.reference_nodes import carried
 from kratos_lite.quadrature import Rule, by_order
 from kratos_lite.time_series import TimeSeries
 from kratos_lite.typing import Array, Ints, Mask, Rows
@@ -138,7 +139,7 @@ class Building:
         axes = self.deck.axes
         turned = np.flatnonzero(values.any(axis=1) & (axes.of_node >= 0))
         values[turned] = np.einsum("ni,nij->nj", values[turned], axes.directions(model.mesh, turned))
-        yield NodalForces(model.supports.acting(time).carried(values))
+        yield NodalForces(carried(model.supports.acting(time), values))
 
     def _pressures(self, model: Model, values: Array, of: Mask, time: float) -> Iterator[Load]:
         n, some = model.mesh.n_nodes, values[tuple(self.faces.T)]
@@ -165,7 +166,7 @@ class Building:
             if kind == "GRAV":
                 force = size * np.array(places)
                 if masses.any():
-                    yield NodalForces(model.supports.acting(time).carried(masses[:, None] * force))
+                    yield NodalForces(carried(model.supports.acting(time), masses[:, None] * force))
                 yield Gravity(force, where)
             elif masses.any():
                 raise ModelError("*DLOAD: CENTRIF on masses is not supported; give their force by *CLOAD")

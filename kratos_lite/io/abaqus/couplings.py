@@ -21,6 +21,7 @@ from kratos_lite.mesh import Mesh
 from kratos_lite.mesh.join import split
 from kratos_lite.model.attachments import OnNodes
 from kratos_lite.model.loads.surface import Pressure, Traction
+from kratos_lite.model.reference_nodes import followed
 from kratos_lite.solvers.constraints import Constraints, rigid_modes
 from kratos_lite.typing import Array, Ints
 
@@ -254,7 +255,7 @@ class Connections:
         model.supports.check_used()
         if not (self.springs or self.geometry.masses):
             return
-        P, moved = model.supports.followed(moves.reshape(-1, 3))
+        P, moved = followed(model.supports, moves.reshape(-1, 3))
         K, loose = csr_array((size, size)), np.flatnonzero(~np.repeat(self.mesh.used_nodes(), 3) & ~fixed)
         for card, dofs, b, k in self.springs:
             if large and (~fixed[dofs] & (np.abs(b) < 1 - 1e-9)).any():

@@ -14,6 +14,7 @@ from kratos_lite.analysis.fields import GaussPoints, known
 from kratos_lite.assembly import nodal_values
 from kratos_lite.assembly.gauss_point_fields import internal_load
 from kratos_lite.elements import KinematicLinear
+from kratos_lite.model import reference_nodes
 from kratos_lite.model.loads.temperature import Temperature
 from kratos_lite.quadrature import Rule
 from kratos_lite.registry import remembered
@@ -131,7 +132,7 @@ def error(result: ElementFields) -> Array | None:
 def displacements(model: Any, u: Array, time: float = 0.0) -> Array:
     """Return displacements (n, 3) with those of reference nodes, if it is a model with supports."""
     supports = getattr(model, "supports", None)
-    return u if supports is None else np.asarray(supports.displacements(u, time))
+    return u if supports is None else reference_nodes.displacements(supports, u, time)
 
 
 AT_NODES: dict[str, Callable[[Any], Array | None]] = {
