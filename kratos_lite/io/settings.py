@@ -105,17 +105,18 @@ class Settings:
         fits = isinstance(value, list) and len(value) == 3 and all(map(is_number, value))
         return [float(v) for v in self._typed(key, REQUIRED, fits, "a list of three numbers")]
 
+    def _list(self, key: str, default: Any, fits: Callable[[Any], bool], kind: str) -> list[Any]:
+        value = self.values.get(key)
+        every = isinstance(value, list) and all(map(fits, value))
+        return list(self._typed(key, default, every, f"a list of {kind}"))
+
     def numbers(self, key: str) -> list[float]:
         """Return a list of numbers."""
-        value = self.values.get(key)
-        fits = isinstance(value, list) and all(map(is_number, value))
-        return [float(v) for v in self._typed(key, REQUIRED, fits, "a list of numbers")]
+        return [float(v) for v in self._list(key, REQUIRED, is_number, "numbers")]
 
     def texts(self, key: str) -> list[str]:
         """Return a list of strings; an empty one where the key is missing."""
-        value = self.values.get(key)
-        fits = isinstance(value, list) and all(isinstance(v, str) for v in value)
-        return list(self._typed(key, [], fits, "a list of strings"))
+        return self._list(key, [], lambda v: isinstance(v, str), "strings")
 
     def section(self, key: str, required: bool = False) -> Settings:
         """Return an inner object; an empty one where the key is missing, unless it is required."""
@@ -125,9 +126,7 @@ class Settings:
 
     def sections(self, key: str) -> list[Settings]:
         """Return a list of inner objects."""
-        value = self.values.get(key)
-        fits = isinstance(value, list) and all(isinstance(v, dict) for v in value)
-        entries = self._typed(key, [], fits, "a list of objects [{…}, …]")
+        entries = self._list(key, [], lambda v: isinstance(v, dict), "objects [{…}, …]")
         return [
             Settings(entry, self.source, f"{self.name(key)}[{i}]", self.files)
             for i, entry in enumerate(entries)

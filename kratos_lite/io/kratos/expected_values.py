@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -188,6 +188,25 @@ def file_comparisons(settings: Settings, context: RunContext) -> Iterator[Callab
         compares[variable] = partial(reference.at_gauss, variable)
     for name, compare in compares.items():
         yield Comparison(f"{name} {what}", times, context.times[-1], compare)
+
+
+def eigenvalue_comparisons(settings: Settings, context: RunContext) -> Iterator[Callable[[Any], str]]:
+    """Yield the comparison of check_eigenvalues_process: ω² to 5 decimals, as many as are stated."""
+    settings.check_keys(("help", "model_part_name", "variable_name", "reference_values"))
+    text = settings.text("reference_values").strip("[] ")
+    try:
+        wanted = np.array([float(word) for word in text.split(",")])
+    except ValueError:
+        text = f"must be numbers such as '[1.0, 2.5]'; got {text!r}"
+        raise settings.error("reference_values", text) from None
+
+    def compare(frequencies: Any) -> str:
+        found = frequencies[: len(wanted)] ** 2
+        allowed = np.full(len(found), 0.5e-5)
+        excess, text = _worst(found, wanted[: len(found)], allowed, lambda i: f"eigenvalue {i[0] + 1}")
+        return f"check EIGENVALUE_VECTOR {'passed' if excess <= 0 else 'failed'} ({text})"
+
+    yield compare
 
 
 COMPARISONS: dict[str, Callable[[Settings, RunContext], Iterator[Callable[[Result], str]]]] = {

@@ -1,4 +1,4 @@
-"""Keys and words of run files: what Kratos refuses is refused, what it ignores is named.
+"""Keys and words of run files: what Kratos refuses is refused, what it ignores is named; those of modes.
 
 Kratos compares settings with the default ones, by key and by kind of value; of some objects it reads what it
 needs and ignores the rest.  Measured against Kratos 10.4.4.
@@ -7,6 +7,7 @@ needs and ignores the rest.  Measured against Kratos 10.4.4.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from math import sqrt
 from typing import Any
 
 from kratos_lite.errors import nearest
@@ -172,3 +173,57 @@ def _solution(solver: Settings, linear: bool) -> list[str]:
     if keys := LINEAR_SOLVERS[name].split():
         inverse.check_keys({key: 0 if key in ("tolerance", "max_iteration") else None for key in keys})
     return unused
+
+
+# ---- natural frequencies -----------------------------------------------------------------------------------
+
+EIGEN = "eigen_value"
+"""Kratos' solver_type of natural frequencies."""
+EIGEN_KEYS: dict[str, Any] = {
+    "scheme_type": "",
+    "eigensolver_settings": {},
+    "eigensolver_diagonal_values": {},
+    "compute_modal_decomposition": False,
+    "normalize_eigenvectors_with_mass_matrix": False,
+}
+"""Its solver settings beside those of all, with a value of the kind of each."""
+OF_ALL = ("solver_type", "max_iteration", "echo_level", "number_of_eigenvalues")
+EIGENSOLVERS = {
+    "spectra_sym_g_eigs_shift": (*OF_ALL, "normalize_eigenvectors", "shift"),
+    "eigen_eigensystem": (*OF_ALL, "normalize_eigenvectors", "tolerance", "use_mkl_if_available"),
+    "feast": (
+        *OF_ALL, "symmetric", "search_lowest_eigenvalues", "search_highest_eigenvalues", "sort_eigenvalues",
+        "sort_order", "subspace_size", "search_dimension", "tolerance", "e_min", "e_max", "lambda_min",
+        "lambda_max", "print_feast_output", "perform_stochastic_estimate", "solve_eigenvalue_problem",
+        "linear_solver_settings",
+    ),
+}  # fmt: skip
+"""Settings of the solvers of Kratos that find the lowest modes, by their names."""
+LARGEST = "search_highest_eigenvalues"
+
+
+def modes_of(solver: Settings, notes: list[str]) -> tuple[int, float | None]:
+    """Return the number of modes, and the frequency in rad/s above which they are, or None for the lowest."""
+    scheme = solver.text("scheme_type", "dynamic")
+    solver.expect(scheme == "dynamic", "scheme_type", f"scheme_type {scheme!r} is not known; take 'dynamic'")
+    settings = solver.section("eigensolver_settings")
+    kind = settings.text("solver_type", "spectra_sym_g_eigs_shift")
+    hint = f"{nearest(kind, EIGENSOLVERS)} Take one of {', '.join(EIGENSOLVERS)}"
+    settings.expect(kind in EIGENSOLVERS, "solver_type", f"the solver {kind!r} is not supported.{hint}")
+    settings.check_keys(EIGENSOLVERS[kind])
+    settings.expect(not settings.flag(LARGEST, False), LARGEST, "the lowest eigenvalues are found alone")
+    for key in ("lambda_min", "e_min"):
+        text = f"eigenvalues above {key} alone are not supported; take spectra_sym_g_eigs_shift with a shift"
+        settings.expect(settings.number(key, 0.0) <= 0, key, text)
+    default = 0 if kind == "feast" else 5 if "eigensolver_settings" not in solver else 1
+    sizes = ("number_of_eigenvalues", "search_dimension", "subspace_size")
+    count = max(settings.integer(key, default * (key == sizes[0])) for key in sizes)
+    settings.expect(count >= 1, sizes[0], f"must be at least 1; got {count}")
+    if kind == "feast":
+        notes.append(f"feast: the {count} lowest modes are found, whatever the largest eigenvalue requested")
+    shift = settings.number("shift", 0.0)
+    # Spectra takes the largest 1 / (λ - shift), not the largest in magnitude; measured against Kratos 10.4.4.
+    settings.expect(shift >= 0, "shift", f"must be an eigenvalue ω² ≥ 0; got {shift:g}")
+    if solver.flag("compute_modal_decomposition", False):
+        notes.append("compute_modal_decomposition is not used: modes have the modal mass 1, stiffness ω²")
+    return count, sqrt(shift) or None

@@ -6,9 +6,10 @@ Solids at rest, in quasi-static steps or in time, or their modes, in the style o
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from kratos_lite.analysis.model import Model
 from kratos_lite.errors import Problems, nearest
@@ -17,9 +18,8 @@ from kratos_lite.io.formats import read_document
 from kratos_lite.io.formats.document import Document
 from kratos_lite.io.formats.mdpa.reader import part_files, read_part
 from kratos_lite.io.kratos.context import Omission, RunContext, module_of, times_of
-from kratos_lite.io.kratos.eigenvalues import EIGEN, EIGEN_KEYS, eigenvalue_comparisons, modes_of
-from kratos_lite.io.kratos.expected_values import COMPARISONS
-from kratos_lite.io.kratos.keys import IN_TIME, unused_keys
+from kratos_lite.io.kratos.expected_values import COMPARISONS, eigenvalue_comparisons
+from kratos_lite.io.kratos.keys import EIGEN, EIGEN_KEYS, IN_TIME, modes_of, unused_keys
 from kratos_lite.io.kratos.laws import make_linear, notes_on_laws, quasi_static_of
 from kratos_lite.io.kratos.motion import add_motion
 from kratos_lite.io.kratos.outputs import OUTPUT_PROCESSES, OutputProcess
@@ -68,7 +68,7 @@ def read_kratos_project(
     notes += (make_linear(document) if small else []) + notes_on_laws(document)
     time = None if dynamic or eigen else quasi_static_of(solver, times)
     instead = "modes are written by -o OUT" if eigen else "" if part is None else PARTS
-    processes = _read_processes(settings, context, notes, eigen, instead)
+    processes = _Processes(context, notes, eigen, instead).read(settings)
     for action in processes.actions:
         if action.component == TEMPERATURE:
             action.settings.expect(expanding(document, True), "variable_name", NO_EXPANSION)
@@ -79,29 +79,16 @@ def read_kratos_project(
     follows = moved and not (small or dynamic)
     model = model_from(document, initial_displacement=displaced, processes=act, follows=follows)
     notes += [_note_on_linearity(document)] if dynamic and not (small or model.is_nonlinear) else []
-    _finish(model, settings, processes, in_time, times[-1], notes)
-    if in_time and dynamic:
-        time = time_integration_of(settings, in_time)
-    outputs, files = Outputs(in_steps=list(processes.written)), settings.files
-    time = time if in_time else None
-    return Case(model, time, modes, above, outputs=outputs, expected=processes.checks, files=files)
-
-
-def _finish(
-    model: Model,
-    settings: Settings,
-    processes: _Processes,
-    in_time: ProcessesInTime | None,
-    end: float,
-    notes: list[str],
-) -> None:
-    """Give a model its initial states, its motion, what changes in time, and the notes."""
     for initial_state in processes.states:
         initial_state(model)
-    add_motion(model, settings, None if in_time else end)
+    add_motion(model, settings, None if in_time else times[-1])
     model.notes += notes
     if in_time:
         in_time.finish(model)
+        time = time_integration_of(settings, in_time) if dynamic else time
+    outputs, files = Outputs(in_steps=list(processes.written)), settings.files
+    time = time if in_time else None
+    return Case(model, time, modes, above, outputs=outputs, expected=processes.checks, files=files)
 
 
 def _read_run_file(path: Path) -> Settings:
@@ -185,60 +172,53 @@ def _use_materials(solver: Settings, context: RunContext, document: Document, no
         use_materials(read_settings(path), context, document, notes)
 
 
-class _Processes(NamedTuple):
-    """What processes do, check, begin with and write."""
+@dataclass
+class _Processes:
+    """What processes do, check, begin with and write; files are left out if something is said `instead`."""
 
-    actions: list[Action]
-    checks: list[Callable[[Any], str]]
-    states: list[Callable[[Model], None]]
-    written: list[OutputProcess]
+    context: RunContext
+    notes: list[str]
+    eigen: bool
+    instead: str
+    actions: list[Action] = field(default_factory=list)
+    checks: list[Callable[[Any], str]] = field(default_factory=list)
+    states: list[Callable[[Model], None]] = field(default_factory=list)
+    written: list[OutputProcess] = field(default_factory=list)
 
+    def read(self, settings: Settings) -> _Processes:
+        """Take what the processes of a run file are for; all that are unknown are reported together."""
+        problems = Problems()
+        for section in (settings.section("processes"), settings.section("output_processes")):
+            # Kratos keeps the lists in alphabetical order; later processes replace earlier values.
+            for key in sorted(section.values):
+                for entry in section.sections(key):
+                    if omitted := self._take(entry, problems):
+                        self.notes.append(Omission(f"{entry.path}: {omitted}"))
+        problems.raise_if_any()
+        return self
 
-def _read_processes(
-    settings: Settings, context: RunContext, notes: list[str], eigen: bool, instead: str
-) -> _Processes:
-    """Return what processes are for; all that are unknown are reported together.
-
-    Output processes are left out where something is said `instead`.
-    """
-    found, problems = _Processes([], [], [], []), Problems()
-    for section in (settings.section("processes"), settings.section("output_processes")):
-        # Kratos keeps the lists in alphabetical order; later processes replace earlier values.
-        for key in sorted(section.values):
-            for entry in section.sections(key):
-                _read_process(entry, context, found, notes, problems, eigen, instead)
-    problems.raise_if_any()
-    return found
-
-
-def _read_process(
-    entry: Settings,
-    context: RunContext,
-    found: _Processes,
-    notes: list[str],
-    problems: Problems,
-    eigen: bool,
-    instead: str,
-) -> None:
-    """Add what a process is for to what is found, or to the notes or the problems."""
-    module, compare = module_of(entry), {CHECK: eigenvalue_comparisons} if eigen else COMPARISONS
-    known = [*PROCESSES, *COMPARISONS, CHECK, INITIAL_STATE, *OUTPUT_PROCESSES]
-    omitted = ""
-    if module in PROCESSES:
-        found.actions.extend(actions_of(entry, module, context))
-    elif module in NOT_RUN:
-        omitted = f"{module} is not run"
-    elif module not in known:
-        text = f"unknown process {module!r}.{nearest(module, known)} Known are {', '.join(known)}"
-        problems.add(str(entry.error("", text)))
-    elif module == INITIAL_STATE:
-        found.states.append(initial_state_of(entry.section("Parameters", required=True), context))
-    elif module in compare:
-        found.checks.extend(compare[module](entry.section("Parameters", required=True), context))
-    elif module not in OUTPUT_PROCESSES:
-        omitted = f"{module} is not evaluated: there are no such values"
-    else:
-        output = OUTPUT_PROCESSES[module](entry.section("Parameters", required=True), context)
-        omitted = f"{module} writes nothing: {instead}" if instead else output.note
-        found.written.extend([] if instead else [output])
-    notes.extend([Omission(f"{entry.path}: {omitted}")] if omitted else [])
+    def _take(self, entry: Settings, problems: Problems) -> str:
+        """Take what a process is for, or add it to the problems; return what is not done of it."""
+        module, compare = module_of(entry), {CHECK: eigenvalue_comparisons} if self.eigen else COMPARISONS
+        known = [*PROCESSES, *COMPARISONS, CHECK, INITIAL_STATE, *OUTPUT_PROCESSES]
+        if module in NOT_RUN:
+            return f"{module} is not run"
+        if module not in known:
+            text = f"unknown process {module!r}.{nearest(module, known)} Known are {', '.join(known)}"
+            problems.add(str(entry.error("", text)))
+            return ""
+        if module in PROCESSES:
+            self.actions += actions_of(entry, module, self.context)
+            return ""
+        if module not in (INITIAL_STATE, *compare, *OUTPUT_PROCESSES):
+            return f"{module} is not evaluated: there are no such values"
+        settings = entry.section("Parameters", required=True)
+        if module == INITIAL_STATE:
+            self.states.append(initial_state_of(settings, self.context))
+        elif module in compare:
+            self.checks += compare[module](settings, self.context)
+        else:
+            output = OUTPUT_PROCESSES[module](settings, self.context)
+            self.written += [] if self.instead else [output]
+            return f"{module} writes nothing: {self.instead}" if self.instead else output.note
+        return ""

@@ -27,7 +27,7 @@ RENAMED = {
 
 
 class VtkOutput(OutputProcess):
-    """A legacy `.vtk` file of the part, and of each of the parts in it if asked for."""
+    """A legacy `.vtk` file of the part, and of each of the parts in it if requested."""
 
     keys: tuple[str, ...] = (
         "file_format", "entity_type", "output_precision", "output_control_type", "output_interval",
