@@ -11,8 +11,7 @@ from kratos_lite.analysis.result import Result
 from kratos_lite.atomic import all_or_none
 from kratos_lite.errors import InputError
 from kratos_lite.io.case import Case, Outputs
-from kratos_lite.io.formats import ELEM_SET, ending
-from kratos_lite.io.writers.endings import check_ending, check_modes, check_result, check_series
+from kratos_lite.io.formats import ELEM_SET, check_ending, check_modes, check_result, check_series, ending
 from kratos_lite.io.writers.results import write_json, write_result
 
 

@@ -19,9 +19,9 @@ ANALYSES = {
     "static": ("at_rest", ""),
     "steady": ("at_rest", "a motion of the material"),
     "modal": ("modal", "natural frequencies"),
-    "harmonic": ("harmonic", "a harmonic response"),
-    "transient": ("transient", "an integration in time"),
-    "quasi_static": ("quasi_static", "quasi-static steps"),
+    "harmonic": ("modal", "a harmonic response"),
+    "transient": ("models_in_time", "an integration in time"),
+    "quasi_static": ("models_in_time", "quasi-static steps"),
     "bodies": ("bodies", "a body"),
 }
 """The module of `kratos_lite.io.runners` that runs each analysis, and what it is if PETSc does not do it."""

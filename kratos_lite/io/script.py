@@ -14,7 +14,7 @@ from kratos_lite.bodies import Body
 from kratos_lite.bodies.batched import batch
 from kratos_lite.errors import InputError, KratosLiteError, nearest
 from kratos_lite.io.case import Case, Outputs, TimeIntegration
-from kratos_lite.io.writers.endings import SERIES
+from kratos_lite.io.formats import SERIES
 
 NEEDED = ("body", "dt", "steps")
 """Names that a script without a `case` defines."""

@@ -14,7 +14,7 @@ from kratos_lite.bodies import Body
 from kratos_lite.bodies.body import Deformable
 from kratos_lite.io.case import Case
 from kratos_lite.io.outputs import write_picture
-from kratos_lite.io.runners.in_time import Kept, begun, follow
+from kratos_lite.io.runners.in_time import Kept, begun, follow, per_step
 from kratos_lite.io.runners.outcome import Outcome
 from kratos_lite.io.writers.recorded import Totals
 from kratos_lite.io.writers.series import SeriesWriter
@@ -91,7 +91,7 @@ class _Summary(Kept):
         ]
         if self.body.q.ndim == 1:
             rows.append(("mass center", f"{_vector(end.center)} m"))
-        return [*rows, ("time per step", f"{seconds / max(steps, 1):.3g} s, {seconds:.3g} s in all")]
+        return [*rows, per_step(seconds, steps)]
 
 
 def rows_of(body: Body) -> list[tuple[str, str]]:

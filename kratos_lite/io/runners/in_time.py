@@ -26,6 +26,11 @@ class Kept:
             self.states.append(state)
 
 
+def per_step(seconds: float, steps: int) -> tuple[str, str]:
+    """Return the row of a summary that says how long steps took."""
+    return "time per step", f"{seconds / max(steps, 1):.3g} s, {seconds:.3g} s in all"
+
+
 def begun(time: TimeIntegration, subject: Any, steps: Callable[[], Iterator[Any]]) -> Iterator[Any]:
     """Return the states of the steps of a body or model, which goes on from one in a file if it is given."""
     with naming(time.restart or ""):

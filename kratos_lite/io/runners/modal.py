@@ -1,4 +1,4 @@
-"""Natural frequencies of models, and factors of their loads at which they buckle."""
+"""Natural frequencies of models, factors of their loads at which they buckle, and harmonic responses."""
 
 from __future__ import annotations
 
@@ -8,11 +8,14 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
+from kratos_lite.analysis.fields import labelled
+from kratos_lite.analysis.harmonic import HarmonicResponse, amplitudes
 from kratos_lite.errors import SolveError
 from kratos_lite.io.case import Case
 from kratos_lite.io.outputs import write_picture
 from kratos_lite.io.runners.outcome import Outcome
 from kratos_lite.io.writers.modes import names_of_modes, write_modes, write_modes_json
+from kratos_lite.io.writers.results import write_table
 from kratos_lite.typing import Array, Progress
 
 DRAWN = 6
@@ -21,6 +24,8 @@ DRAWN = 6
 
 def check(case: Case) -> list[str]:
     """Return the warnings of the model, checked as the search for its modes does."""
+    if case.harmonic is not None:
+        case.model.require_linear("harmonic response")
     if case.buckling:
         return EquationsOfMotion(case.model, free=False, massless=True).warnings
     return EquationsOfMotion(case.model, steady=case.model.motion is not None).warnings
@@ -31,6 +36,8 @@ def run(case: Case, progress: Progress | None = None) -> Outcome:
 
     Frequency is Im λ, of conjugate pairs once, and growth Re λ, which is not positive where motion is stable.
     """
+    if case.harmonic is not None:
+        return _harmonic(case, progress)
     model, count = case.model, case.modes
     head = f"{'mode':>4}  {'frequency Hz':>14}  {'rad/s':>14}"
     values: Any
@@ -80,3 +87,29 @@ def _write(case: Case, values: Any, shapes: Any) -> None:
     if outputs.picture is not None:
         names = names_of_modes(values[:DRAWN].tolist(), case.buckling)
         write_picture(outputs.picture, case.model, modes=shapes[:DRAWN], titles=names)
+
+
+def _harmonic(case: Case, progress: Progress | None) -> Outcome:
+    """Find the response at each frequency, and write amplitudes and phases of all nodes."""
+    options = dict(case.harmonic or {})
+    if callable(options["frequencies"]):
+        options["frequencies"] = options["frequencies"](case.model)
+    response = case.model.harmonic(**options, progress=progress)
+    rows = [f"{'frequency Hz':>14}  {'rad/s':>14}  {'amplitude m':>14}  {'at node':>9}"]
+    for i, omega in enumerate(response.frequencies.tolist()):
+        size = np.linalg.norm(response.displacement(i), axis=1)
+        at = int(size.argmax())
+        node = case.model.mesh.node_ids[at]
+        rows.append(f"{omega / (2 * pi):>14.8g}  {omega:>14.8g}  {size[at]:>14.6e}  {node:>9}")
+    for path in case.outputs.results:
+        write_table(path, _columns(response))
+    notes = [("note", text) for text in case.model.notes]
+    return Outcome(case, notes, lines=rows, response=response)
+
+
+def _columns(response: HarmonicResponse) -> dict[str, Any]:
+    """Return amplitudes and phases by headers, of all nodes at the first frequency and so on."""
+    mesh, omega = response.mesh, response.frequencies
+    u = np.concatenate([response.displacement(i) for i in range(len(omega))])
+    nodes = {"frequency [rad/s]": omega.repeat(mesh.n_nodes), "node": np.tile(mesh.node_ids, len(omega))}
+    return labelled({**nodes, **amplitudes(u)}, response.units)

@@ -14,8 +14,8 @@ from kratos_lite import __version__
 from kratos_lite.analysis.fields import FIELDS
 from kratos_lite.atomic import write_whole
 from kratos_lite.errors import InputError
+from kratos_lite.io.formats import check_modes
 from kratos_lite.io.formats.vtu import write_pvd, write_vtu
-from kratos_lite.io.writers.endings import check_modes
 from kratos_lite.mesh import Mesh
 from kratos_lite.typing import Array, Complexes
 from kratos_lite.validation import finite, flag, instance, path_of

@@ -14,7 +14,7 @@ from kratos_lite.analysis.peak import peak
 from kratos_lite.analysis.report import element_counts
 from kratos_lite.atomic import refuse_nan, write_whole
 from kratos_lite.errors import SolveError
-from kratos_lite.io.writers.endings import check_ending, check_result
+from kratos_lite.io.formats import check_ending, check_result
 from kratos_lite.typing import Numbers
 
 if TYPE_CHECKING:

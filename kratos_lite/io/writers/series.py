@@ -14,8 +14,8 @@ from kratos_lite.analysis.transient import TransientAnalysis
 from kratos_lite.atomic import refuse_nan, write_arrays
 from kratos_lite.bodies import Body
 from kratos_lite.errors import InputError
+from kratos_lite.io.formats import check_series
 from kratos_lite.io.formats.vtu import check_mode, write_pvd, write_vtu
-from kratos_lite.io.writers.endings import check_series
 from kratos_lite.io.writers.recorded import Recorded, arrays_of, recorded
 from kratos_lite.io.writers.results import write_table
 from kratos_lite.typing import Array
