@@ -18,8 +18,7 @@ from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import assemble_stiffness
 from kratos_lite.distributed.communicator import Alone
 from kratos_lite.distributed.cut import Part
-from kratos_lite.distributed.ghosts import Ghosts
-from kratos_lite.distributed.multigrid import Multigrid
+from kratos_lite.distributed.multigrid import Ghosts, Multigrid
 from kratos_lite.solvers.coarse_level import has_corners, has_middle_nodes, is_stretched, p_coarse_level
 from kratos_lite.solvers.constraints import rigid_modes
 from kratos_lite.solvers.multigrid import multigrid
