@@ -33,7 +33,7 @@ class ModelError(KratosLiteError):
 
 
 class SolveError(KratosLiteError):
-    """The equations could not be solved to the accuracy asked for."""
+    """The equations could not be solved to the accuracy requested."""
 
 
 def installing(extra: str) -> str:

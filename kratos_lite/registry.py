@@ -33,7 +33,7 @@ class Registry(Generic[T]):
         self._expected: dict[str, str] = {}
 
     def expect(self, name: str, module: str, aliases: Iterable[str] = ()) -> None:
-        """Know of an item that a module registers; the module is imported when the item is asked for."""
+        """Know of an item that a module registers; the module is imported when the item is requested."""
         self._expected[name] = module
         self._aliases.update(dict.fromkeys(aliases, name))
 

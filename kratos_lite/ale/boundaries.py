@@ -65,7 +65,7 @@ def dashpots(mesh: Mesh, direction: Array, system: ConstrainedSystem, moving: Ma
         faces = mesh.faces(nodes)
         if not faces:
             raise ModelError(
-                f"the body has no face across the direction {direction.tolist()} at one end, so nothing can "
+                f"the body has no boundary face normal to {direction.tolist()} at one end, so nothing can "
                 "absorb waves there; cut the body across it, or take boundaries='natural'"
             )
         for block in faces:

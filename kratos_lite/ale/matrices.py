@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class MotionMatrices:
-    """What a motion adds to the equations of elements, for the rates 1; each is made when it is asked for.
+    """What a motion adds to the equations of elements, for unit rates; each is made when it is requested.
 
     All are data (nnz,) on one pattern.  Loads come from `mass`, which is consistent also where that of the
     equations is lumped.
@@ -120,7 +120,7 @@ class MotionMatrices:
 
     @property
     def gyroscopic(self) -> Array:
-        """What 2 rate multiplies in the damping: S, or G where that is asked for."""
+        """What 2 rate multiplies in the damping: S, or G where that is requested."""
         return self.S if self.motion.skew else self.G
 
     @property
@@ -148,7 +148,7 @@ class MotionMatrices:
         """
         return np.asarray(self._sparse(data) @ v)
 
-    # ---- loads for the rates 1 --------------------------------------------------------------------
+    # ---- loads for unit rates --------------------------------------------------------------------
 
     @cached_property
     def centrifugal(self) -> Array:

@@ -252,7 +252,7 @@ class Motion(Attachment):
         return leak(mesh, self.field, self.moving(mesh), self.open_faces(mesh))
 
     def attach(self, structure: Structure) -> None:
-        """Become the motion of a structure, and tie or fix its boundaries if asked for.
+        """Become the motion of a structure, and tie or fix its boundaries if requested.
 
         Raises
         ------

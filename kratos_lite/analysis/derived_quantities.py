@@ -81,9 +81,7 @@ def reaction_resultant(
     if not len(rows):
         raise ModelError(f"no node is chosen by {where!r}")
     hub = model.motion.center if isinstance(model.motion, Motion) else np.zeros(3)
-    point = hub if center is None else finite(center, "a center")
-    if point.shape != (3,):
-        raise InputError(f"a center must have shape (3,); got {point.shape}")
+    point = hub if center is None else finite(center, "a center", (3,))
     forces = of.reactions[rows]
     return forces.sum(axis=0), np.cross(model.mesh.points[rows] - point, forces).sum(axis=0)
 
@@ -95,9 +93,9 @@ def motion_summary(
     assert e.terms is not None
     (rate, acceleration), waves = e.rates(time), critical_rate_estimate(e.terms)
     critical = None if critical == np.inf else critical
-    noise = 1e-12 * float(np.abs(of.reactions).sum())  # what is left of reactions that balance one another
+    rounding = 1e-12 * float(np.abs(of.reactions).sum())  # what is left of reactions that balance one another
     carried = reaction_resultant(e.model, of, e.terms.motion.moving(e.model.mesh))
-    force, moment = (np.where(np.abs(v) < noise, 0.0, v) for v in carried)
+    force, moment = (np.where(np.abs(v) < rounding, 0.0, v) for v in carried)
     names, moves = ("center_velocity", "center_acceleration"), e.terms.motion.travels
     center = dict(zip(names, (v.tolist() for v in e.center_rates(time)), strict=True)) if moves else {}
     return {

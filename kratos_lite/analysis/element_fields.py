@@ -27,7 +27,7 @@ PLACES = ("gauss", "element", "node", "averaged", "raw")
 
 
 class ElementFields:
-    """Strains and stresses of elements under displacements; they are made when asked for.
+    """Strains and stresses of elements under displacements; they are made when requested.
 
     Parameters
     ----------

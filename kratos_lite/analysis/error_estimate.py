@@ -228,13 +228,13 @@ def _concentrated(sizes: Array) -> list[str]:
         return []
     return [
         f"few elements contribute most of the error, above all row {int(sizes.argmax())}: near the point "
-        "asked for, a re-entrant corner, the edge of a support or a concentrated load; it may be several "
+        "requested, a re-entrant corner, the edge of a support or a concentrated load; it may be several "
         "times larger where stresses have no limit"
     ]
 
 
 def _shared(result: Fields, held: Mask, part: Mask) -> list[str]:
-    """Return a warning where a support goes on beside the part whose reaction is asked for."""
+    """Return a warning where a support goes on beside the part whose reaction is requested."""
     axis = int(part.any(axis=0).argmax())
     for block in result.mesh.boundary:
         inside = part[block.nodes, axis]

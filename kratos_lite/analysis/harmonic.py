@@ -34,7 +34,7 @@ HarmonicLoads: TypeAlias = "Sequence[Load | tuple[Load, complex]]"
 """Loads, each alone or with a complex factor."""
 METHODS = ("modes", "direct")
 ENOUGH = 2.0
-"""Frequency of the last mode that is taken over the largest one asked for; the others answer statically."""
+"""Frequency of the last mode that is taken over the largest one requested; the others answer statically."""
 FIRST = 20
 """Modes that are looked for first."""
 SINGULAR = 1e-8

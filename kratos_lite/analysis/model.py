@@ -106,7 +106,7 @@ class Model(Structure):
             If the model is broken, or its supports leave rigid-body modes free along which loads do not
             balance; what belongs to `error` is wrong or given without it; or the quantity is 0.
         SolveError
-            If the accuracy asked for cannot be reached.
+            If the accuracy requested cannot be reached.
         """
         unused = {"most_unknowns": most_unknowns, "geometry": geometry, "quantity": quantity}
         for name, value in unused.items():

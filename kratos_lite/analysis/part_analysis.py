@@ -74,7 +74,7 @@ def solve_part(
         A part is broken, supports leave rigid-body modes free, or the model has what needs the whole mesh:
         constraints, a motion, a point load at a place without node.
     SolveError
-        If the accuracy asked for cannot be reached.
+        If the accuracy requested cannot be reached.
     """
     mesh, own = model.mesh, partition.own
     phase = Phases(progress if partition.rank == 0 else None)
@@ -110,9 +110,9 @@ def solve_part(
         system.warnings += [] if initial is not None else checks.check_energy(work)
     found = [text for some in partition.gather(warnings) for text in some]
     warnings = [*dict.fromkeys(found), *system.warnings]
-    told = {"unknowns": system.unknowns, "seconds": phase.seconds, "warnings": warnings}
+    known = {"unknowns": system.unknowns, "seconds": phase.seconds, "warnings": warnings}
     fields = u, reactions, external
-    result = result_of(PartResult, None, model, groups, fields, solution, (off, 0.0), **told)
+    result = result_of(PartResult, None, model, groups, fields, solution, (off, 0.0), **known)
     report = result.report
     report.total_load, report.total_reaction = (
         partition.sum(f[own].sum(axis=0)) for f in (external, reactions)

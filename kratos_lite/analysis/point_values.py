@@ -20,7 +20,7 @@ from kratos_lite.validation import choice
 
 
 class PointValues:
-    """Values of a result at points (...) of its mesh, each computed when it is first asked for.
+    """Values of a result at points (...) of its mesh, each computed when it is first requested.
 
     Beside the attributes below, it has every field that the table of fields knows at points: ``von_mises``,
     ``tresca``, ``principal_stresses``, ``principal_directions``, ``strain_energy_density``, …, and internal

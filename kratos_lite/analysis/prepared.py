@@ -160,7 +160,7 @@ def backend_of(backend: str | None, petsc: str | None) -> str:
 
 
 def check_own(backend: str | None, petsc: str | None, what: str) -> None:
-    """Raise InputError where another backend is asked for than the own one, which something needs."""
+    """Raise InputError where another backend is requested than the own one, which something needs."""
     if backend_of(backend, petsc) != "own":
         raise InputError(f"{what} is solved by the own backend alone; leave backend and PETSc options out")
 

@@ -47,7 +47,7 @@ class Analysis(Protocol):
 
 
 class Result(ElementFields, Tabular):
-    """Displacements and all that follows from them; strains and stresses are made when asked for.
+    """Displacements and all that follows from them; strains and stresses are made when requested.
 
     Analyses make results.
 
@@ -403,7 +403,7 @@ class Result(ElementFields, Tabular):
         return energy_error(*squares, self.norm**2, self.groups, self.mesh)
 
     def _stated_error(self) -> str:
-        """Return the error for the table: the one that was asked for, which its meshes have corrected."""
+        """Return the error for the table: the one that was requested, which its meshes have corrected."""
         report = self.report
         if report.error is None:
             return str(self._error)

@@ -166,25 +166,25 @@ class StaticAnalysis:
         """Solve for a load set with the equations of all parts in `moving`."""
         model, state, phase = self.model, self._state, case.phase
         warnings, n_used = self._warnings(case), 3 * int(state.used.sum())
-        u, reactions, noise = self._at_rest(), 0.0 - case.forces, 0.0
+        u, reactions, rounding = self._at_rest(), 0.0 - case.forces, 0.0
         solution = Solution(u, "none", "nothing moves: u = 0 needs no solution", 0, 0.0)
         if case.moving.any():
             with phase("assemble"):
                 equations = self._equations_of(moving)
                 system = equations.system
-                noise = float(np.finfo(float).eps * system.norm * system.constraint_map.norm)
+                rounding = float(np.finfo(float).eps * system.norm * system.constraint_map.norm)
             with phase("solve"):
                 u, solution = system.solve(case.forces, equations.prescribed, tolerance, start)
                 warnings += system.warnings
                 u = state.free.without(self._complete(u, system, case.moving))
-                noise *= float(np.abs(u).max(initial=0.0))
+                rounding *= float(np.abs(u).max(initial=0.0))
         with phase("verify"):
             if case.moving.any():
                 reactions = system.residual(u, case.forces)
             reactions = model.reactions(reactions, u)
             inner = model.supports.on_independents(stress_load(model, case.groups, u))
             initial = case.external - case.forces
-            roundoff = max(noise, self._initial_roundoff(case.forces) if initial.any() else 0.0)
+            roundoff = max(rounding, self._initial_roundoff(case.forces) if initial.any() else 0.0)
             # Without loads, each prescribed degree of freedom may hold nothing but the rounding of K u.
             count = n_used**0.5 if case.forces.any() else np.count_nonzero(reactions)
             balance = checks.equilibrium(model.mesh.points, case.external, reactions, inner, count * roundoff)
@@ -193,8 +193,8 @@ class StaticAnalysis:
             if tolerance is None and not initial.any():
                 work = checks.work_of(u, inner, case.external, reactions)
                 moved = float(np.abs(u).sum()) if model.attached else model.supports.displaced
-                warnings += checks.check_energy(work, 100 * noise * moved)  # which have roundoff of forces
-            warnings += checks.check_rounding(noise, case.external, initial, reactions, model.supports)
+                warnings += checks.check_energy(work, 100 * rounding * moved)  # which have roundoff of forces
+            warnings += checks.check_rounding(rounding, case.external, initial, reactions, model.supports)
             warnings += check_deformation(model, state.groups, u)
         report = {
             "unknowns": n_used - self._dirichlet.count - len(model.supports.dependents()),

@@ -269,14 +269,14 @@ class TransientAnalysis(ModelInTime):
             residual = free / largest if largest else 0.0
         solution = Solution(at.u, str(self.integrator), f"step {at.step}, t = {at.time:g} s", 0, 0.0)
         warnings = [*e.warnings, *([] if model.is_nonlinear else check_deformation(model, e.groups, at.u))]
-        told: dict[str, Any] = {
+        report: dict[str, Any] = {
             "unknowns": len(e.system.constraint_map.free),
             "seconds": {},
             "warnings": warnings,
         }
         with self._at(at) as (u, _, _, time):
             fields = at.u.copy(), at.reactions.copy(), e.system.scatter(e.load_of_result(u, time)).copy()
-            result = result_of(Result, None, model, e.groups_of_result(time), fields, solution, **told)
+            result = result_of(Result, None, model, e.groups_of_result(time), fields, solution, **report)
         result.report.backward_error = residual
         if e.terms is not None:
             result.report.motion = motion_summary(e, result, self._monitor.of_mesh, at.time)

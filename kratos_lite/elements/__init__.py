@@ -1,4 +1,4 @@
-"""Elements: the KinematicLinear family, one file each; they register themselves when they are asked for.
+"""Elements: the KinematicLinear family, one file each; they register themselves when they are requested.
 
 The file ``kinematic_linear_3d8n.py`` holds the class ``KinematicLinear3D8N``.
 """

@@ -1,4 +1,4 @@
-"""Materials: constitutive laws, one file each; they register themselves when they are asked for.
+"""Materials: constitutive laws, one file each; they register themselves when they are requested.
 
 The file ``isotropic3d.py`` holds the class ``Isotropic3D``.
 """

@@ -176,7 +176,7 @@ class Softening(IsotropicLaw, family=True):
         return stress, None, new
 
     def _tangent(self, strain: Array, state: GaussState, dt: float, stress: Array) -> Array:
-        """Return the consistent tangent (..., 6, 6), where it is asked for."""
+        """Return the consistent tangent (..., 6, 6), where it is requested."""
         C, variables = self.elastic.C, self._variables(state)
         trial = voigt.times(strain - state["plastic_strain"], C)
         flows = (stress != trial).any(axis=-1)

@@ -341,8 +341,8 @@ def equilibrium(
     points: Array, loads: Array, reactions: Array, internal: Array, roundoff: float = 0.0
 ) -> tuple[float, float]:
     """Return what forces and moments miss to equilibrium, relative to the sizes of loads and reactions."""
-    # The larger of the sum over all nodes and of what nodes miss one by one, beside the internal load of the
-    # stresses. Forces that are together below `roundoff` in N are rounding, and in balance.
+    # The larger of the sum over all nodes and of what nodes miss one by one, beside the internal forces of
+    # the stresses. Forces that are together below `roundoff` in N are rounding, and in balance.
     total = loads + reactions
     X = points - points.mean(axis=0)
     size = float(np.abs(loads).sum() + np.abs(reactions).sum())

@@ -33,7 +33,7 @@ EXPANSIONS = 60
 ROUNDED = 1e-8
 """Length that a vector of length 1 has left without the span of others, below which it is rounding."""
 SMALL = 1e-6
-"""Fraction of the largest |λ| asked for below which one counts as 0."""
+"""Fraction of the largest |λ| requested below which one counts as 0."""
 NEUTRAL = 1e-11
 """Fraction of the stiffness up to which a motion is not resisted at all."""
 
