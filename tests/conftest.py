@@ -36,7 +36,7 @@ def shared() -> Path:
 
 LONGEST = (
     *("test_table.py", "test_over_ranks.py", "test_command.py"),
-    *("test_examples.py", "test_notebooks.py", "test_benchmarks.py"),
+    *("test_examples.py", "test_benchmarks.py"),
 )
 """Files whose tests come first: no worker begins one when the others are done, or shares its fixtures."""
 
@@ -58,6 +58,7 @@ def pytest_collection_modifyitems(items):
 
 
 def pytest_collection_finish():
+    gc.freeze()  # the tests themselves are no garbage
     gc.enable()
 
 

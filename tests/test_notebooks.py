@@ -1,27 +1,18 @@
-"""Every tutorial and every solution of an exercise runs without Jupyter, and ends by asserting its number."""
+"""Every tutorial and every solution ends by asserting its number; building the site runs them."""
 
 import re
 from itertools import pairwise
 
-import pytest
-from pages import DOCS, run_scripts, text_of
+from pages import DOCS
 
 SOLUTIONS = DOCS / "exercises" / "solutions"
 NOTEBOOKS = sorted([*(DOCS / "tutorials").glob("[0-9]*.md"), *SOLUTIONS.glob("*.md")])
 
 
-def cells(page):
-    """Return the code of a notebook, cell by cell."""
-    return re.findall(r"(?ms)^```\{code-cell\}[^\n]*\n(.*?)^```$", text_of(page.relative_to(DOCS).as_posix()))
-
-
-@pytest.mark.parametrize("folder", [DOCS / "tutorials", SOLUTIONS], ids=lambda folder: folder.name)
-def test_notebooks_run_and_reach_their_numbers(folder, tmp_path):
-    pytest.importorskip("matplotlib")
-    pages = {page.name: cells(page) for page in NOTEBOOKS if page.parent == folder}
-    assert all("assert " in code[-1] for code in pages.values())
-    data = [file for file in folder.iterdir() if file.suffix in (".msh", ".mdpa")]
-    run_scripts(tmp_path, {name: "\n".join(code) for name, code in pages.items()}, dict.fromkeys(pages, data))
+def test_the_last_code_of_each_notebook_asserts():
+    for page in NOTEBOOKS:
+        *_, last = re.findall(r"(?ms)^```\{code-cell\}[^\n]*\n(.*?)^```$", page.read_text(encoding="utf-8"))
+        assert "assert " in last, page.name
 
 
 def test_there_are_eleven_tutorials_and_each_leads_to_the_next():

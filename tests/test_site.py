@@ -2,7 +2,6 @@
 
 import json
 import re
-import shutil
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -10,13 +9,12 @@ from threading import Thread
 from urllib.parse import urlsplit
 
 import pytest
+from chromium import started, wait
 
 import kratos_lite as kl
 
 ROOT = Path(__file__).resolve().parents[1]
 SITE = ROOT / "build" / "site"
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-DRIVER = shutil.which("chromedriver")
 PAGES = (
     "index.html",
     "tutorials/01-b-and-k-by-hand.html",
@@ -27,8 +25,6 @@ PAGES = (
     "gallery/index.html",
     "about/verification.html",
 )
-FLAGS = """--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking
---disable-component-update --disable-sync --disable-dev-shm-usage --window-size=1200,900"""
 
 
 def test_every_public_name_is_in_the_reference():
@@ -63,25 +59,8 @@ def site():
 
 @pytest.fixture(scope="module")
 def browser(site, tmp_path_factory):
-    webdriver = pytest.importorskip("selenium.webdriver")
-    if not (CHROMIUM and DRIVER):
-        pytest.skip("Chromium or its driver is not installed")
-    options = webdriver.ChromeOptions()
-    options.binary_location = CHROMIUM
-    for flag in (*FLAGS.split(), f"--user-data-dir={tmp_path_factory.mktemp('browser')}"):
-        options.add_argument(flag)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-    driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(DRIVER))
-    driver.set_script_timeout(60)
-    yield driver
-    driver.quit()
-
-
-def wait(browser, script):
-    """Return the first true value of a script."""
-    from selenium.webdriver.support.wait import WebDriverWait
-
-    return WebDriverWait(browser, 60).until(lambda driver: driver.execute_script(f"return {script}"))
+    with started(tmp_path_factory.mktemp("browser"), "1200,900") as driver:
+        yield driver
 
 
 def sound(browser):

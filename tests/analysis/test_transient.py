@@ -212,8 +212,8 @@ def test_support_that_moves(name):
     model = kl.Model(kl.box((1, 1, LENGTH)), kl.Isotropic3D(E=E, nu=0.0, density=RHO))
     model.fix(lambda X: np.ones(len(X), dtype=bool), "xy")
     model.fix("z-", "z", lambda t: amplitude * np.sin(drive * t))
-    h = 0.004 / omega
-    end = last(model.transient(integrator=INTEGRATORS[name]), h, 1000)
+    h = 0.016 / omega
+    end = last(model.transient(integrator=INTEGRATORS[name]), h, 250)
     t, m = end.time, RHO / (2 if lumped else 3)
     push = E + (0 if lumped else RHO / 6 * drive**2)
     A = amplitude * push / (E - m * drive**2)
@@ -222,7 +222,7 @@ def test_support_that_moves(name):
     bottom = model.mesh.nodes("z-")
     np.testing.assert_allclose(end.u[bottom, 2], amplitude * np.sin(drive * t), atol=1e-15)
     velocity = amplitude * drive * np.cos(drive * t)
-    np.testing.assert_allclose(end.v[bottom, 2], velocity, atol=2e-2 * amplitude * drive)
+    np.testing.assert_allclose(end.v[bottom, 2], velocity, atol=5e-5 * amplitude * drive)
 
 
 def test_free_fall():
@@ -303,7 +303,7 @@ def test_lumped_mass_is_another_frequency():
     mode = shape(bar())
     for lumped in (False, True):
         omega = wave(4, lumped)
-        end = last(bar().transient(displacement=mode, lumped=lumped), 2 * np.pi / omega / 1000, 1000)
+        end = last(bar().transient(displacement=mode, lumped=lumped), 2 * np.pi / omega / 250, 250)
         np.testing.assert_allclose(end.u, mode, atol=1e-4)
 
 

@@ -1,5 +1,7 @@
 """Everything that is registered passes the conformance kit."""
 
+import sys
+
 import numpy as np
 import pytest
 
@@ -95,7 +97,8 @@ def test_each_material_conforms(material):
 
 
 def test_each_material_is_checked():
-    shipped = {law for law in MATERIALS.values() if law.__module__.startswith("kratos_lite")}
+    package = {name: vars(module) for name, module in sys.modules.items() if name.startswith("kratos_lite.")}
+    shipped = {law for law in MATERIALS.values() if law is package.get(law.__module__, {}).get(law.__name__)}
     assert {type(law) for law in (*MATERIALS_TO_CHECK, *(law for law, _ in BY_STEPS))} == shipped
 
 

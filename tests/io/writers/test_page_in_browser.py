@@ -3,25 +3,14 @@
 import itertools
 import json
 import re
-import shutil
 
 import numpy as np
 import pytest
+from chromium import started, wait
 
 import kratos_lite as kl
 from kratos_lite.shapes import SHAPES
 
-webdriver = pytest.importorskip("selenium.webdriver")
-WebDriverWait = pytest.importorskip("selenium.webdriver.support.wait").WebDriverWait
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-DRIVER = shutil.which("chromedriver")
-pytestmark = pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="no chromium with its chromedriver")
-
-FLAGS = (
-    *("headless", "no-sandbox", "disable-gpu", "enable-unsafe-swiftshader", "disable-quic", "no-first-run"),
-    *("disable-background-networking", "disable-component-update", "disable-sync", "disable-extensions"),
-    *("hide-scrollbars", "disable-dev-shm-usage", "window-size=700,500"),
-)
 STEEL = kl.Isotropic3D(E=2e11, nu=0.3, density=7850.0)
 
 PIXELS = """
@@ -54,12 +43,16 @@ class Browser:
     def open(self, path):
         self.logged()
         self.driver.get(path.as_uri())
-        wait = WebDriverWait(self.driver, 30, 0.05)
-        wait.until(lambda _: self("return Boolean(globalThis.page) || !message.hidden"))
+        wait(self.driver, "Boolean(globalThis.page) || !message.hidden")
         assert self("return message.textContent") == ""
 
     def __call__(self, script, *values):
         return self.driver.execute_script(script, *values)
+
+    def actions(self):
+        from selenium.webdriver import ActionChains
+
+        return ActionChains(self.driver)
 
     def pixels(self):
         """Number of colors, and a number that differs from picture to picture."""
@@ -87,15 +80,8 @@ class Browser:
 
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory):
-    options = webdriver.ChromeOptions()
-    options.binary_location = CHROMIUM
-    for flag in (*FLAGS, f"user-data-dir={tmp_path_factory.mktemp('profile')}"):
-        options.add_argument(f"--{flag}")
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-    driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(DRIVER))
-    driver.set_script_timeout(30)
-    yield Browser(driver)
-    driver.quit()
+    with started(tmp_path_factory.mktemp("profile"), "700,500") as driver:
+        yield Browser(driver)
 
 
 @pytest.fixture(scope="module")
@@ -161,8 +147,7 @@ def test_controls_change_the_picture(page):
 def test_dragging_turns_the_body(page):
     before = page.pixels()
     view = page.driver.find_element("id", "view")
-    actions = webdriver.ActionChains(page.driver)
-    actions.move_to_element(view).click_and_hold().move_by_offset(80, 30).release().perform()
+    page.actions().move_to_element(view).click_and_hold().move_by_offset(80, 30).release().perform()
     assert page.pixels() != before
 
 
@@ -284,7 +269,7 @@ def test_the_pointer_tells_node_element_and_value(page, result):
         page.pixels()
         view = page.driver.find_element("id", "view")
         middle = round(page("return (legend.offsetLeft + legend.offsetWidth) / 2"))
-        webdriver.ActionChains(page.driver).move_to_element(view).move_by_offset(middle + 17, 11).perform()
+        page.actions().move_to_element(view).move_by_offset(middle + 17, 11).perform()
         text = page("return pointer.hidden ? '' : pointer.textContent")
         value, node, place, nodal, element = re.fullmatch(
             r"(\S+ .?m)\nnode (\d+) at \((.*)\) m: (\S+ .?m)\nelement (\d+)", text
@@ -297,7 +282,7 @@ def test_the_pointer_tells_node_element_and_value(page, result):
         assert abs(meters(nodal) - size[row]) < 1e-4 * size.max()
         assert size[cell].min() * 0.99 <= meters(value) <= size[cell].max() * 1.01
     corner = view.size["width"] // 2 - 6, view.size["height"] // 2 - 6
-    webdriver.ActionChains(page.driver).move_to_element_with_offset(view, *corner).perform()
+    page.actions().move_to_element_with_offset(view, *corner).perform()
     assert page("return pointer.hidden")
 
 
@@ -336,9 +321,8 @@ def test_modes_swing_to_both_sides(browser, model, tmp_path):
     step = "document.querySelector('[data-step=\"1\"]').click(); return page.frame"
     assert [browser(step) for _ in names] == [0, 1, 2]
     browser.click("play")
-    wait = WebDriverWait(browser.driver, 30, 0.02)
     for sign in (1, -1):
-        wait.until(lambda _, sign=sign: sign * browser("return page.phase") > 0.2)
+        wait(browser.driver, f"{sign} * page.phase > 0.2")
 
 
 def test_complex_modes_pass_through_both_parts(browser, tmp_path):
@@ -369,8 +353,7 @@ def test_states_play_with_one_range_for_all(browser, model, tmp_path):
     assert browser.pixels() != first
     assert abs(browser.array("page.displacement") - states[6].u.ravel()).max() < 1e-4 * largest
     browser.click("play")
-    wait = WebDriverWait(browser.driver, 30, 0.02)
-    wait.until(lambda _: browser("return page.frame") != 6)
+    wait(browser.driver, "page.frame != 6")
     back = "const shown = page.frame; document.querySelector('[data-step=\"-1\"]').click(); return shown"
     shown = browser(back)
     assert browser("return [page.playing, page.frame]") == [False, (shown - 1) % 7]
@@ -456,6 +439,5 @@ def test_without_webgl_a_page_says_so(browser, written, tmp_path):
     )
     (tmp_path / "blind.html").write_text(text, encoding="utf-8")
     browser.driver.get((tmp_path / "blind.html").as_uri())
-    wait = WebDriverWait(browser.driver, 30, 0.05)
-    wait.until(lambda _: browser("return !message.hidden"))
+    wait(browser.driver, "!message.hidden")
     assert "needs WebGL" in browser("return message.textContent")
