@@ -34,6 +34,7 @@ from kratos_lite.io.settings import Settings, find_file, read_settings
 
 CHECK = "check_eigenvalues_process"
 NOT_RUN = ("save_restart_process", "timer_process", "print_info_in_file_process")
+DAMPING = Omission("rayleigh_beta damps by the stiffness at rest; Kratos takes that of each iteration")
 LINEAR = "analysis_type is non_linear: the linear solution is computed, on the undeformed body"
 PARTS = "results over part files are written by -o OUT.pvtu"
 
@@ -76,6 +77,7 @@ def read_kratos_project(
     _finish(model, settings, processes, in_time, times[-1], notes)
     if in_time and dynamic:
         time = time_integration_of(settings, in_time)
+        model.notes += [DAMPING] if model.is_nonlinear and time.rayleigh[1] else []
     outputs, files = Outputs(in_steps=list(processes.written)), settings.files
     time = time if in_time else None
     return Case(model, time, modes, above, outputs=outputs, expected=processes.checks, files=files)

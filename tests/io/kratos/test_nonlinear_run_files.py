@@ -94,6 +94,8 @@ def test_pressures_follow_linear_elements_in_time(tmp_path, follower):
     text = text if follower else text.replace("SurfaceLoadC", "SmallDisplacementSurfaceLoadC")
     (tmp_path / "box.mdpa").write_text(text)
     *_, state = prepare(read_case(path))[1]
+    damped = read_case(write(tmp_path, pressed(**settings, rayleigh_beta=1e-4), "damped.json"))
+    assert any("rayleigh_beta damps by" in note for note in damped.model.notes) == follower
     found = []
     for how in (follower, not follower):
         mesh = kl.box(cells=(2, 2, 2), size=(2.0, 1.0, 1.5), element="KinematicLinear3D8N")
