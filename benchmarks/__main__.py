@@ -69,7 +69,9 @@ OTHERS: dict[str, Callable[[argparse.Namespace], int | None]] = {
     "adaptive": lambda o: accuracy.adaptive(o.scenes, o.elements),
     "edges": lambda o: accuracy.edges(),
     "dynamics": lambda o: dynamics.dynamics(),
-    "laws": lambda o: laws.laws(o.pythons.get("Kratos", o.pythons.get("", "")), o.cells or laws.CELLS),
+    "laws": lambda o: laws.laws(
+        o.pythons.get("Kratos", o.pythons.get("", "")), o.cells or laws.CELLS, o.path
+    ),
     "loads": lambda o: loads.loads(),
     "folders": lambda o: folders.folders(o.path, o.pythons.get("Kratos", o.pythons.get("", ""))),
     "decks": lambda o: decks.speed() if o.path == ROOT else decks.decks(o.path),
@@ -129,7 +131,13 @@ def arguments(words: Sequence[str] | None) -> argparse.Namespace:
     many = {"nargs": "+", "metavar": "NAME"}
     add, seconds = parser.add_argument, {"type": float, "metavar": "SECONDS"}
     add("command", choices=[*COMMANDS, *OTHERS])
-    add("path", nargs="?", type=Path, default=ROOT, help="for folders, decks: with tests of Kratos, CalculiX")
+    add(
+        "path",
+        nargs="?",
+        type=Path,
+        default=ROOT,
+        help="for laws, folders, decks: with files of Kratos, CalculiX",
+    )
     add("--programs", choices=names, default=names, help=f"some of: {', '.join(names)}", **many)
     add("--scenes", choices=sorted(scenes.SCENES), help="for error, stall: some of their scenes", **many)
     add("--elements", choices=scenes.KINDS, help=f"some of: {', '.join(scenes.KINDS)}", **many)

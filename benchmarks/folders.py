@@ -55,7 +55,7 @@ if solver["solver_type"] == "eigen_value":
     kind = {"solver_type": "spectra_sym_g_eigs_shift", "number_of_eigenvalues": int(sys.argv[3])}
     if solver.get("eigensolver_settings", {}).get("solver_type") == "feast":
         solver["eigensolver_settings"] = kind
-else:
+elif len(sys.argv) == 4:
     solver |= {"residual_relative_tolerance": 1e-10, "max_iteration": 30}
     if solver.get("linear_solver_settings", {}).get("solver_type", "").startswith("ExternalSolvers"):
         del solver["linear_solver_settings"]
@@ -66,7 +66,8 @@ steps, start, model = [], time.time(), KM.Model()
 Analysis(model, KM.Parameters(json.dumps(settings))).Run()
 np.save("u.npy", steps)
 """
-"""Runs a file, also of 2019, without its checks, to small residuals, until its end or a limit in seconds."""
+"""Runs a file, also of 2019, without its checks, until its end or a limit in seconds, to small residuals, or
+its own with a fourth word."""
 FILES = r'"(?:input_filename|materials_filename)"\s*:\s*"(.*?)"'
 LAW, NAMES = r'"constitutive_law"\s*:\s*\{([^}]*)\}', r'"(?:name|yield_surface)"\s*:\s*"([\w.]+)"'
 SOLID = r"Begin Elements\s+((?:SmallDisplacement|TotalLagrangian|UpdatedLagrangian)\w*3D\d+N)"

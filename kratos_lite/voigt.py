@@ -51,15 +51,20 @@ def times(a: Array, C: Array) -> Array:
     return np.asarray((a.reshape(-1, 6) @ C.T).reshape(a.shape))
 
 
+def components(a: Array) -> Array:
+    """Return vectors (..., 6) as their components (6, ...), each in one piece, with which NumPy is faster."""
+    return np.ascontiguousarray(np.moveaxis(a, -1, 0))
+
+
 def determinant(a: Array) -> Array:
     """Return the determinant (...) of a symmetric tensor (..., 6)."""
-    xx, yy, zz, xy, yz, zx = np.moveaxis(a, -1, 0)
+    xx, yy, zz, xy, yz, zx = components(a)
     return np.asarray(xx * (yy * zz - yz**2) - xy * (xy * zz - yz * zx) + zx * (xy * yz - yy * zx))
 
 
 def cofactor(a: Array) -> Array:
     """Return the determinant times the inverse (..., 6) of a symmetric tensor (..., 6)."""
-    xx, yy, zz, xy, yz, zx = np.moveaxis(a, -1, 0)
+    xx, yy, zz, xy, yz, zx = components(a)
     normal = yy * zz - yz**2, zz * xx - zx**2, xx * yy - xy**2
     shear = yz * zx - xy * zz, zx * xy - yz * xx, xy * yz - zx * yy
     return np.stack([*normal, *shear], axis=-1)

@@ -295,11 +295,14 @@ def test_laws_beside_another_program():
     assert row["unknowns"] == 3 * 3 * 3 * 5
     assert row["iterations"] > 10
     other = row | {"seconds": 2 * row["seconds"], "u": row["u"] * (1 + 1e-9)}
+    other["processors"] = 4 * row["processors"]
     rows = [{"law": "J2", "n": 2, "ours": row, "Kratos": other}]
-    page = laws.page({"rows": [*rows, rows[0] | {"Kratos": {"failed": "> 9 s"}}], "points": {"J2": 3.14}})
-    assert "| 0.5 | 1e-09 |" in page
+    page = laws.page(
+        {"rows": [*rows, rows[0] | {"Kratos": {"failed": "> 9 s"}}], "points": {"one core": {"J2": 3.14}}}
+    )
+    assert "| 0.5 / 0.25 | 1e-09 |" in page
     assert "| > 9 s |" in page
-    assert page.endswith("J2 3.1.\n")
+    assert page.endswith("one core, in millions: J2 3.1.\n")
     assert "failed" in laws.timed(sys.executable, "ours", "clay", 2)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from kratos_lite import voigt
 from kratos_lite.errors import MaterialError
 from kratos_lite.materials.material import GaussState, Material, Response
-from kratos_lite.materials.neo_hookean3d import inverse_and_log, symmetric_product
+from kratos_lite.materials.neo_hookean3d import inverse_and_log, tangent
 from kratos_lite.typing import Array
 
 
@@ -67,12 +67,11 @@ class MooneyRivlin3D(Material):
         stress = first * (voigt.UNIT - I1 / 3 * inverse) + second * (a - 2 / 3 * I2 * inverse)
         stress += self.bulk * (J**2 - J) * inverse
 
-        I1, I2, J, first, second = (v[..., None] for v in (I1, I2, J, first, second))
-        both, product = _outer(inverse, inverse), symmetric_product(inverse)
-        D = 2 * first * (I1 / 9 * both + I1 / 3 * product - _symmetric(voigt.UNIT, inverse) / 3)
-        D += 2 * second * (np.outer(voigt.UNIT, voigt.UNIT) - np.diag(voigt.HALF_SHEAR))
-        D += 2 * second * (4 / 9 * I2 * both + 2 / 3 * I2 * product - 2 / 3 * _symmetric(a, inverse))
-        D += self.bulk * ((2 * J**2 - J) * both - 2 * (J**2 - J) * product)
+        w = first * (I1 / 9 * inverse - 2 / 3 * voigt.UNIT) + second * (4 / 9 * I2 * inverse - 4 / 3 * a)
+        w += self.bulk * (J**2 - J / 2) * inverse
+        b = first * I1 / 3 + second * 2 / 3 * I2 - self.bulk * (J**2 - J)
+        D = tangent(inverse, w, b[..., 0])
+        D += 2 * second[..., None] * (np.outer(voigt.UNIT, voigt.UNIT) - np.diag(voigt.HALF_SHEAR))
         return stress, D, {}
 
     def energy(self, strain: Array, stress: Array, state: GaussState) -> Array:
@@ -87,11 +86,3 @@ def invariants(C: Array) -> tuple[Array, Array]:
     """Return I₁ and I₂ (..., 1) of a tensor (..., 6)."""
     I1 = C[..., :3].sum(axis=-1, keepdims=True)
     return I1, (I1**2 - (C**2 @ voigt.SHEAR_TWICE)[..., None]) / 2
-
-
-def _outer(a: Array, b: Array) -> Array:
-    return np.asarray(a[..., :, None] * b[..., None, :])
-
-
-def _symmetric(a: Array, b: Array) -> Array:
-    return _outer(a, b) + _outer(b, a)

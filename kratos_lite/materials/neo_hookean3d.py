@@ -56,10 +56,7 @@ class NeoHookean3D(IsotropicLaw):
         lam, mu = self.elastic.lame
         inverse, log_J = inverse_and_log(strain)
         stress = mu * voigt.UNIT + (lam * log_J - mu)[..., None] * inverse
-        D = symmetric_product(inverse)
-        D *= 2 * (mu - lam * log_J)[..., None, None]
-        D += np.einsum("...i,...j->...ij", lam * inverse, inverse)
-        return stress, D, {}
+        return stress, tangent(inverse, lam / 2 * inverse, mu - lam * log_J), {}
 
     def energy(self, strain: Array, stress: Array, state: GaussState) -> Array:
         """Return W; see `Material.energy`."""
@@ -75,12 +72,12 @@ def inverse_and_log(strain: Array) -> tuple[Array, Array]:
         return voigt.inverse(C), np.log(voigt.determinant(C)) / 2
 
 
-def symmetric_product(a: Array) -> Array:
-    """Return ½ (a_ik a_jl + a_il a_jk) (..., 6, 6) of a symmetric tensor a (..., 6)."""
-    parts = np.ascontiguousarray(np.moveaxis(a, -1, 0))
-    A, out = [[parts[k] for k in row] for row in voigt.PLACES], np.empty((*a.shape, 6))
+def tangent(inverse: Array, w: Array, b: Array) -> Array:
+    """Return w_ij c_kl + c_ij w_kl + b (c_ik c_jl + c_il c_jk) (..., 6, 6) of c = C⁻¹, w and b (...)."""
+    c, w = voigt.components(inverse), voigt.components(w)
+    tensor, out = [[c[k] for k in row] for row in voigt.PLACES], np.empty((6, 6, *b.shape))
     for row, (i, j) in enumerate(voigt.PAIRS):
         for column, (k, m) in enumerate(voigt.PAIRS[: row + 1]):
-            value = (A[i][k] * A[j][m] + A[i][m] * A[j][k]) / 2
-            out[..., row, column] = out[..., column, row] = value
-    return out
+            value = b * (tensor[i][k] * tensor[j][m] + tensor[i][m] * tensor[j][k])
+            out[row, column] = out[column, row] = value + w[row] * c[column] + c[row] * w[column]
+    return np.moveaxis(out, (0, 1), (-2, -1))

@@ -93,7 +93,7 @@ def test_amplitudes_and_functions_of_time_follow_too():
     found = []
     for load in (
         (kl.Pressure("z+", 2e5, follower=True), {"amplitude": lambda t: t / 2}),
-        (kl.TimeDependentLoad(lambda t: kl.Pressure("z+", 1e5 * t, follower=True)), {}),
+        (kl.TimeDependentLoad(lambda t: kl.Pressure("z+", 1e5 * t, follower=True), follower=True), {}),
     ):
         model = kl.Model(kl.box(element=element(8)), SVK)
         model.fix("z-")
@@ -122,6 +122,26 @@ def test_a_follower_makes_a_model_of_small_displacements_a_nonlinear_one(more):
         assert result.report.iterations <= corrections
     with pytest.raises(ModelError, match="a load that follows the body"):
         model.static()
+
+
+def test_functions_of_time_make_small_displacements_nonlinear_too_where_they_say_so():
+    """In time, a free block whose pressed face grows with what its sides do."""
+    found = []
+    for load, how in (
+        (kl.Pressure("x+", 4e5, follower=True), {"amplitude": lambda t: t}),
+        (kl.TimeDependentLoad(lambda t: kl.Pressure("x+", 4e5 * t, follower=True), follower=True), {}),
+        (kl.Pressure("x+", 4e5), {"amplitude": lambda t: t}),
+    ):
+        model = kl.Model(kl.box(cells=(1, 1, 2)), kl.Isotropic3D(E, 0.3, 1e3))
+        model.fix("x-")
+        model.add(load, **how)
+        *_, state = kl.integrate(model.transient(), dt=0.1, steps=5)
+        found.append(state.u)
+    assert np.abs(found[1] - found[0]).max() < 1e-10 * np.abs(found[0]).max()
+    assert np.abs(found[2] - found[0]).max() > 1e-2 * np.abs(found[0]).max()
+    model.add(kl.TimeDependentLoad(lambda t: kl.Pressure("x+", t, follower=True)))
+    with pytest.raises(InputError, match=r"take TimeDependentLoad\(function, follower=True\)"):
+        model.transient()
 
 
 def test_a_follower_by_places_is_refused():

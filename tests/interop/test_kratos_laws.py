@@ -94,6 +94,30 @@ def test_ten_steps_are_those_of_kratos(tmp_path, name):
     compare(tmp_path, content, 10)
 
 
+DYNAMIC = {  # elements, law, its constants, traction on the top after 1 s, prefix of conditions
+    "J2": (*CASES["J2"][:3], 3e8, "SmallDisplacement"),
+    "neo-Hooke": (*CASES["neo-Hooke"][:3], 5e9, "SmallDisplacement"),
+    "Saint Venant, followed": (*CASES["Saint Venant"][:3], 5e9, ""),
+    "linear, followed": ("SmallDisplacementElement", "LinearElastic3DLaw", {}, 5e9, ""),
+}
+
+
+@pytest.mark.parametrize("scheme", ["newmark", "bossak"])
+@pytest.mark.parametrize("name", DYNAMIC)
+def test_dynamic_steps_are_those_of_kratos(tmp_path, name, scheme):
+    """Also where loads follow the faces of linear elements, which makes these nonlinear."""
+    element, law, variables, size, prefix = DYNAMIC[name]
+    text = box_mdpa().replace("SmallDisplacementElement", element)
+    (tmp_path / "box.mdpa").write_text(text.replace("SmallDisplacementSurface", f"{prefix}Surface"))
+    write(tmp_path, materials("Structure.Body", 7850.0, 2e9, 0.3, law, **variables), "materials.json")
+    vector = "assign_vector_variable_to_conditions_process"
+    pull = process(vector, "Structure.Top", "SURFACE_LOAD", value=[f"{size / 5}*t", 0.0, f"{size}*t"])
+    scalar = "assign_scalar_variable_to_conditions_process"
+    loads = [pull, process(scalar, "Structure.Side", "POSITIVE_FACE_PRESSURE", value=f"{-size}*t")]
+    how = {"solver_type": "dynamic", "scheme_type": scheme} | EXACT
+    compare(tmp_path, run_file([CLAMP], loads, step=2e-3, end=0.029, **how), 15)
+
+
 SURFACES = ("VonMises", "DruckerPrager", "Tresca", "ModifiedMohrCoulomb")
 ROCK = {
     "YOUNG_MODULUS": 20e9, "POISSON_RATIO": 0.2, "FRACTURE_ENERGY": 5e5, "SOFTENING_TYPE": 1,

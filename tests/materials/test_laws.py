@@ -125,6 +125,24 @@ def test_steel_hardens_along_the_lines_of_a_bar():
         assert abs(back[1] - (top - 2 * radius - slope * rest)) < 1e-9 * Y
 
 
+def test_a_kinematic_loop_is_twice_its_first_branch_and_closes():
+    """Masing: σ_r - σ = 2 f((ε_r - ε)/2) from a reversal on, where f is the first branch."""
+    E, H, Y = 200e9, 2e9, 250e6
+
+    def first(strain):
+        return min(E * strain, Y + E * H / (E + H) * (strain - Y / E))
+
+    law = kl.J2Plasticity3D(E, 0.3, Y, kinematic=H)
+    path = [0.01, 0.009, 0.002, -0.01, 0.003, 0.01]
+    stress, _ = uniaxial(law, path)
+    for begin, places in ((0, (1, 2, 3)), (3, (4, 5))):
+        for i in places:
+            change, sign = path[i] - path[begin], np.sign(path[i] - path[begin])
+            exact = stress[begin] + sign * 2 * first(abs(change) / 2)
+            assert abs(stress[i] - exact) < 1e-9 * Y
+    assert abs(stress[-1] - stress[0]) < 1e-9 * Y
+
+
 def test_saturation_of_voce():
     law = kl.J2Plasticity3D(200e9, 0.3, 200e6, 0.0, 0.0, 300e6, 50.0)
     stress, state = uniaxial(law, [0.05])
@@ -371,6 +389,32 @@ def test_relaxation_and_creep_of_order_two():
         errors.append(abs(out[0] / stress[0] - exact))
     assert 3.8 < errors[0] / errors[1] < 4.2
     assert 3.8 < errors[1] / errors[2] < 4.2
+
+
+def test_a_cycle_of_glue_loses_what_its_loss_modulus_says():
+    """∮ σ dε = π ε² E Σ w ωτ / (1 + ω²τ²)."""
+    law, n, omega = kl.GeneralizedMaxwell3D(1e9, 0.3, 0.3, 2.0, 0.2, 0.5), 200, 1.7
+    strain = np.outer(1e-3 * np.sin(2 * np.pi * np.arange(1, 6 * n + 1) / n), [1.0, 0, 0, 0, 0, 0])
+    state, stress = law.initial_state(), np.zeros(len(strain))
+    for i, e in enumerate(strain):
+        out, _, state = law.evaluate(e, state, 2 * np.pi / omega / n, tangent=False)
+        stress[i] = out[0]
+    middle = (stress[-n - 1 : -1] + stress[-n:]) / 2
+    lost = (middle * np.diff(strain[-n - 1 :, 0])).sum()
+    modulus = law.C[0, 0] * sum(w * omega * tau / (1 + (omega * tau) ** 2) for w, tau in law.terms)
+    assert abs(lost / (np.pi * 1e-6 * modulus) - 1) < 1e-3
+
+
+@pytest.mark.parametrize(("stretch", "sides"), [(0.6, 1), (1.8, 1), (0.7, 2), (1.5, 2)])
+def test_rubber_pulled_along_one_side_or_two(stretch, sides):
+    """Cauchy's stresses of neo-Hooke are (μ (λ² - 1) + Λ ln J) / J; those of free sides vanish."""
+    law = kl.NeoHookean3D(1e6, 0.3)
+    path = kl.material_point(law, {side: [(stretch**2 - 1) / 2] for side in ("xx", "yy")[:sides]})
+    squares = 1 + 2 * path.strain[-1, :3]
+    J, (lam, mu) = np.sqrt(squares.prod()), (law.E * 0.3 / (1.3 * 0.4), law.E / 2.6)
+    cauchy = (mu * (squares - 1) + lam * np.log(J)) / J
+    assert np.abs(cauchy[sides:]).max() < 1e-8 * np.abs(cauchy).max()
+    assert np.abs(path.stress[-1, :3] - J * cauchy / squares).max() < 1e-8 * np.abs(cauchy).max()
 
 
 @pytest.mark.parametrize("stretch", [0.6, 1.5, 3.0])

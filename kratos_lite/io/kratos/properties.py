@@ -210,7 +210,7 @@ def use_materials(settings: Settings, context: RunContext, document: Document, n
     entries = settings.sections("properties")
     settings.expect(entries, "properties", "the materials file needs a list of 'properties'")
     for entry in entries:
-        entry.check_keys(("model_part_name", "properties_id", "Material"))
+        entry.check_keys(("model_part_name", "properties_id", "Material", "sub_properties"))
         number = entry.integer("properties_id")
         _assign(entry, context, document, number)
         _use_material(entry, document.properties.setdefault(number, Properties(number)), notes)
@@ -249,8 +249,9 @@ def _use_material(entry: Settings, properties: Properties, notes: list[str]) -> 
     law.expect(name in MATERIALS, "name", f"{text} Choose one, or solve this part with Kratos")
     variables = body.section("Variables")
     values = {key.rsplit(".", 1)[-1]: _variable(variables, key) for key in variables.values}
-    if body.section("Tables").values:
-        notes.append(Omission(f"material of {part}: Tables are not used by {name}"))
+    for what, where in (("Tables", body), ("sub_properties", entry)):
+        if where.values.get(what):
+            notes.append(Omission(f"material of {part}: {what} are not used by {name}"))
     for key in body.unknown(("name", "constitutive_law", "Variables", "Tables")):
         text = f"part {part}: {key!r} in a material is not supported; leave it out"
         body.expect(not body.values[key], key, text)

@@ -37,10 +37,11 @@ from kratos_lite.io.kratos.time_dependent import DYNAMIC, ProcessesInTime, time_
 from kratos_lite.io.kratos.to_model import model_from
 from kratos_lite.io.kratos.variables import TEMPERATURE
 from kratos_lite.io.settings import Settings, find_file, read_settings
-from kratos_lite.model.loads.surface import ConditionLoads
 
 CHECK = "check_eigenvalues_process"
 NOT_RUN = ("save_restart_process", "timer_process", "print_info_in_file_process")
+DAMPING = Omission("rayleigh_beta damps by the stiffness at rest; Kratos takes that of each iteration")
+LINEAR = "analysis_type is non_linear: the linear solution is computed, on the undeformed body"
 PARTS = "results over part files are written by -o OUT.pvtu"
 
 
@@ -76,16 +77,18 @@ def read_kratos_project(
     in_time = ProcessesInTime(processes.actions, context, dynamic) if in_steps else None
     act = in_time.prepare if in_time else partial(run, processes.actions, context, notes)
     displaced = initial_displacement and in_time is None
-    follows = moved and not (small or dynamic)
+    follows = moved and not small
     model = model_from(document, initial_displacement=displaced, processes=act, follows=follows)
-    notes += [_note_on_linearity(document)] if dynamic and not (small or model.is_nonlinear) else []
+    notes += [LINEAR] if dynamic and not (small or model.is_nonlinear) else []
     for initial_state in processes.states:
         initial_state(model)
     add_motion(model, settings, None if in_time else times[-1])
     model.notes += notes
     if in_time:
         in_time.finish(model)
-        time = time_integration_of(settings, in_time) if dynamic else time
+        if dynamic:
+            time = time_integration_of(settings, in_time)
+            model.notes += [DAMPING] if model.is_nonlinear and time.rayleigh[1] else []
     outputs, files = Outputs(in_steps=list(processes.written)), settings.files
     time = time if in_time else None
     return Case(model, time, modes, above, outputs=outputs, expected=processes.checks, files=files)
@@ -109,13 +112,6 @@ def _notes_on_keys(settings: Settings, dynamic: bool, eigen: bool, small: bool) 
     note = f"{are.format(', '.join(unused))} not used"
     misspelt = any("Did you mean" in key for key in unused if "." not in key)  # a whole section is left out
     return [Omission(note) if misspelt else note] if unused else []
-
-
-def _note_on_linearity(document: Document) -> str:
-    """Return a note on a solution that is linear here, and not in Kratos where loads follow faces."""
-    text = "analysis_type is non_linear: the linear solution is computed, on the undeformed body"
-    carriers = [block.name for block in document.mesh.conditions if len(block)]
-    return Omission(text) if any(name.startswith(ConditionLoads.following) for name in carriers) else text
 
 
 def _dofs(solver: Settings, dynamic: bool) -> tuple[str, ...]:

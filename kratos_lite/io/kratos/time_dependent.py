@@ -73,7 +73,8 @@ class ProcessesInTime:
                 if group is SURFACE:
                     values.note_idle(self.notes)
                 values.drop(group)
-                self._later.append(TimeDependentLoad(_load_in_time(actions, self.context, base, load_of)))
+                function = _load_in_time(actions, self.context, base, load_of)
+                self._later.append(TimeDependentLoad(function, group is SURFACE and values.follows))
         values.drop({f"{name}_{axis}" for name in UNPRESCRIBED for axis in "XYZ"})
 
     def finish(self, model: Model) -> None:

@@ -87,7 +87,9 @@ class Variables:
     """Values of variables on the nodes and conditions of a mesh; later values replace earlier ones."""
 
     def __init__(self, mesh: Mesh, expanding: Sequence[Properties] = (), follows: bool = False) -> None:
-        self.mesh, self.follows = mesh, follows  # whether loads on faces follow the body
+        kinds = (block.name for block in mesh.conditions if len(block))
+        self.follows = follows and any(kind.startswith(ConditionLoads.following) for kind in kinds)
+        self.mesh = mesh
         self.expanding = expanding  # the properties of elements that a temperature strains
         self.nodal, self.conditional = Fields(mesh.n_nodes), Fields(mesh.n_conditions)
         self.fixed: dict[str, Mask] = {}
@@ -159,9 +161,7 @@ class Variables:
         values = (force, *nodal_force.values(), pressure, nodal_pressure)
         is_loaded = len(carriers) > 0 and any(value.any() for value in values)
         given = force, nodal_force, pressure, nodal_pressure
-        kinds = ConditionLoads.following
-        follower = self.follows and any(block.name.startswith(kinds) for block, _ in conditions)
-        return ConditionLoads(*given, follower) if is_loaded else None
+        return ConditionLoads(*given, self.follows) if is_loaded else None
 
     def note_idle(self, notes: list[str]) -> None:
         """Note loads where nothing carries them, and pressures that follow deformed faces in Kratos only."""

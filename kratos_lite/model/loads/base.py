@@ -17,7 +17,7 @@ from kratos_lite.mesh import Mesh
 from kratos_lite.model.local_axes import LocalAxes
 from kratos_lite.time_series import Factor, TimeSeries, function_of
 from kratos_lite.typing import Array, ArrayLike, Ints, Rows
-from kratos_lite.validation import finite, instance, of_places, short, takes
+from kratos_lite.validation import finite, flag, instance, of_places, short, takes
 
 if TYPE_CHECKING:
     from kratos_lite.mesh.refined_mesh import RefinedMesh
@@ -205,6 +205,7 @@ class TimeDependentLoad(Load):
     ----------
     function : takes the time in s, returns a load, or None where nothing acts.  As long as it returns the
         same object, the nodal forces of that are kept.
+    follower : whether some of these loads follow the body, which makes any model a nonlinear one.
 
     Raises
     ------
@@ -221,10 +222,10 @@ class TimeDependentLoad(Load):
     array([    0.,     0., -1000.])
     """
 
-    def __init__(self, function: Callable[[float], Load | None]) -> None:
+    def __init__(self, function: Callable[[float], Load | None], follower: bool = False) -> None:
         if isinstance(function, (Load, type)) or not takes(function, 1):
             raise InputError(f"a function of time that returns a load is needed; got {function!r}")
-        self.function = function
+        self.function, self.follower = function, flag(follower, "follower")
 
     def at(self, time: float) -> Load | None:
         """Return the load at a time.
@@ -240,13 +241,15 @@ class TimeDependentLoad(Load):
         Raises
         ------
         InputError
-            The function returns anything else.
+            The function returns anything else, or a load that follows the body though `follower` is False.
         """
         load = self.function(time)
         if load is not None and (not isinstance(load, Load) or isinstance(load, TimeDependentLoad)):
             raise InputError(
                 f"the load at t = {time:g} s must be a PointLoad or another, or None; got {load!r}"
             )
+        if getattr(load, "follower", False) and not self.follower:
+            raise InputError("a load that follows the body: take TimeDependentLoad(function, follower=True)")
         return load
 
     def drawn(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> list[Drawn]:
@@ -270,7 +273,7 @@ class TimeDependentLoad(Load):
             load = self.at(time)
             return None if load is None else load.refined(finer)
 
-        return TimeDependentLoad(function)
+        return TimeDependentLoad(function, self.follower)
 
 
 class ScaledLoad(TimeDependentLoad):

@@ -181,6 +181,10 @@ BAD_MATERIALS = [
     (bad_material({"YOUNG_MODULUS": "steel"}), "YOUNG_MODULUS must be a number; got 'steel'"),
     (bad_material({"YOUNG_MODULUS": 1e9}), "part Structure.Body: Isotropic3D needs nu (POISSON_RATIO)"),
     (bad_material({"YOUNG_MODULUS": 1e9, "POISSON_RATIO": 0.5}), "POISSON_RATIO) 0.5 must be < 0.5"),
+    (
+        bad_material(None, {"constitutive_law": {"name": "GenericAnisotropic3DLaw"}}, sub_properties=[{}]),
+        "'GenericAnisotropic3DLaw' is not a law that",
+    ),
     (bad_material(material={"sub_properties": [1]}), "'sub_properties' in a material is not supported"),
 ]
 

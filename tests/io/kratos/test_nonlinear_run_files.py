@@ -86,6 +86,29 @@ def test_conditions_of_small_displacements_keep_their_pressure(tmp_path):
     assert np.abs(in_order(kl.run(case).result) - in_order(dead)).max() < 1e-8
 
 
+@pytest.mark.parametrize("follower", [True, False])
+def test_pressures_follow_linear_elements_in_time(tmp_path, follower):
+    settings = {"solver_type": "dynamic", "scheme_type": "newmark", "step": 2e-3, "end": 0.0095}
+    path = write(box(tmp_path, content=law("LinearElastic3DLaw")), pressed(**settings))
+    text = (tmp_path / "box.mdpa").read_text().replace("TotalLagrangian", "SmallDisplacement")
+    text = text if follower else text.replace("SurfaceLoadC", "SmallDisplacementSurfaceLoadC")
+    (tmp_path / "box.mdpa").write_text(text)
+    *_, state = prepare(read_case(path))[1]
+    damped = read_case(write(tmp_path, pressed(**settings, rayleigh_beta=1e-4), "damped.json"))
+    assert any("rayleigh_beta damps by" in note for note in damped.model.notes) == follower
+    found = []
+    for how in (follower, not follower):
+        mesh = kl.box(cells=(2, 2, 2), size=(2.0, 1.0, 1.5), element="KinematicLinear3D8N")
+        model = kl.Model(mesh, kl.Isotropic3D(2e9, 0.3, 7850.0))
+        model.fix("z-")
+        model.add(kl.Pressure("x+", 1e8, follower=how), amplitude=lambda t: (1 + t) * (t > 0))
+        found.append([*kl.integrate(model.transient(integrator=kl.Newmark()), dt=2e-3, steps=5)][-1].u)
+    order = np.lexsort(read_case(path).model.mesh.points.round(9).T)
+    off = [np.abs(state.u[order] - u[np.lexsort(mesh.points.round(9).T)]).max() for u in found]
+    assert off[0] < 1e-9 * np.abs(state.u).max()
+    assert off[1] > 1e-5 * np.abs(state.u).max()
+
+
 def test_plastic_bar_pulled_in_steps_with_files_and_expected_values(tmp_path, run):
     """σ = σ_Y + E H / (E + H) (ε - σ_Y / E), also in the check of the run file and after a restart."""
     E, H, Y = 2e9, 4e8, 2e6
@@ -141,10 +164,12 @@ def test_a_factory_names_surface_and_potential_and_a_flow_with_corners_is_noted(
         "yield_surface": "VonMises",
         "plastic_potential": flow,
     }
+    content["properties"][0]["sub_properties"] = [{"properties_id": 2}]
     case = read_case(write(box(tmp_path, False, content), pressed(step=0.5)))
     assert case.model.element_groups()[0].material.potential == (flow if noted else "")
     notes = " ".join(case.model.notes)
     assert ("J2Softening3D: Kratos exchanges the shears yz and zx in its flow" in notes) == noted
+    assert "material of Structure.Body: sub_properties are not used by" in notes
 
 
 def test_linear_takes_elements_and_laws_of_small_strains(tmp_path, run):
