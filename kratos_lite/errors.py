@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 MAX_PROBLEMS = 20
 """Problems shown in one message; the rest are counted."""
@@ -127,5 +130,7 @@ def nearest(name: str, known: Iterable[str], count: int = 3) -> str:
 
 def no_such_file(path: str | Path) -> InputError:
     """Return the error for a path where there is no file, with the files of its folder that are near."""
+    from pathlib import Path
+
     near = nearest(Path(path).name, (file.name for file in Path(path).parent.glob("*")))
     return InputError(f"{path}: there is no such file{'.' * bool(near)}{near}")
