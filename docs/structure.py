@@ -34,7 +34,7 @@ FLOORS = [
 ]
 """The packages of each layer, lowest first, with column in the picture and contents."""
 
-COLUMN, ROW, BOX, HEIGHT = 220, 72, 196, 44
+COLUMN, ROW, BOX, HEIGHT, TIP = 220, 72, 196, 44, 7
 TEXT = 'text-anchor="middle" font-family="Helvetica, Arial, sans-serif"'
 
 
@@ -112,7 +112,8 @@ def picture() -> str:
     for name, other in arrows():
         (x, y), (x2, y2) = at[name], at[other]
         x2 = x if other == "base modules" else x2
-        y, turned, y2 = y + HEIGHT / 2, y + ROW - HEIGHT / 2, y2 - HEIGHT / 2
+        # The head turns with the last line, which must have a length.
+        y, turned, y2 = y + HEIGHT / 2, y + ROW - HEIGHT / 2 - TIP, y2 - HEIGHT / 2
         curve = f"M {x:g} {y:g} C {x:g} {turned:g} {x2:g} {y:g} {x2:g} {turned:g} V {y2:g}"
         lines.append(f'<path d="{curve}" fill="none" stroke="#667" marker-end="url(#tip)"/>')
     for name, (x, y) in at.items():

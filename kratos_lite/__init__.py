@@ -5,6 +5,8 @@ The public names are listed in ``__init__.pyi`` and imported when they are first
 https://en.wikipedia.org/wiki/Finite_element_method the method.
 """
 
+import sys
+
 __version__ = "0.1.0"
 
 
@@ -21,7 +23,8 @@ __all__ = ["__version__", *sorted(_HOMES)]  # noqa: PLE0604
 
 def __getattr__(name: str) -> object:
     if name not in _HOMES:
-        raise AttributeError(f"module 'kratos_lite' has no attribute {name!r}")
+        said = f"module 'kratos_lite' has no attribute {name!r}"
+        raise AttributeError(said, name=name, obj=sys.modules[__name__])  # Python names what is near
     from importlib import import_module
 
     if _HOMES[name] == __name__:

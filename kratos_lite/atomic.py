@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from kratos_lite.errors import InputError, SolveError
+from kratos_lite.errors import InputError, SolveError, no_such_file
 from kratos_lite.typing import Numbers
 
 CURES = {
@@ -34,7 +34,7 @@ def read_arrays(
         with np.load(io.BytesIO(Path(path).read_bytes()), allow_pickle=False) as file:
             return {name: np.asarray(file[name]) for name in (*names, *(file.files if others else ()))}
     except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file") from None
+        raise no_such_file(path) from None
     except Exception as error:  # whatever NumPy and zipfile raise for a damaged file
         raise InputError(f"{path}: not {what}, or not all of it") from error
 

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 MAX_PROBLEMS = 20
 """Problems shown in one message; the rest are counted."""
@@ -122,3 +126,11 @@ def nearest(name: str, known: Iterable[str], count: int = 3) -> str:
     close = get_close_matches(name, known, n=count, cutoff=0.6)
     close = close or [plain[word] for word in get_close_matches(_plain(name), list(plain), count, 0.6)]
     return f" Did you mean {' or '.join(close)}?" if close else ""
+
+
+def no_such_file(path: str | Path) -> InputError:
+    """Return the error for a path where there is no file, with the files of its folder that are near."""
+    from pathlib import Path
+
+    near = nearest(Path(path).name, (file.name for file in Path(path).parent.glob("*")))
+    return InputError(f"{path}: there is no such file{'.' * bool(near)}{near}")

@@ -82,7 +82,7 @@ def marks_of_model(structure: Structure) -> Marks:
         return np.concatenate([none, *some])
 
     surface = _Surface(mesh)
-    arrows: dict[str, list[Array]] = {"on": [none], "from": [none], "about": [none]}
+    arrows: dict[str, list[Array]] = {"on": [none], "from": [none], "to": [none], "about": [none]}
     for drawn in _loads(structure):
         for kind, known in arrows.items():
             known.append(surface.arrows(kind, [(X, v) for X, v, way in drawn if way == kind]))
@@ -94,7 +94,7 @@ def marks_of_model(structure: Structure) -> Marks:
         masses=lines(mass=True, inside=False)[:, 0],
         spokes=np.concatenate(spokes),
         supports=np.concatenate([none, *_supports(structure, surface)]),
-        loads=np.concatenate([*arrows["on"], *arrows["from"]]),
+        loads=np.concatenate([*arrows["on"], *arrows["from"], *arrows["to"]]),
         moments=np.concatenate(arrows["about"]),
     )
 
@@ -128,9 +128,10 @@ class _Surface:
         X, v = (np.concatenate([np.zeros((0, 3)), *(one[i] for one in drawn)]) for i in range(2))
         lengths = np.linalg.norm(v, axis=1)
         X, v = (some[lengths > LEAST * lengths.max(initial=0.0)] for some in (X, v))
-        some = spread(X, MARKS)
-        X, v = X[some], v[some] * (self.size / lengths.max(initial=1e-300))
-        ahead = np.zeros(len(X)) if kind != "on" else np.where(self.outwards(X, v) < 0, 1.0, 0.0)
+        v = v * (self.size / lengths.max(initial=1e-300))
+        some = spread(np.hstack([X, v]), MARKS)
+        X, v = X[some], v[some]
+        ahead = self.outwards(X, v) < 0 if kind == "on" else np.full(len(X), kind == "to")
         tails = X - ahead[:, None] * v
         return np.stack([tails, tails + v], axis=1)
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from kratos_lite.cli.options import only, read_values
 from kratos_lite.errors import InputError, KratosLiteError, ModelError, within_numbers
-from kratos_lite.tabular import in_units
+from kratos_lite.tabular import UNITS, in_units
 
 if TYPE_CHECKING:
     from kratos_lite.io.case import Case
@@ -136,24 +136,28 @@ def info(options: Namespace) -> int:
     """Describe a file without solving it.
 
     kratos-lite info beam.mdpa
+    kratos-lite info part.msh --units "mm N MPa t"
     kratos-lite info examples/bodies/pendulum.py
     """
     with _within_numbers(options):
         from kratos_lite.io.formats import describes_case, read_document
+        from kratos_lite.validation import choice
 
+        units = choice(options.units or "SI", "--units", UNITS)
         if describes_case(options.input):
             from kratos_lite.io.files import read_case
             from kratos_lite.io.run import describe_case
 
-            print(describe_case(read_case(options.input)))
+            text = describe_case(read_case(options.input))
         else:
             from kratos_lite.io.describe import amounts, describe
             from kratos_lite.io.kratos.to_model import model_from
 
             document = read_document(options.input, strict=not options.lenient)
-            print(describe(document))
+            text = describe(document)
             with suppress(KratosLiteError):
-                _print([f"{name:<12}{text}" for name, text in amounts(model_from(document))])
+                text = "\n".join([text, *(f"{name:<12}{row}" for name, row in amounts(model_from(document)))])
+        print(in_units(text, units))
         return 0
 
 

@@ -35,11 +35,14 @@ FILES = {"bash": "_shtab_compgen_files", "zsh": "_files", "tcsh": "f"}
 """What shtab takes for the names of files, where it completes words in a shell."""
 DEBUG = Option("--debug", None, "show the traceback of an error")
 LENIENT = Option("--lenient", None, "accept .mdpa rows that are broken over lines")
+OF_INFO = Option("--units", "SET", "consistent units of all numbers in the file, a label: mm N MPa t … (SI)")
 OF_VERIFY = (
     Option("--element", "NAME", "only this one, such as 3D8N; may be given several times (all)", many=True),
     Option("-o --output", "OUT", "write the table as .md or .json"),
     Option("--list", None, "list the problems and their sources instead"),
 )
+OPTIONS = {"info": (OF_INFO, LENIENT), "verify": OF_VERIFY}
+"""Of the commands that have more than one of their own."""
 
 
 class Formatter(argparse.RawDescriptionHelpFormatter):
@@ -126,7 +129,7 @@ def build_parser() -> Parser:
         for word, meaning in words.items():
             many = "*" if word == "names" else "+" if name in ("info", "check") else None
             command.add_argument(word, help=meaning, nargs=many).complete = FILES  # type: ignore[attr-defined]
-        _add(command, (*(OF_VERIFY if name == "verify" else [LENIENT]), DEBUG))
+        _add(command, (*OPTIONS.get(name, (LENIENT,)), DEBUG))
     # All its words, also --help, are for the program that it runs.
     subparsers.add_parser("bench", help="run the benchmarks of a source checkout", add_help=False)
     subparsers.add_parser("ccx", help="solve a deck in place of CalculiX: -i JOB", add_help=False)

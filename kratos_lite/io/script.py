@@ -12,7 +12,7 @@ from typing import Any
 
 from kratos_lite.bodies import Body
 from kratos_lite.bodies.batched import batch
-from kratos_lite.errors import InputError, KratosLiteError, nearest
+from kratos_lite.errors import InputError, KratosLiteError, nearest, no_such_file
 from kratos_lite.io.case import Case, Outputs, TimeIntegration
 from kratos_lite.io.formats import SERIES
 
@@ -40,7 +40,7 @@ def read_script(path: Path) -> Case:
     dictionary such as ``{"csv": "swing.csv"}``.  Errors are InputError with file and line.
     """
     if not path.is_file():
-        raise InputError(f"{path}: there is no such file")
+        raise no_such_file(path)
     names = _run(path)
     case = names["case"] if "case" in names else _case_of_body(path, names)
     if not isinstance(case, Case):

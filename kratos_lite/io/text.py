@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kratos_lite.errors import InputError, Problems
+from kratos_lite.errors import InputError, Problems, no_such_file
 from kratos_lite.io.formats.document import Note
 from kratos_lite.typing import Ints
 
@@ -32,7 +32,7 @@ def read_bytes(path: str | Path, long_lines: bool = False) -> bytes:
             raise InputError(f"{path}: is no ordinary file but a pipe or device; name a file")
         data = path.read_bytes()
     except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file") from None
+        raise no_such_file(path) from None
     except IsADirectoryError:
         raise InputError(f"{path}: is a folder; name a file in it") from None
     except OSError as error:

@@ -13,7 +13,7 @@ from kratos_lite.assembly.sparsity_pattern import dofs_of
 from kratos_lite.elements.surface import area_vectors
 from kratos_lite.errors import ModelError
 from kratos_lite.mesh import Mesh, Where, components
-from kratos_lite.model.loads import Load
+from kratos_lite.model.loads.base import Drawn, Load
 from kratos_lite.model.ties import PartTie, faces_of, name_of
 from kratos_lite.solvers.constraints import Constraints
 from kratos_lite.typing import Array, Ints, Mask
@@ -163,6 +163,12 @@ class BoltForce(Load):
         cut, total = Cut(mesh, self.a, self.b), np.zeros_like(mesh.points)
         total.flat[list(cut.carriers)] = np.array([self.force, -self.force]) / cut.normal[cut.axis]
         return total
+
+    def drawn(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> list[Drawn]:
+        """Return what pulls each side, from both to the middle of the cut."""
+        cut = Cut(mesh, self.a, self.b)
+        pull = self.force * np.stack([cut.normal, -cut.normal])
+        return [(np.tile(mesh.points[cut.above].mean(axis=0), (2, 1)), pull, "to")]
 
     def refined(self, finer: RefinedMesh) -> BoltForce:
         """Return the same force on a finer mesh."""

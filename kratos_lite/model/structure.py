@@ -553,7 +553,8 @@ class Structure(Solid):
             return
         if not isinstance(load, Load):
             hint = ", which acts on bodies" if type(load).__module__.startswith("kratos_lite.bodies") else ""
-            raise InputError(f"a load such as Gravity or Traction is needed; got {type(load).__name__}{hint}")
+            what = f"the class {load.__name__}: call it" if isinstance(load, type) else type(load).__name__
+            raise InputError(f"a load such as Gravity or Traction is needed; got {what}{hint}")
         load = load if amplitude is None else ScaledLoad(load, amplitude)
         load.check(self.mesh)
         if name is not None:

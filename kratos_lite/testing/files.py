@@ -14,7 +14,7 @@ from types import ModuleType
 from typing import Any
 
 from kratos_lite.elements import ELEMENTS, KinematicLinear
-from kratos_lite.errors import InputError
+from kratos_lite.errors import InputError, no_such_file
 from kratos_lite.materials import MATERIALS, LinearMaterial, Material
 from kratos_lite.shapes import SHAPES, Shape
 from kratos_lite.testing.elements import check_element
@@ -114,6 +114,8 @@ def run_module(path: Path) -> ModuleType:
     module.__file__ = str(path)
     try:
         code = compile(path.read_bytes(), str(path), "exec")
+    except FileNotFoundError:
+        raise no_such_file(path) from None
     except OSError as error:
         raise InputError(
             f"{path}: cannot be read ({error.strerror}); give the path of a Python file"

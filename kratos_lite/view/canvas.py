@@ -130,12 +130,12 @@ def right_of(axes: Any) -> float:
     return float(reach) / DPI
 
 
-def entitle(axes: Any, title: str, lines: Sequence[str]) -> None:
-    """Write a title above axes, and small lines beneath it."""
-    axes.set_title(title, fontsize=11, pad=8 + 13 * len(lines))
+def entitle(axes: Any, title: str, lines: Sequence[str], rise: float = 0.0) -> None:
+    """Write a title above axes and what rises so many inches above them, and small lines beneath it."""
+    axes.set_title(title, fontsize=11, pad=8 + 72 * rise + 13 * len(lines))
     if lines:
         style = {"xycoords": "axes fraction", "textcoords": "offset points", "size": 9, "color": "0.25"}
-        axes.annotate("\n".join(lines), (0.5, 1), (0, 6), ha="center", va="bottom", **style)
+        axes.annotate("\n".join(lines), (0.5, 1), (0, 6 + 72 * rise), ha="center", va="bottom", **style)
 
 
 def title_widths(panels: list[Any]) -> list[float]:

@@ -80,20 +80,23 @@ def _laid_out(
     size = (high - low) / inch
     figure = canvas.empty((20, 20), layout=None)
     panels: list[Any] = []
-    for subject in scene.subjects:
+    for _ in scene.subjects:
         axes = canvas.without_frame(canvas.axes_in_inches(figure, (0, 0), size))
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-        lines = texts(subject, options.size[0] / len(scene.subjects) ** 2) if title is None else []
-        canvas.entitle(axes, subject.title if title is None else title, lines)
         panels.append(axes)
-    step = np.array([max(size[0], *canvas.title_widths(panels)) + GAP, size[1] + GAP])
     # The rulers are those of the first panel of the last line, where they are in nobody's way.
     first = (len(panels) - 1) // columns * columns
-    if scene.zoom is not None or scene.subjects[first].moving:
-        draw_triad(panels[first], scene.rows, scene.window, inch, units=scene.subjects[first].mesh.units)
-    else:
-        subject = scene.subjects[first]
+    subject, has_rulers = scene.subjects[first], scene.zoom is None and not scene.subjects[first].moving
+    if has_rulers:
         draw_rulers(panels[first], scene.rows, subject.mesh, drawn_points(scene, subject), inch)
+    else:
+        draw_triad(panels[first], scene.rows, scene.window, inch, units=subject.mesh.units)
+    rise = max([0.0, *(float(max(line.get_ydata()) - high[1]) / inch for line in panels[first].lines)])
+    for axes, subject in zip(panels, scene.subjects, strict=True):
+        lines = texts(subject, options.size[0] / len(scene.subjects) ** 2) if title is None else []
+        canvas.entitle(axes, subject.title if title is None else title, lines, rise)
+    step = np.array([max(size[0], *canvas.title_widths(panels)) + GAP, size[1] + rise + GAP])
+    if has_rulers:
         step[0] = max(step[0], canvas.right_of(panels[first]) + GAP / 2)
     for number, axes in enumerate(panels):
         line, column = divmod(number, columns)

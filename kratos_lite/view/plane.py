@@ -25,6 +25,8 @@ COLLAPSED = {
 POLYGONS = 6000
 """Cells of lattices to aim at in a section."""
 FINEST = 8
+ROUNDING = 1e-12
+"""Of distances within a cell."""
 Corners: TypeAlias = "dict[int, list[tuple[int, int]]]"
 CLIPPED_LINES: Corners = {1: [(0, 0), (0, 1)], 2: [(0, 0), (1, 1)]}
 CLIPPED_TRIANGLES: Corners = {
@@ -170,6 +172,7 @@ def cut_cells(
     xi = Hexahedron8.N(points) @ shape.nodes[list(COLLAPSED[shape.cell])]
     N = shape.N(xi)
     d = d[crossed] @ N.T
+    d[np.abs(d) <= ROUNDING * np.abs(d).max(axis=1, keepdims=True)] = 0.0  # a side on the plane is cut once
     field = np.einsum("pa,mac->mpc", N, nodal[nodes])
     field = np.concatenate([field, np.broadcast_to(xi, (*field.shape[:2], 3))], axis=-1)
     cells, corners = _parts(d, field, tetrahedra, CUT_TETRAHEDRA)

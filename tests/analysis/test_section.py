@@ -43,6 +43,14 @@ def test_a_cantilever_has_constant_forces_and_a_linear_bending_moment(element, x
     assert np.abs(at_end).max() < 1e-10 * FORCE[2] * LENGTH
 
 
+def test_a_plane_along_faces_of_curved_cells_cuts_them_once():
+    model = kl.Model(kl.box((100.0, 20.0, 10.0), (10, 4, 2), "KinematicLinear3D10N"), LAW)
+    model.fix("x-")
+    cut = model.solve().section(("x", 50.0))
+    assert abs(cut.area - 200) < 1e-9
+    assert np.abs(cut.centroid - [50, 10, 5]).max() < 1e-9
+
+
 def test_a_shaft_carries_its_torque_through_every_cut():
     model = kl.Model(kl.box((LENGTH, 1.0, 1.0), (3, 2, 2), "KinematicLinear3D20N"), LAW)
     model.fix("x-")

@@ -274,6 +274,10 @@ def test_info_tells_what_is_in_a_file(run, folder):
         "DENSITY 7620, YOUNG_MODULUS 2.1e+08, POISSON_RATIO 0.3, VOLUME_ACCELERATION [0, 0, -9.81] (line 6)",
     ):
         assert text in done.out
+    in_mm = run("info", GRAVITY_CUBE, "--units", "mm N MPa t").out
+    assert "[0, 1] × [0, 1] × [0, 1] mm" in in_mm
+    assert "volume      1 mm³" in in_mm
+    assert run("info", GRAVITY_CUBE, "--units", "mm").refuses("--units must be one of SI, mm N MPa t, ")
 
 
 def test_check_tells_warnings_and_what_is_missing(run, folder):
@@ -790,15 +794,16 @@ def test_a_reader_that_goes_away_is_no_error(folder):
 @pytest.mark.parametrize("command", ["info", "check"])
 def test_several_files_stand_under_headings_and_the_worst_code_counts(run, box, command):
     script("by_file.json", gravity=-9.81)
-    done = run(command, "run.py", "none.mdpa", "run.py")
+    done = run(command, "run.py", "lost_and_gone.mdpa", "run.py")
     assert done.code == 2
     assert [line for line in done.out.splitlines() if line.startswith("==")] == [
         "== run.py",
-        "== none.mdpa",
+        "== lost_and_gone.mdpa",
         "== run.py",
     ]
-    assert done.err == "error: none.mdpa: there is no such file\n"
+    assert done.err == "error: lost_and_gone.mdpa: there is no such file\n"
     assert run(command, "run.py", "run.py").code == 0
+    assert run(command, "bx.mdpa").refuses("bx.mdpa: there is no such file. Did you mean box.mdpa?")
 
 
 def test_most_unknowns_stop_a_requested_error(run, box):

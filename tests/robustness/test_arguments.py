@@ -69,7 +69,7 @@ WRONG = {
         lambda: model().constrain((1, "x"), {TOP: 1.0}, np.inf),
         "constant of a constraint must be finite",
     ),
-    "load class": (lambda: model().add(kl.Gravity), "a load such as Gravity or Traction is needed"),
+    "load class": (lambda: model().add(kl.Gravity), "or Traction is needed; got the class Gravity: call it"),
     "gravity number": (lambda: kl.Gravity(-9.81), r"must be \(3,\) or \(n, 3\) .*got the number -9.81"),
     "gravity plane": (lambda: kl.Gravity((0, 1)), r"got shape \(2,\)"),
     "force rows": (lambda: solved_with(kl.BodyForce(np.ones((99, 3)))), r"BodyForce needs shape \(27, 3\)"),

@@ -272,7 +272,7 @@ def test_a_file_that_does_not_run_or_has_nothing_to_check_is_one_clear_error(che
 
 
 def test_a_file_that_is_missing_or_not_text_is_one_clear_error(tmp_path):
-    with pytest.raises(InputError, match=r"none\.py: cannot be read \(No such file"):
+    with pytest.raises(InputError, match=r"none\.py: there is no such file"):
         run_file(tmp_path / "none.py")
     with pytest.raises(InputError, match="cannot be read"):
         run_file(tmp_path)

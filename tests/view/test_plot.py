@@ -132,6 +132,25 @@ def test_arrows_of_loads(load, places, way, tip, element):
         assert np.abs(places - exact).max() < 1e-9
 
 
+def test_titles_stand_above_the_rulers_of_a_round_body():
+    wheel = kl.annulus(0.3, 1.0, 0.25, cells=(1, 16, 1))
+    turned = wheel.replace(points=wheel.points @ np.eye(3)[[0, 2, 1]])  # a ruler along z beside it
+    (axes, *_) = kl.plot(turned, values=turned.points[:, 0]).axes
+    tops = [line.get_window_extent().y1 for line in axes.lines]
+    assert max(tops) > axes.get_window_extent().y1  # what it stands in the way of
+    assert min(text.get_window_extent().y0 for text in axes.texts if "at node" in text.get_text()) > max(tops)
+
+
+@pytest.mark.parametrize("force", [3.0, -3.0])
+def test_arrows_of_a_bolt_meet_in_its_cut(force):
+    bolt = kl.split(kl.box((1, 1, 4), (2, 2, 4)), lambda X: X[:, 2] == 2)
+    model = kl.Model(bolt, STEEL)
+    model.pretension("cut-", "cut+", force=force)
+    tails, heads = marked(model).loads.transpose(1, 0, 2)
+    assert np.abs(heads - (0.5, 0.5, 2)).max() < 1e-12
+    assert np.abs(tails[:, 2] - 2 - np.array([-0.1, 0.1]) * np.sign(force) * np.sqrt(18)).max() < 1e-12
+
+
 def test_moments_and_many_loads_have_arrows():
     model = kl.Model(kl.box((4, 1, 1), (4, 4, 4)), STEEL)
     model.add(kl.Resultant("x+", (0, 0, 0), moment=(0, 2.0, 0)))

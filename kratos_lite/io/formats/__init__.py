@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from kratos_lite.errors import InputError, naming
+from kratos_lite.errors import InputError, naming, no_such_file
 from kratos_lite.io.formats.document import Document
 
 PROJECT = "ProjectParameters.json"
@@ -78,7 +78,7 @@ def read_document(path: str | Path, *, strict: bool = True) -> Document:
 
             return read_elem(path)
         if not path.exists():
-            raise InputError(f"{path}: there is no such file")
+            raise no_such_file(path)
         if path.is_dir():
             such = "".join(f", such as {file.name}" for file in sorted(path.glob("*arameters*.json"))[:1])
             raise InputError(f"{path}: is a folder without {PROJECT}; name a file in it{such}")

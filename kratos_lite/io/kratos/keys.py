@@ -41,7 +41,7 @@ IN_TIME = {"time_integration_method": "", "scheme_type": ""} | _like(
 """Those of what moves."""
 ELSEWHERE = {
     **_like("give 'solver_settings' in its place", "modelers stages orchestrator restart_load_file_label"),
-    "rve_settings": "a periodic cell is solved by kl.homogenize",
+    "rve_settings": "a periodic cell is solved by kl.homogenized",
     **_like("contact is not solved here", "contact_settings mpc_contact_settings"),
     **_like("kratos_lite solves for displacements of all elements",
             "displacement_control volumetric_strain_dofs strain_dofs pressure_dofs use_orthogonal_subscales "

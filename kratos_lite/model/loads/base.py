@@ -27,7 +27,7 @@ OfPlace: TypeAlias = "Callable[[Array], ArrayLike]"
 """A function of places (m, 3) in m."""
 
 Drawn: TypeAlias = "tuple[Array, Array, str]"
-"""Places, vectors, and their arrows: ``on`` the surface from outside, ``from`` a place, ``about`` an axis."""
+"""Places, vectors, and their arrows: ``on`` the surface, ``from`` or ``to`` a place, ``about`` an axis."""
 
 MOST_CHANGE = 0.01
 """Of the forces of a function, by the next quadrature rule; more is a warning."""

@@ -49,7 +49,7 @@ REFUSED = [
     (
         (SOLVER, "rve_settings"),
         {},
-        "rve_settings is not supported; a periodic cell is solved by kl.homogenize",
+        "rve_settings is not supported; a periodic cell is solved by kl.homogenized",
     ),
     ((SOLVER, "contact_settings"), {}, "contact_settings is not supported; contact is not solved here"),
     ((SOLVER, "time_stepping", "time_step"), renamed("time_stp"), "is missing; is it 'time_stp'?"),
