@@ -61,12 +61,13 @@ def matrices_of(
 
     def whole(A: Any, square: bool = True) -> csr_array[Any, Any]:
         """Return a matrix (3a, ...) with the rows, and columns if it is square, of all degrees of freedom."""
-        A = A.tocsr()
-        indptr = np.zeros(3 * n + 1, dtype=A.indptr.dtype)
-        indptr[dofs + 1] = np.diff(A.indptr)
-        indices = dofs.astype(A.indices.dtype)[A.indices] if square else A.indices
-        shape = 3 * n, 3 * n if square else A.shape[1]
-        made = csr_array((A.data, indices, np.cumsum(indptr)), shape=shape)
+        made = A = A.tocsr()
+        if len(dofs) < 3 * n:
+            indptr = np.zeros(3 * n + 1, dtype=A.indptr.dtype)
+            indptr[dofs + 1] = np.diff(A.indptr)
+            indices = dofs.astype(A.indices.dtype)[A.indices] if square else A.indices
+            shape = 3 * n, 3 * n if square else A.shape[1]
+            made = csr_array((A.data, indices, np.cumsum(indptr, dtype=indptr.dtype)), shape=shape)
         made.eliminate_zeros()
         made.sort_indices()
         return made

@@ -72,13 +72,14 @@ class LinearSolver:
 
         `prescribed` displacements (3n,) take the place of c of the constraint map.  An iteration begins at
         `start` (3n,), of which the free components count, if that is nearer than 0.  With a `reduction` it
-        ends where the residual is this fraction of that of 0 or the start, whichever is less, and the
-        backward error is not computed: NaN.
+        ends where the residual is this fraction of that of 0 or the start, whichever is less, does no work
+        on the solution if K is symmetric, and the backward error is not computed: NaN.
         """
         reduce, expand = self.constraint_map.reduce, self.constraint_map.expand
         c = self.constraint_map.c if prescribed is None else prescribed
         u, b = c, reduce(f - self.K @ c if c.any() else f)
-        size = norm = float(np.linalg.norm(b))
+        whole, size = b, float(np.linalg.norm(b))
+        norm = size
         aim = tolerance * self._fraction(f, c, size) * size
         if start is not None and self.plan.iterates:
             near = expand((start - c)[self.constraint_map.free], c)
@@ -94,7 +95,12 @@ class LinearSolver:
         q, iterations, plan = np.zeros(len(b)), 0, self.plan
         if len(b) and (u is c or tolerance < 1):
             q, iterations, plan = self._solve(b, tolerance, progress, u is not c or reduction > 0)
-        u = expand(q, u)
+        begun, u = u - c, expand(q, u)
+        if reduction and self.symmetric and begun.any():
+            # The scale of x with r·x = 0, as from 0: a residual without work, so that steps keep energy.
+            free = self.constraint_map.free
+            of_load, of_r = (u - c)[free] @ whole, begun[free] @ b - q @ (whole - b)
+            u = c + (u - c) * (of_load / (of_load - of_r) if of_load > of_r else 1.0)
         error = np.nan if reduction else backward_error(reduce(f - self.K @ u), self.norm, u, f)
         return Solution(u, plan.method, plan.reason, iterations, error)
 
