@@ -52,12 +52,13 @@ def are_among(keys: Keys, known: Keys) -> Mask:
 @remembered
 def surroundings(shape: type[Shape]) -> tuple[tuple[int, ...], ...]:
     """Return for each node of a shape beyond its corners the corners that it is in the middle of."""
-    return tuple(corners_around(shape.cell, xi) for xi in shape.nodes[shape.corners :])
+    return tuple(corners_around(shape.cell, shape.nodes[shape.corners :]))
 
 
-def corners_around(cell: str, xi: Array) -> tuple[int, ...]:
-    """Return the corners of the edge, face or cell inside which a point (d,) of a reference cell lies."""
-    return tuple(np.flatnonzero(np.abs(LINEAR[cell].N(xi)) > 1e-12).tolist())
+def corners_around(cell: str, places: Array) -> list[tuple[int, ...]]:
+    """Return the corners of the edge, face or cell inside which each point (p, d) of a cell lies."""
+    weights = np.abs(LINEAR[cell].N(places))
+    return [tuple(np.flatnonzero(row).tolist()) for row in weights > 1e-12]
 
 
 def raise_order(points: Array, corners: Ints, shape: type[Shape]) -> tuple[Array, Ints]:

@@ -105,18 +105,16 @@ class CellRefiner:
     def _corners(self, block: Block, cells: Ints, children: Sequence[Child]) -> list[Ints]:
         """Return the corners (m, c) of each child of some cells."""
         family, old = block.known_shape.cell, block.nodes[cells].astype(np.int64)
-        at: dict[tuple[int, ...], Array] = {
-            corners_around(family, xi): xi for child in children for xi in child.corners
-        }
+        places = np.concatenate([child.corners for child in children])
+        of_places = corners_around(family, places)
+        at = dict(zip(of_places, places, strict=True))
         nodes: dict[tuple[int, ...], Ints] = {around: old[:, around[0]] for around in at if len(around) == 1}
         if inner := [around for around in at if len(around) > 1]:
             keys = np.stack([keys_of(old[:, list(around)]) for around in inner], axis=1)
             middles = self._nodes(block, cells, keys, np.array([at[around] for around in inner]))
             nodes.update((around, middles[:, i]) for i, around in enumerate(inner))
-        return [
-            np.stack([nodes[corners_around(family, xi)] for xi in child.corners], axis=1)
-            for child in children
-        ]
+        each = iter(of_places)
+        return [np.stack([nodes[next(each)] for _ in child.corners], axis=1) for child in children]
 
     def _nodes(self, block: Block, cells: Ints, keys: Keys, places: Array) -> Ints:
         """Return the nodes of keys (m, ...) at places (p, d) in each cell; new ones are made."""
@@ -127,21 +125,20 @@ class CellRefiner:
         cell, place = np.divmod(new, len(places))
         nodes, weights = block.nodes[cells[cell]].astype(np.int64), shape.N(places)
         self._sources.append((nodes, np.where(np.abs(weights) < 1e-14, 0.0, weights)[place]))
-        inside = np.zeros(len(new), dtype=np.uint64)
+        inside, around = np.zeros(len(new), dtype=np.uint64), corners_around(shape.cell, places)
         for i in np.flatnonzero(np.bincount(place, minlength=len(places))).tolist():
             chosen = place == i
-            inside[chosen] = keys_of(nodes[chosen][:, list(corners_around(shape.cell, places[i]))])
+            inside[chosen] = keys_of(nodes[chosen][:, list(around[i])])
         self._inside.append(inside)
         return self.centers.find(keys)
 
     def _recognize(self, block: Block, cells: Ints, keys: Keys, places: Array) -> None:
         """Let nodes in the middle of edges, faces or cells be those that the cells have there already."""
-        keys = keys.reshape(len(cells), len(places))
-        for column, xi in enumerate(places):
-            around, cell = list(corners_around(block.known_shape.cell, xi)), LINEAR[block.known_shape.cell]
-            if len(around) < 4 or np.abs(cell.N(xi)[around] * len(around) - 1).max() > 1e-9:
+        keys, weights = keys.reshape(len(cells), len(places)), LINEAR[block.known_shape.cell].N(places)
+        for column, around in enumerate(corners_around(block.known_shape.cell, places)):
+            if len(around) < 4 or np.abs(weights[column].max() * len(around) - 1) > 1e-9:
                 continue
-            own = self.centers.find(keys_of(block.nodes[cells][:, around]))
+            own = self.centers.find(keys_of(block.nodes[cells][:, list(around)]))
             known = (own >= 0) & (self.centers.find(keys[:, column]) < 0)
             if known.any():
                 self.centers.add(keys[known, column], own[known])

@@ -113,7 +113,7 @@ def _with_lone_nodes(block: Block, inside: Mask, alone: Mask) -> list[Keys]:
         return []
     faces = [face[: FACE_SHAPES[len(face)].corners] for face in shape.faces]
     around = [tuple(sorted(corners)) for corners in (*shape.edges, *faces, range(shape.corners))]
-    inside_of = [set(corners_around(shape.cell, xi)) for xi in shape.nodes]
+    inside_of = list(map(set, corners_around(shape.cell, shape.nodes)))
     keys = []
     for corners in around:
         nodes = block.nodes[:, [node for node, among in enumerate(inside_of) if among <= set(corners)]]

@@ -14,41 +14,54 @@
 
 namespace kl {
 
-// Components x_i = sum w x_j that depend on others; where K is tied, T'K T takes its place.
+// Components x_i = sum w x_j that depend on others; where K is tied, T'K T takes its place.  The three of a
+// node that depend alike on those of other nodes, as where it hangs, are one of `width` 3.
 struct Ties {
     struct Share {
         int32_t node, tie;  // of an independent component, and the dependent one it takes a share of
         int axis;
         double weight;
     };
-    std::vector<int32_t> dependents, start, independents;  // dependents ascend
+    std::vector<int32_t> dependents, start{0}, independents;  // the first components; dependents ascend
+    std::vector<int> width;
     std::vector<double> weights;
     std::vector<Share> shares;       // sorted by nodes
     std::vector<int32_t> of;         // first share of each node, (n + 1)
 
     Ties() = default;
-    Ties(std::vector<int32_t> dependents, std::vector<int32_t> start, std::vector<int32_t> independents,
-         std::vector<double> weights, int64_t n)
-        : dependents(std::move(dependents)), start(std::move(start)), independents(std::move(independents)),
-          weights(std::move(weights)), of(n + 1, 0) {
-        for (int32_t t = 0; t < size(); ++t)
-            for (int32_t k = this->start[t]; k < this->start[t + 1]; ++k) {
-                const int32_t j = this->independents[k];
-                shares.push_back({j / 3, t, j % 3, this->weights[k]});
-                ++of[j / 3 + 1];
+    Ties(const std::vector<int32_t>& rows, const std::vector<int32_t>& first, const std::vector<int32_t>& columns,
+         const std::vector<double>& values, int64_t n) : of(n + 1, 0) {
+        const auto alike = [&](size_t t, int c) {  // row t + c is row t, of the next axis
+            bool same = t + c < rows.size() && rows[t] % 3 == 0 && rows[t + c] == rows[t] + c &&
+                        first[t + c + 1] - first[t + c] == first[t + 1] - first[t];
+            for (int32_t k = first[t], l = same ? first[t + c] : 0; same && k < first[t + 1]; ++k, ++l)
+                same = columns[k] % 3 == 0 && columns[l] == columns[k] + c && values[l] == values[k];
+            return same;
+        };
+        for (size_t t = 0; t < rows.size(); t += width.back()) {
+            width.push_back(alike(t, 1) && alike(t, 2) ? 3 : 1);
+            for (int32_t k = first[t]; k < first[t + 1]; ++k) {
+                shares.push_back({columns[k] / 3, size(), columns[k] % 3, values[k]});
+                ++of[columns[k] / 3 + 1];
             }
+            dependents.push_back(rows[t]);
+            independents.insert(independents.end(), columns.begin() + first[t], columns.begin() + first[t + 1]);
+            weights.insert(weights.end(), values.begin() + first[t], values.begin() + first[t + 1]);
+            start.push_back(static_cast<int32_t>(independents.size()));
+        }
         std::stable_sort(shares.begin(), shares.end(), [](const Share& a, const Share& b) { return a.node < b.node; });
         std::partial_sum(of.begin(), of.end(), of.begin());
     }
     int32_t size() const { return static_cast<int32_t>(dependents.size()); }
 
-    // Give dependent components of x (3n) what they depend on.
+    // Give dependent components of x (3n) what they depend on; three numbers behind the last are read.
     template <class T>
     void fill(T* x) const {
         for (int32_t t = 0; t < size(); ++t) {
-            T sum = 0;
-            for (int32_t k = start[t]; k < start[t + 1]; ++k) sum += static_cast<T>(weights[k]) * x[independents[k]];
-            x[dependents[t]] = sum;
+            vec<T, 4> sum = {};
+            for (int32_t k = start[t]; k < start[t + 1]; ++k)
+                sum += static_cast<T>(weights[k]) * *reinterpret_cast<const vec<T, 4>*>(x + independents[k]);
+            for (int c = 0; c < width[t]; ++c) x[dependents[t] + c] = sum[c];
         }
     }
 };
@@ -90,9 +103,10 @@ public:
         std::vector<T>& room = std::get<std::vector<T>>(rooms);
         room.resize(4 * pairs);
         tied = tied && ties.size();
-        std::vector<T> filled, passed_on(tied ? ties.size() : 0);
         if (tied) {
-            filled.assign(x, x + 3 * n + 1);
+            std::vector<T>& filled = std::get<std::vector<T>>(filled_rooms);
+            filled.resize(3 * n + 4);
+            std::copy(x, x + 3 * n, filled.begin());
             ties.fill(filled.data());
             x = filled.data();
         }
@@ -104,13 +118,23 @@ public:
                 sum += *reinterpret_cast<const vec<T, 4>*>(room.data() + 4 * static_cast<int64_t>(met[p]));
             return sum;
         };
-        for (size_t t = 0; t < passed_on.size(); ++t) passed_on[t] = force(ties.dependents[t] / 3)[ties.dependents[t] % 3];
+        std::vector<T> passed_on(tied ? 4 * ties.size() : 0);
+        parallel_ranges(tied ? ties.size() : 0, NODES, [&](int64_t first, int64_t last) {
+            for (int64_t t = first; t < last; ++t)
+                *reinterpret_cast<vec<T, 4>*>(&passed_on[4 * t]) = force(ties.dependents[t] / 3);
+        });
         parallel_ranges(n, NODES, [&](int64_t first, int64_t last) {
             for (int64_t i = first; i < last; ++i) {
-                const vec<T, 4> sum = force(i);
-                T y[3] = {sum[0], sum[1], sum[2]};
-                for (int32_t k = tied ? ties.of[i] : 0; tied && k < ties.of[i + 1]; ++k)
-                    y[ties.shares[k].axis] += static_cast<T>(ties.shares[k].weight) * passed_on[ties.shares[k].tie];
+                vec<T, 4> sum = force(i);
+                for (int32_t k = tied ? ties.of[i] : 0; tied && k < ties.of[i + 1]; ++k) {
+                    const Ties::Share& s = ties.shares[k];
+                    const T weight = static_cast<T>(s.weight), *f = &passed_on[4 * static_cast<int64_t>(s.tie)];
+                    if (ties.width[s.tie] == 3)
+                        sum += weight * *reinterpret_cast<const vec<T, 4>*>(f);
+                    else
+                        sum[s.axis] += weight * f[ties.dependents[s.tie] % 3];
+                }
+                const T y[3] = {sum[0], sum[1], sum[2]};
                 done(i, y);
             }
         });
@@ -133,7 +157,12 @@ public:
             for (int32_t k = ties.of[i]; k < ties.of[i + 1]; ++k)  // shares of one dependent node follow each other
                 for (int32_t l = k; l < ties.of[i + 1] && dependent(l) / 3 == dependent(k) / 3; ++l) {
                     const Ties::Share &a = ties.shares[k], &b = ties.shares[l];
-                    const double value = a.weight * b.weight * untied[3 * dependent(k) + dependent(l) % 3];
+                    const double w = a.weight * b.weight, *block = &untied[9 * (dependent(k) / 3)];
+                    if (ties.width[a.tie] == 3) {
+                        for (int e = 0; e < 9; ++e) D[9 * i + e] += w * block[e];
+                        continue;
+                    }
+                    const double value = w * block[3 * (dependent(k) % 3) + dependent(l) % 3];
                     D[9 * i + 3 * a.axis + b.axis] += value;
                     if (l != k) D[9 * i + 3 * b.axis + a.axis] += value;
                 }
@@ -262,7 +291,7 @@ private:
     }
 
     mutable Turns turns;  // the element vectors serve one product at a time
-    mutable std::tuple<std::vector<float>, std::vector<double>> rooms;  // element vectors
+    mutable std::tuple<std::vector<float>, std::vector<double>> rooms, filled_rooms;  // element vectors; x
     int64_t pairs = 0;
     mutable std::vector<double> kept;
     std::vector<double> X;

@@ -118,11 +118,13 @@ def test_arrays_and_pairs_say_the_same():
 @compiled
 @pytest.mark.parametrize("kind", ["8N", "10N", "20N"])
 def test_products_of_ties_are_those_of_the_matrix(kind):
-    """Ties of single axes, with weights and across axes; product, and matrix, against T^T K T."""
+    """Ties of single axes, across axes and of whole nodes, with weights: against T^T K T."""
     model, dependents, independents = tied_blocks(f"KinematicLinear3D{kind}")
-    model.constrain(3 * dependents + 2, 3 * independents + 2)
     pair = np.stack([independents[1:], independents[:-1]], axis=1)
-    model.constrain(3 * dependents[1:], 3 * pair + [0, 1], weights=[[0.7, -0.4]])
+    model.constrain(3 * dependents[2:] + 2, 3 * independents[2:] + 2)
+    model.constrain(3 * dependents[2:], 3 * pair[1:] + [0, 1], weights=[[0.7, -0.4]])
+    for axis in range(3):
+        model.constrain(3 * dependents[:2] + axis, 3 * pair[:2] + axis, weights=[[0.7, 0.2]])
     system = ConstrainedSystem(model.mesh.points, model.element_groups(), model.supports.constraint_map)
     T, free = system.constraint_map.T, system.constraint_map.free
     K, q = MatrixFree(system.points, system.groups), np.random.default_rng(1).standard_normal(len(free))
