@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -75,27 +74,68 @@ def _by_iteration(
     e: EquationsOfMotion, solver: LinearSolver, count: int, progress: Progress | None, K_g: Any = None
 ) -> tuple[Array, Array]:
     """Return ω (count,) and shapes (q, count): the rigid motions that are free, then the lowest others."""
-    constraints, R = e.system.constraint_map, _free_motions(e)
-    further = count - len(R)
+    constraints, rigid = e.system.constraint_map, _free_motions(e)
+    further = count - rigid.shape[2]
+    stiffness = solver.times if K_g is None else lambda u: solver.times(u) + K_g.times(u)
+    firm, norms = _firm(e, solver), (solver.norm, e.mass.norm())
+    problem = _problem(constraints, firm, stiffness, e.mass.times, rigid, norms)
+    R = problem.known[0] if problem.known else np.zeros((0, problem.n))
     if further <= 0:
         return np.zeros(count), R[:count].T
-    stiffness = solver.times if K_g is None else lambda u: solver.times(u) + K_g.times(u)
-    times_K, times_M = (_reduced_product(constraints, times) for times in (stiffness, e.mass.times))
-    norms = solver.norm, e.mass.norm()
-    known = (R, times_M(R)) if len(R) else None
-    problem = Problem(
-        len(constraints.free), times_K, times_M, _preconditioner(e, solver), norms, known, progress
-    )
-    squares, shapes = problem.lowest(further)
+    coarse = _coarse(e, firm, rigid)
+    squares, shapes = replace(problem, progress=progress, coarse=coarse).lowest(further)
     return np.sqrt(np.append(np.zeros(len(R)), np.maximum(squares, 0.0))), np.vstack([R, shapes]).T
 
 
-def _preconditioner(e: EquationsOfMotion, solver: LinearSolver) -> Callable[[Array], Array]:
+def _problem(
+    constraints: ConstraintMap,
+    firm: LinearSolver,
+    K: Operator,
+    M: Operator,
+    rigid: Array,
+    norms: tuple[float, float],
+) -> Problem:
+    """Return K x = λ M x, given by products of (k, N), beside rigid motions (a, 3, k), which `firm` holds."""
+    times_K, times_M = (_reduced_product(constraints, times) for times in (K, M))
+    known = None
+    if rigid.shape[2]:
+        R = np.ascontiguousarray(rigid.reshape(3 * len(rigid), -1).T)
+        R = np.linalg.solve(np.linalg.cholesky(R @ M(R).T), R[:, constraints.free])
+        known = R, times_M(R)
+    return Problem(len(constraints.free), times_K, times_M, _preconditioner(constraints, firm), norms, known)
+
+
+def _coarse(e: EquationsOfMotion, firm: LinearSolver, rigid: Array) -> tuple[Problem, Operator] | None:
+    """Return the equations of the linear elements inside quadratic ones, and what leads to all nodes."""
+    level = firm.linear_level()
+    if level is None:
+        return None
+    below, linear = level
+    fine, P = e.system.constraint_map, linear.interpolation
+    constraints, masses = fine.at(linear.nodes), np.repeat(P.T @ e.mass.nodal, 3)
+    if not (masses > 0).all():
+        return None
+    norms = below.norm, float(masses.max())
+    problem = _problem(constraints, below, below.times, lambda u: masses * u, rigid[linear.nodes], norms)
+
+    def onto_all(q: Array) -> Array:
+        nodal = (constraints.transform(x).reshape(-1, 3) for x in q)
+        return np.stack([(P @ u).ravel()[fine.free] for u in nodal])
+
+    return problem, onto_all
+
+
+def _firm(e: EquationsOfMotion, solver: LinearSolver) -> LinearSolver:
+    """Return the solver with rigid motions that are free held."""
+    held = e.system.constraint_map.holding(e.free_motions.constrained[e.system.nodes])
+    return replace(solver, constraint_map=held)
+
+
+def _preconditioner(constraints: ConstraintMap, firm: LinearSolver) -> Operator:
     """Return about K⁻¹ of free degrees of freedom (k, q), rigid motions that are free being held."""
-    constraints = e.system.constraint_map
-    held = constraints.holding(e.free_motions.constrained[e.system.nodes])
-    kept = np.searchsorted(constraints.free, held.free)
-    firm = replace(solver, constraint_map=held)
+    if firm.constraint_map is constraints:
+        return firm.precondition
+    kept = np.searchsorted(constraints.free, firm.constraint_map.free)
 
     def precondition(r: Array) -> Array:
         out = np.zeros_like(r)
@@ -111,10 +151,8 @@ def _reduced_product(constraints: ConstraintMap, times: Operator) -> Operator:
 
 
 def _free_motions(e: EquationsOfMotion) -> Array:
-    """Return the rigid motions (k, q) that supports leave to each part, φ^T M φ = 1."""
-    R = np.ascontiguousarray(e.free_motions.basis()[e.system.nodes].reshape(e.size, -1).T)
-    L = np.linalg.cholesky(R @ e.mass.times(R).T)
-    return np.linalg.solve(L, R[:, e.system.constraint_map.free])
+    """Return the rigid motions (a, 3, k) that supports leave to each part."""
+    return e.free_motions.basis()[e.system.nodes]
 
 
 def complex_modes(
@@ -131,10 +169,11 @@ def complex_modes(
         solver = replace(e.system.equations, plan=plan)
 
         def start(number: int) -> Array:
-            return _by_iteration(e, solver, number + len(_free_motions(e)), progress)[1].T
+            return _by_iteration(e, solver, number + _free_motions(e).shape[2], progress)[1].T
 
         rigid = unresisted_modes(M, C, K, _rigid_motions(e))
-        pencil = Pencil(M, C, K, rigid, start, _preconditioner(e, solver))
+        precondition = _preconditioner(e.system.constraint_map, _firm(e, solver))
+        pencil = Pencil(M, C, K, rigid, start, precondition)
         values, shapes = pencil.modes(whole_number(count, "count"))
     return values, expanded(e, shapes)
 

@@ -123,10 +123,10 @@ public:
         levels.back().clusters.forget();
     }
 
-    // z = M r, the V-cycle on a right side of any size.
-    void cycle(const double* r, double* z) {
+    // z = M r, the V-cycle on a right side of any size, from a level on.
+    void cycle(const double* r, double* z, size_t from = 0) {
         for (Level& level : levels) level.set_vectors(1);
-        Level& top = levels.front();
+        Level& top = levels[from];
         double norm = 0;
         for (int64_t i = 0; i < top.size(); ++i) norm = std::max(norm, std::fabs(r[i]));
         norm = top.halo->max(norm);
@@ -135,17 +135,17 @@ public:
             return;
         }
         for_each(top.size(), [&](int64_t i) { top.c[i] = static_cast<float>(r[i] / norm); });
-        descend(0);
+        descend(from);
         for_each(top.size(), [&](int64_t i) { z[i] = norm * top.x[i]; });
     }
 
     // The same for `count` right sides, each behind the other: several at once where all levels allow it.
-    void cycles(const double* r, double* z, int64_t count) {
-        const int64_t size = levels.front().size();
-        const bool serves = std::all_of(levels.begin(), levels.end(), [](const Level& l) { return l.serves_several(); });
+    void cycles(const double* r, double* z, int64_t count, size_t from) {
+        const int64_t size = levels[from].size();
+        const bool serves = std::all_of(levels.begin() + from, levels.end(), [](const Level& l) { return l.serves_several(); });
         while (count > 0) {
             const int64_t done = serves ? std::min<int64_t>(count, SEVERAL) : 1;
-            done > 1 ? cycle_several(r, z, static_cast<int>(done)) : cycle(r, z);
+            done > 1 ? cycle_several(r, z, static_cast<int>(done), from) : cycle(r, z, from);
             count -= done;
             r += done * size;
             z += done * size;
@@ -195,8 +195,8 @@ private:
         return coarse;
     }
 
-    void cycle_several(const double* r, double* z, int count) {
-        Level& top = levels.front();
+    void cycle_several(const double* r, double* z, int count, size_t from) {
+        Level& top = levels[from];
         const int64_t size = top.size();
         for (Level& level : levels) level.set_vectors(count);
         double norms[SEVERAL] = {};
@@ -206,7 +206,7 @@ private:
             for (int v = 0; v < SEVERAL; ++v)
                 top.c[i * SEVERAL + v] = norms[v] > 0 ? static_cast<float>(r[v * size + i] / norms[v]) : 0.0f;
         });
-        descend(0);
+        descend(from);
         for_rows(size, [&](int64_t i) KL_INLINE_LAMBDA {
             for (int v = 0; v < count; ++v) z[v * size + i] = norms[v] * top.x[i * SEVERAL + v];
         });

@@ -105,16 +105,17 @@ public:
         });
     }
 
-    // Of one vector r (n), or of several (k, n).
-    Array<double> cycle(Array<double> r) {
-        const int64_t size = static_cast<int64_t>(fixed.size()), count = r.ndim() == 2 ? r.shape(0) : 1;
+    // Of one vector r (n), or of several (k, n), of the finest level or of one below it.
+    Array<double> cycle(Array<double> r, int level) {
+        require(level >= 0 && level < static_cast<int>(hierarchy.levels.size()), "there is no such level");
+        const int64_t size = hierarchy.levels[level].size(), count = r.ndim() == 2 ? r.shape(0) : 1;
         require(r.size() == count * size && r.shape(r.ndim() - 1) == size, "r must have one number for each unknown");
         Array<double> z = r.ndim() == 2 ? Array<double>({count, size}) : Array<double>(size);
         const double* from = r.data();
         double* to = z.mutable_data();
         GilReleased release;
         const auto turn = at_work();
-        hierarchy.cycles(from, to, count);
+        hierarchy.cycles(from, to, count, level);
         return z;
     }
 
@@ -264,7 +265,7 @@ KL_MODULE(_multigrid, m) {
                           method<&Multigrid::aggregate_plate>("aggregate_plate"),
                           method<&Multigrid::aggregate_linear>("aggregate_linear"),
                           method<&Multigrid::labels>("labels"),
-                          method<&Multigrid::cycle>("cycle"),
+                          method<&Multigrid::cycle>("cycle", nullptr, {"r", {"level", PyLong_FromLong(0)}}),
                           method<&Multigrid::solve>("solve"),
                           method<&Multigrid::sizes>("sizes"),
                           method<&Multigrid::clusters>("clusters"),

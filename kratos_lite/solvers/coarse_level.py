@@ -47,18 +47,24 @@ class PCoarseLevel:
         """The stiffness matrix (3m, 3m) of the linear elements on the corner nodes."""
         return self.assemble()
 
-    def with_springs(self, springs: Csr) -> PCoarseLevel:
-        """Return the level of K with springs (3n, 3n) on all nodes."""
-        from scipy.sparse import csr_array, eye_array, kron
+    @property
+    def interpolation(self) -> Csr:
+        """Weights (n, m) of the corner nodes at all nodes, where they are no blocks."""
+        from scipy.sparse import csr_array
 
         shape = len(self.indptr) - 1, len(self.nodes)
-        P = kron(csr_array((self.weights, self.indices, self.indptr), shape=shape), eye_array(3))
+        return csr_array((self.weights, self.indices, self.indptr), shape=shape)
+
+    def with_springs(self, springs: Csr) -> PCoarseLevel:
+        """Return the level of K with springs (3n, 3n) on all nodes."""
+        from scipy.sparse import eye_array, kron
+
+        P = kron(self.interpolation, eye_array(3))
         return replace(self, assemble=lambda: BlockMatrix.of(self.K.scipy().tocsr() + P.T @ springs @ P))
 
     def with_mass(self, nodal: Array) -> PCoarseLevel:
         """Return the level of K + M, with masses of all nodes (n,) lumped at the corners."""
-        fine = np.repeat(np.arange(len(self.indptr) - 1), np.diff(self.indptr))
-        lumped: Array = np.bincount(self.indices, self.weights * nodal[fine], len(self.nodes)).astype(float)
+        lumped: Array = self.interpolation.T @ nodal
 
         def assemble() -> BlockMatrix:
             A = BlockMatrix(self.K.data.copy(), self.K.indices, self.K.indptr)
@@ -314,7 +320,7 @@ def apply_ties(level: PCoarseLevel, T: Any, free: Ints) -> PCoarseLevel | None:
     corner[level.nodes] = np.arange(m)
     of_corners = dependent.flat[entries.row] & (corner[entries.row // 3] >= 0)
     row, column, data = entries.row[of_corners], column[of_corners], entries.data[of_corners]
-    W = csr_array((level.weights, level.indices, level.indptr), shape=(n, m))
+    W = level.interpolation
     by_axis = [
         csr_array((data[at], (row[at] // 3, column[at] // 3)), shape=(n, n))
         for at in (row % 3 == axis for axis in range(3))

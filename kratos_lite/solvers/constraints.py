@@ -124,6 +124,11 @@ class ConstraintMap:
             return self
         return ConstraintMap(self.free[keep], self.c, None if self.T is None else self.T[:, keep])
 
+    def at(self, nodes: Ints) -> ConstraintMap:
+        """Return the map of some nodes whose free components, alone, are free, and the others 0."""
+        is_free = self.is_free.reshape(-1, 3)[nodes]
+        return ConstraintMap(np.flatnonzero(is_free), np.zeros(is_free.size))
+
     def transform(self, q: Numbers) -> Numbers:
         """Return T q, (N, ...), of the free degrees of freedom (q, ...): without what is prescribed."""
         if self.T is not None:

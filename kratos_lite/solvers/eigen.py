@@ -2,7 +2,9 @@
 
 Small problems are solved whole (LAPACK).  Of larger ones a block of vectors comes down to the lowest
 energies: each step takes the best of the span of the vectors X, their last step P, and what an approximate
-inverse of K (a cycle of multigrid, or factors) makes of their residuals, W.
+inverse of K (a cycle of multigrid, or factors) makes of their residuals, W.  Vectors beyond those wanted
+speed these up where they are known roughly: no more is spent on them.  The modes of a coarse level, as rough,
+are the start, if there is one.
 
 Sources: Knyazev, SIAM J. Sci. Comput. 23 (2001) 517-541 (LOBPCG); Hetmaniuk & Lehoucq, J. Comput. Phys. 218
 (2006) 324-332 (its basis); Stathopoulos & Wu, SIAM J. Sci. Comput. 23 (2002) 2165-2182 (dependent vectors).
@@ -26,10 +28,12 @@ Operator: TypeAlias = Callable[[Array], Array]
 """Takes vectors (k, n) to vectors (k, n)."""
 Done: TypeAlias = Callable[[Array, Array], bool]
 """Says from eigenvalues and their relative errors whether they will do."""
-TOLERANCE = 1e-9
-"""Relative error of an eigenvalue; that of its vector is the root of it."""
+TOLERANCE = 2e-9
+"""Relative error of an eigenvalue, twice that of its frequency; that of its vector is the root of it."""
 GUARDS = 2
 """Vectors beyond those wanted, and one more for every six of these: what is next to the last comes along."""
+ROUGH = 0.05
+"""Relative error to which those beyond, and the modes of a coarse level, are found."""
 STEPS = 200
 """Steps after which the iteration does not converge."""
 PATIENCE = 40
@@ -152,6 +156,8 @@ class Problem:
     known: tuple[Array, Array] | None = None  # R (k, n) with R M R^T = 1, and R M
     progress: Progress | None = None
     power: int = 1  # of λ in its error; 2 where `precondition` is about M⁻¹
+    coarse: tuple[Problem, Operator] | None = None  # equations of fewer components, and from these to all
+    wanted: int = 1  # vectors of a block that are found to TOLERANCE, the others to ROUGH
 
     def lowest(self, count: int) -> tuple[Array, Array]:
         """Return the lowest λ (count,) beside the known ones, ascending, and x (count, n), x M x^T = 1."""
@@ -166,9 +172,9 @@ class Problem:
                 self.progress("modes", 0.99 * float(np.log(smallest) / np.log(TOLERANCE)))
             return largest <= TOLERANCE
 
-        X = self._start(count + GUARDS + count // 6)
+        X, problem = self._roughly(count + GUARDS + count // 6), replace(self, wanted=count)
         while True:
-            squares, X, MX = self._descend(X, converged)
+            squares, X, MX = problem._descend(X, converged)
             last = squares[count - 1]
             R, MR = self.known or (X[:0], MX[:0])
             known = np.vstack([R, X[:count]]), np.vstack([MR, MX[:count]])
@@ -187,42 +193,57 @@ class Problem:
         """Return vectors (count, n) in which low modes are large, the same each time."""
         return self.precondition(self.M(_random(count, self.n)))
 
+    def _roughly(self, count: int) -> Array:
+        """Return vectors (count, n) near the lowest modes, those of the coarse level if there is one."""
+        if self.coarse is None or self.coarse[0].n < 4 * count:
+            return self._start(count)
+        problem, onto_all = self.coarse
+        problem = replace(problem, wanted=0)
+
+        def enough(squares: Array, errors: Array) -> bool:
+            return bool(errors[:-GUARDS].max() <= ROUGH)
+
+        return onto_all(problem._descend(problem._start(count), enough)[1])
+
     def _descend(self, X: Array, done: Done) -> tuple[Array, Array, Array]:
         """Return λ, x and M x of as many vectors as X has, from these, when `done`."""
         m, (W, MW) = len(X), self._independent(X)
         while len(W) < m:  # thin bodies: one cycle leaves little but their softest motions
             W, MW = self._independent(np.vstack([W, _random(m - len(W), self.n)]))
         S, KS, MS = (np.empty((3 * m, self.n)) for _ in range(3))
-        squares, errors = np.full(m, np.inf), np.full(m, np.inf)
+        squares, errors, A = np.full(m, np.inf), np.full(m, np.inf), np.zeros((0, 0))
+        limits = np.where(np.arange(m) < self.wanted, TOLERANCE, ROUGH)
         used, allowed, best, best_at = 0, EPS, np.inf, 0
         for step in range(STEPS):
             new = slice(used, used + len(W))
             S[new], MS[new], KS[new] = W, MW, self.K(W)
             used, before = new.stop, squares
-            A, G = (S[:used] @ V[:used].T for V in (KS, MS))
+            A = _bordered(A, KS[new] @ S[:used].T)
+            G = _bordered(np.eye(new.start), MS[new] @ S[:used].T)
             squares, C = _ritz(A, G, m)
-            active = np.flatnonzero((errors > TOLERANCE) | (squares < before - TOLERANCE * np.abs(squares)))
+            active = np.flatnonzero((errors > limits) | (squares < before - limits * np.abs(squares)))
             last = C[:, active]
             last[:m] = 0.0
             last -= C @ (C.T @ (G @ last))
             both = np.hstack([C, last @ orthonormal(last.T @ G @ last)]) if step else C
             for V in (S, KS, MS):
                 _combine(V, both)
+            A = both.T @ A @ both
             residual = KS[active] - squares[active, None] * MS[active]
             W = self.precondition(residual)
             gaps = (squares[-1] - squares[active]) / np.abs(squares[-1])  # beyond which others mix in
             errors[active] = self._errors(residual, W, S[active], squares[active], allowed)
-            errors[active] /= np.clip(gaps, NEAR, 1.0)
+            errors[active] /= np.where(active < self.wanted, np.clip(gaps, NEAR, 1.0), 1.0)
             if done(squares, errors):
                 return squares, S[:m], MS[:m]
-            if np.log(errors + EPS).sum() < best:
+            if np.log(errors + EPS).sum() < best - 0.1:
                 best, best_at = float(np.log(errors + EPS).sum()), step
             elif step - best_at > PATIENCE:
                 if allowed == ROUNDING:
                     break
                 allowed, best_at = ROUNDING, step
             used = both.shape[1]
-            W, MW = self._independent(W[errors[active] > TOLERANCE], S[:used], MS[:used])
+            W, MW = self._independent(W[errors[active] > limits[active]], S[:used], MS[:used])
         raise not_converged(m)
 
     def _independent(self, W: Array, *basis: Array) -> tuple[Array, Array]:
@@ -275,6 +296,11 @@ def _ritz(A: Array, G: Array, count: int) -> tuple[Array, Array]:
     Q = orthonormal(G)
     values, C = np.linalg.eigh(Q.T @ A @ Q)
     return values[:count], Q @ C[:, :count]
+
+
+def _bordered(A: Array, rows: Array) -> Array:
+    """Return a symmetric matrix A with further rows, and columns that equal them."""
+    return np.vstack([np.hstack([A, rows[:, : len(A)].T]), rows])
 
 
 def _combine(V: Array, C: Array) -> None:

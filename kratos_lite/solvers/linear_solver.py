@@ -21,6 +21,7 @@ from kratos_lite.typing import Array, Ints, Progress
 if TYPE_CHECKING:
     from kratos_lite.assembly.element_groups import ElementGroup
     from kratos_lite.mesh.hanging import HangingNodes
+    from kratos_lite.solvers.coarse_level import PCoarseLevel
     from kratos_lite.solvers.multigrid import Solver
 
 WIDE, MOST_MEANS = 100, 24
@@ -114,9 +115,24 @@ class LinearSolver:
             return self.factors.rows(r)
         if self._without_means is not None:
             return self._without_means.precondition(r)
+        free = self.constraint_map.free
         forces = np.zeros((*r.shape[:-1], len(self.constraint_map.c)))
-        forces[..., self.constraint_map.free] = r
-        return self._multigrid.precondition(forces)[..., self.constraint_map.free]
+        for full, part in zip(np.atleast_2d(forces), np.atleast_2d(r), strict=True):  # faster than at once
+            full[free] = part
+        return np.take(self._multigrid.precondition(forces), free, axis=-1)
+
+    def linear_level(self) -> tuple[LinearSolver, PCoarseLevel] | None:
+        """Return the equations of the linear elements inside quadratic ones, where multigrid has them."""
+        if self.plan.method != "amg" or self._without_means is not None:
+            return None
+        multigrid: Any = self._multigrid
+        linear: PCoarseLevel | None = getattr(multigrid, "linear", None)
+        if linear is None or linear.weights.ndim > 1:
+            return None
+        constraints = self.constraint_map.at(linear.nodes)
+        below = LinearSolver(linear.K, constraints, self.points[linear.nodes], self.plan)
+        vars(below)["_multigrid"] = multigrid.below()
+        return below, linear
 
     def _fraction(self, f: Array, c: Array, size: float) -> float:
         """Return the fraction of |b|, a `size`, that tolerances refer to."""

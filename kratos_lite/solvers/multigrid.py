@@ -12,6 +12,7 @@ Phys. 188 (2003) 593-610 (Chebyshev smoothing).
 
 from __future__ import annotations
 
+from copy import copy
 from typing import Any, Protocol
 
 import numpy as np
@@ -84,6 +85,8 @@ class Compiled:
             self._kernel = self._module.Multigrid(A.product, *settings)
         else:
             self._kernel = self._module.Multigrid(self._matrix(A), *settings, thin)
+        self.linear: PCoarseLevel | None = None  # what is next to the finest level, if it is that
+        self._level = 0  # where cycles begin
         lines = self._kernel.labels()
         plate = None
         if linear is not None and len(lines) and linear.weights.ndim == 1:
@@ -112,6 +115,7 @@ class Compiled:
         """Aggregate nodes, or those of the linear level."""
         if linear is not None and self._kernel.has_planes() and not linear.halved:
             linear = None  # tetrahedra: their middle nodes are too far from their corners
+        self.linear = linear
         X = points if linear is None else points[linear.nodes]
         modes = rigid_modes(X) if axes is None or self._kernel.has_planes() else bending_modes(X, axes)
         if linear is None:
@@ -127,9 +131,15 @@ class Compiled:
             modes,
         )
 
+    def below(self) -> Compiled:
+        """Return what makes cycles from the next level on."""
+        below = copy(self)
+        below._level += 1
+        return below
+
     def precondition(self, r: Array) -> Array:
         """Return one V-cycle on r (3n,), or on several vectors (k, 3n), for which matrices are read once."""
-        return self._kernel.cycle(r)
+        return self._kernel.cycle(r, self._level)
 
     def with_pressures(self, *matrices: Any) -> Any:
         """Return the kernel that solves for pressures beside the displacements."""

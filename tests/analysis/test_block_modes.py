@@ -181,6 +181,33 @@ def test_a_mode_that_a_start_misses_is_found(monkeypatch):
     assert len(blocks) > 2
 
 
+@pytest.mark.skipif(kernels("multigrid") is None, reason="the compiled kernels were not built")
+@pytest.mark.parametrize("sides", [("x-",), ()])
+@pytest.mark.parametrize("element", ["20N", "27N", "10N"])
+def test_modes_of_the_linear_level_save_cycles_of_all_nodes(element, sides, monkeypatch):
+    """Of a body that is held, and of a free one, whose rigid motions the level has, too."""
+    model = kl.Model(
+        kl.box((1, 1, 2), (4, 4, 7), f"KinematicLinear3D{element}"), kl.Isotropic3D(nu=0.3, **STEEL)
+    )
+    for side in sides:
+        model.fix(side)
+    cycles, omegas = [], []
+    plain = LinearSolver.precondition
+
+    def counted(self, r):
+        cycles[-1] += len(r) * (self.K.shape[0] == 3 * model.mesh.n_nodes)
+        return plain(self, r)
+
+    monkeypatch.setattr(LinearSolver, "precondition", counted)
+    for has_level in (True, False):
+        if not has_level:
+            monkeypatch.setattr(LinearSolver, "linear_level", lambda self: None)
+        cycles.append(0)
+        omegas.append(model.modes(8 if sides else 14)[0])
+    np.testing.assert_allclose(*omegas, rtol=1e-8)
+    assert 0 < cycles[0] < 0.85 * cycles[1]
+
+
 def test_modes_beyond_reach_are_refused(monkeypatch):
     model = kl.Model(kl.box((1, 1, 1), (8, 8, 8)), kl.Isotropic3D(nu=0.3, **STEEL))
     model.fix("z-")
