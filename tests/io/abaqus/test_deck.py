@@ -175,6 +175,9 @@ WRONG = {  # what is added to the cube, and the message, which begins with the l
     "*STEP\n*STATIC\n*DLOAD\nEALL,CENTRIF,1.,0,0,0,0,0,1.\nEALL,CENTRIF,1.,0,0,0,0,1.,0.\n*END STEP\n": (
         "4: an element turns about another axis already"
     ),
+    "*EQUATION\n0\n" + STEP: "1: an equation has 1 term at least; got 0",
+    "*EQUATION\n2\n5,3,0.,6,3,-1.\n" + STEP: "1: the first term has the factor 0",
+    "*EQUATION\n2\n5,3,1.,6.5,3,-1.\n" + STEP: "1: there is no node 6.5",
     "*BOUNDARY\nTOP,XSYMM\n" + STEP: "1: 'XSYMM' is no number of a direction",
     "*BOUNDARY\nTOP,1,1,1;5\n" + STEP: "1: '1;5' is not a number",
     "*STEP, FOO=1\n*STATIC\n*END STEP\n": "0: *STEP: option FOO is not supported",
