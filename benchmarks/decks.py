@@ -50,8 +50,7 @@ DIFFERS = {
 SIZES = (("C3D10", 8), ("C3D10", 13), ("C3D20R", 8), ("C3D8", 20), ("C3D10", 18))
 """Elements and cells along the short edges of a block 1 × 1 × 2 under its weight."""
 TIMES = """Blocks 1 × 1 × 2 under their weight (`python -m benchmarks decks`), and a bar with a hole that
-FreeCAD meshed (`python -m benchmarks decks bar.inp`), whole processes, two cores: seconds, those of the
-processors in brackets, of which the ratio is, and memory."""
+FreeCAD meshed (`python -m benchmarks decks bar.inp`), whole processes: seconds of processors, and memory."""
 TEXT = """# Test decks of CalculiX
 
 The decks of CalculiX's own tests that hold solids alone, here and in a live ccx {version}. *Tables*: those of
@@ -227,7 +226,7 @@ def times(rows: list[Row]) -> str:
     """Return the table of times."""
     names = ("deck", "unknowns", "kratos_lite", "ccx", "ratio", "difference of U")
     body = [
-        [row["element"], str(row["unknowns"]), *("{} s ({} s), {} MB".format(*row[n]) for n in names[2:4]),
+        [row["element"], str(row["unknowns"]), *("{1} s, {2} MB".format(*row[n]) for n in names[2:4]),
          f"{row['ccx'][1] / row['kratos_lite'][1]:.1f}", error(row["U"])]
         for row in rows
     ]  # fmt: skip

@@ -43,7 +43,7 @@ PRINTED = {
     card: [word for word, (field, *_) in dat.VARIABLES.items() if (field in FIELDS) == (card == "NODEPRINT")]
     for card in OF_SET
 }
-"""What each of the former can ask for."""
+"""Words of *NODE PRINT and *EL PRINT."""
 STATUS = (
     "SUMMARY OF JOB INFORMATION\n  STEP      INC     ATT  ITRS     TOT TIME     STEP TIME      INC TIME\n"
 )

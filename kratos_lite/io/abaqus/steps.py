@@ -231,12 +231,9 @@ class _Cases(Building):
 
 def _is_stressed(model: Model) -> bool:
     """Return whether stress, loads, temperatures or displacements are given to a linear model."""
-    groups, moves = model.element_groups(), model.supports.values.any()
-    return bool(
-        model.prestress is not None
-        or moves
-        or any(load.forces(model.mesh, groups).any() for load in model.loads)
-    )
+    loads, groups = model.loads, model.element_groups()
+    acts = model.supports.values.any() or any(load.forces(model.mesh, groups).any() for load in loads)
+    return bool(acts or model.prestress is not None)
 
 
 def _sweep(low: float, high: float, count: int, bias: float, modes: int) -> Callable[[Model], Array]:
