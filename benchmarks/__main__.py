@@ -74,7 +74,7 @@ OTHERS: dict[str, Callable[[argparse.Namespace], int | None]] = {
     ),
     "loads": lambda o: loads.loads(),
     "folders": lambda o: folders.folders(o.path, o.pythons.get("Kratos", o.pythons.get("", ""))),
-    "decks": lambda o: decks.speed() if o.path == ROOT else decks.decks(o.path),
+    "decks": lambda o: (decks.speed if o.path == ROOT or o.path.is_file() else decks.decks)(o.path),
     "references": lambda o: references(o.cells or (4, 8, 16)),
     "report": lambda o: write_report(),
 }
@@ -131,13 +131,7 @@ def arguments(words: Sequence[str] | None) -> argparse.Namespace:
     many = {"nargs": "+", "metavar": "NAME"}
     add, seconds = parser.add_argument, {"type": float, "metavar": "SECONDS"}
     add("command", choices=[*COMMANDS, *OTHERS])
-    add(
-        "path",
-        nargs="?",
-        type=Path,
-        default=ROOT,
-        help="for laws, folders, decks: with files of Kratos, CalculiX",
-    )
+    add("path", nargs="?", type=Path, default=ROOT, help="for laws, folders, decks: their files")
     add("--programs", choices=names, default=names, help=f"some of: {', '.join(names)}", **many)
     add("--scenes", choices=sorted(scenes.SCENES), help="for error, stall: some of their scenes", **many)
     add("--elements", choices=scenes.KINDS, help=f"some of: {', '.join(scenes.KINDS)}", **many)

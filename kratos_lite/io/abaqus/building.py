@@ -144,7 +144,7 @@ class Building:
     def _pressures(self, model: Model, values: Array, of: Mask, time: float) -> Iterator[Load]:
         n, some = model.mesh.n_nodes, values[tuple(self.faces.T)]
         none = {cell: np.zeros((n, 3)) for cell in ("point", "line", "triangle", "quadrilateral")}
-        yield ConditionLoads(np.zeros((len(some), 3)), none, some, np.zeros(n))
+        yield ConditionLoads(np.zeros((len(some), 3)), none, some, np.zeros(n), model.is_nonlinear)
 
     def _temperatures(self, model: Model, values: Array, of: Mask, time: float) -> Iterator[Load]:
         initial = self.deck.initial

@@ -116,16 +116,24 @@ class Card:
             found = text.rows(data, 0, len(data), kinds, self.line)
         return found
 
-    def every(self) -> Array:
-        """Return all numbers of the data in order, whatever the lines; InputError at the first wrong one."""
-        found = [[row.number(i) for i in range(len(row.fields)) if row.fields[i]] for row in self.rows()]
-        return np.array([value for row in found for value in row])
+    def every(self, width: int = 0) -> Array:
+        """Return all numbers in order, by lines or so that each line ends a row of `width` or goes on in it.
 
-    def ids(self, width: int) -> Ints:
-        """Return all numbers as rows of `width` ids."""
+        InputError at the first wrong one.
+        """
+        found = list[float]()
+        for row in self.rows():
+            numbers = [row.number(i) for i in range(len(row.fields)) if row.fields[i]]
+            found += numbers[: width - len(found) % width] if width else numbers
+        return np.array(found)
+
+    def ids(self, width: int, notes: list[str] | None = None) -> Ints:
+        """Return all numbers as rows of `width` ids; with notes a line ends a row, and may hold more."""
         if plain := self.plain("i" * width):
             return plain[0]
-        values = self.every()
+        values = self.every(width if notes is not None else 0)
+        if notes is not None and len(values) < len(self.every()):
+            notes.append(f"{self.place}: *{self.keyword}: what stands behind {width} numbers is ignored")
         if values.size % width:
             self.wrong(f"{values.size} numbers are no rows of {width}")
         whole = values.astype(np.int64)

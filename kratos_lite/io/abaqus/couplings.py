@@ -138,14 +138,18 @@ class Connections:
         card.check_options(())
         rows = card.rows()
         for row in rows:
-            count, values = row.integer(0), list[float]()
+            if (count := row.integer(0)) < 1:
+                row.wrong(f"an equation has 1 term at least; got {count}")
+            values = list[float]()
             while len(values) < 3 * count:
                 line = next(rows, None) or row.wrong(f"an equation of {count} terms has {3 * count} values")
                 values += [line.number(i) for i in range(len(line.fields))]
             table = np.array(values[: 3 * count]).reshape(-1, 3)
             nodes, directions = self.mesh.node_rows(table[:, 0].astype(np.int64)), table[:, 1]
-            if (nodes < 0).any():
-                row.wrong(f"there is no node {table[nodes < 0, 0][0]:g}")
+            if (lost := (nodes < 0) | (table[:, 0] % 1 != 0)).any():
+                row.wrong(f"there is no node {table[lost, 0][0]:g}")
+            if table[0, 2] == 0:
+                row.wrong("the first term has the factor 0")
             if not np.isin(directions, (1, 2, 3)).all():
                 row.wrong("an equation has directions 1, 2, 3 of solids alone")
             along = self.axes.directions(self.mesh, nodes)[range(len(nodes)), directions.astype(int) - 1]

@@ -12,7 +12,7 @@ import numpy as np
 from kratos_lite.errors import InputError, naming, nearest
 from kratos_lite.io.abaqus.cards import Card, read_cards
 from kratos_lite.io.abaqus.couplings import Connections
-from kratos_lite.io.abaqus.loads import OPTIONS, Acting, read_row
+from kratos_lite.io.abaqus.loads import OPTIONS, Acting, read_rows
 from kratos_lite.io.abaqus.materials import Axes, Definition, axes_of, orientation
 from kratos_lite.io.abaqus.mesh import Geometry
 from kratos_lite.model.local_axes import LocalAxes
@@ -126,8 +126,8 @@ class Deck:
     """What the cards of a deck have said so far."""
 
     def __init__(self, path: Path) -> None:
-        self.path, self.notes = path, list[str]()
-        cards, self.geometry = list(read_cards(path)), Geometry()
+        self.path, self.geometry = path, Geometry()
+        cards, self.notes = list(read_cards(path)), self.geometry.notes
         for card in cards:
             if card.keyword in OF_MESH:
                 OF_MESH[card.keyword](self.geometry, card)
@@ -303,8 +303,7 @@ class Deck:
         known, name = ["", *self.amplitudes], card.options.get("AMPLITUDE", "").upper()
         if name not in known:
             card.wrong(f"there is no *AMPLITUDE {name}.{nearest(name, self.amplitudes)}")
-        for row in card.rows():
-            read_row(card, row, self.acting, self.geometry, known.index(name), len(self.steps) + 1)
+        read_rows(card, self.acting, self.geometry, known.index(name), len(self.steps) + 1)
 
     def output(self, card: Card) -> None:
         """Read a card that asks for results."""

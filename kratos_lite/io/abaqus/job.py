@@ -20,7 +20,7 @@ from kratos_lite.io.case import Case
 from kratos_lite.io.run import prepare, run
 from kratos_lite.io.writers import dat
 from kratos_lite.io.writers.calculix import at_nodes, displacements, forces
-from kratos_lite.io.writers.frd import FrdStep, steps_of_modes, write_frd
+from kratos_lite.io.writers.frd import FIELDS, FrdStep, steps_of_modes, write_frd
 from kratos_lite.io.writers.recorded import recorded
 from kratos_lite.materials.anisotropic3d import Anisotropic3D
 from kratos_lite.mesh import rows_of_ids
@@ -39,6 +39,11 @@ FILED = {
 OF_SET = {"NODEPRINT": "NSET", "ELPRINT": "ELSET"}
 OF_FACES = ("SECTIONPRINT", "FACEPRINT")
 """Cards that ask for tables of sets and of surfaces."""
+PRINTED = {
+    card: [word for word, (field, *_) in dat.VARIABLES.items() if (field in FIELDS) == (card == "NODEPRINT")]
+    for card in OF_SET
+}
+"""Words of *NODE PRINT and *EL PRINT."""
 STATUS = (
     "SUMMARY OF JOB INFORMATION\n  STEP      INC     ATT  ITRS     TOT TIME     STEP TIME      INC TIME\n"
 )
@@ -78,7 +83,7 @@ class Job:
         self.asked = [card for card in self.asked if card.keyword not in new] + step.outputs
         for card in step.outputs:
             self.every = _every(card) or self.every  # the last one counts for all
-            known = FILED if card.keyword in FILES else {*FILED, *dat.VARIABLES}
+            known = FILED if card.keyword in FILES else PRINTED.get(card.keyword, ())
             if other := [w for w in _words(card) if w not in known and card.keyword not in OF_FACES]:
                 self.tell(f"{card.place}: *{card.keyword}: not written: {', '.join(other)}")
         if np.ptp(self.deck.initial) and any("NT" in _words(card) for card in step.outputs):
@@ -194,7 +199,7 @@ class Job:
             totals, is_local = (card.options.get(word, "NO").upper() for word in ("TOTALS", "GLOBAL"))
             local, rows = self._local(card) if is_local == "NO" else (), self._rows(card)
             for word in _words(card):
-                if word in dat.VARIABLES and rows is not None:
+                if word in PRINTED[card.keyword] and rows is not None:
                     self.dat += dat.prints(result, rows, word, where, time, totals, local, known)
         for card in (card for card in self.asked if card.keyword in OF_FACES and _every(card) != 0):
             name = card.option("SURFACE")

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
 
+from kratos_lite.errors import InputError
 from kratos_lite.io.abaqus.cards import Card, Row
 from kratos_lite.io.abaqus.mesh import Geometry, face_number
 from kratos_lite.typing import Array, ArrayLike, Ints, Mask, Numbers
@@ -16,6 +19,7 @@ Body: TypeAlias = tuple[str, str, tuple[float, ...]]
 """A load on elements of size 1: GRAV or CENTRIF, their set, and its direction or axis."""
 OPTIONS = {"BOUNDARY": ("FIXED",), "CLOAD": ("LOADCASE",), "DLOAD": (), "DSLOAD": (), "TEMPERATURE": ()}
 """Cards of supports and loads, and their options beside OP and AMPLITUDE."""
+_FACE = re.compile(rb",[ \t]*[Pp]([1-6])[ \t]*,")
 
 
 @dataclass
@@ -32,8 +36,8 @@ class Given:
         self.given[rows, axes], self.values[rows, axes] = True, value
         self.amplitudes[rows, axes] = amplitude
 
-    def add(self, rows: Ints, axes: Ints | int, value: float, amplitude: int, step: int) -> None:
-        """Add a value to those of the same step, and replace those of earlier ones."""
+    def add(self, rows: Ints, axes: Ints | int, value: ArrayLike, amplitude: int, step: int) -> None:
+        """Add values to those of the same step, and replace those of earlier ones."""
         at = rows, np.broadcast_to(axes, rows.shape)
         self.values[at] = np.where(self.steps[at] < step, 0.0, self.values[at])
         np.add.at(self.values, at, value)
@@ -81,8 +85,34 @@ def courses(each: Sequence[Given], none: int = 0) -> tuple[Mask, Ints, list[Ints
     return given, numbers, [np.zeros(len(each), dtype=int), *found]
 
 
-def read_row(card: Card, row: Row, acting: Acting, geometry: Geometry, amplitude: int, step: int) -> None:
-    """Read a row of *BOUNDARY, *CLOAD, *DLOAD, *DSLOAD or *TEMPERATURE."""
+def read_rows(card: Card, acting: Acting, geometry: Geometry, amplitude: int, step: int) -> None:
+    """Read *BOUNDARY, *CLOAD, *DLOAD, *DSLOAD or *TEMPERATURE."""
+    with suppress(InputError):  # the line that is wrong is told below
+        if card.keyword in ("CLOAD", "DLOAD") and _read_at_once(card, acting, geometry, amplitude, step):
+            return
+    for row in card.rows():
+        _read_row(card, row, acting, geometry, amplitude, step)
+
+
+def _read_at_once(card: Card, acting: Acting, geometry: Geometry, amplitude: int, step: int) -> bool:
+    """Read forces on directions 1 to 3 of nodes, or pressures on faces of elements, if all lines are such."""
+    data, count = _FACE.subn(rb",\1,", card.data)
+    plain = replace(card, data=data).plain("iir")
+    if plain is None or count != (len(plain[0]) if card.keyword == "DLOAD" else 0):
+        return False
+    (ids, axes), values = plain[0].T, plain[1][:, 0]
+    if count:
+        rows, axes = geometry.faces(ids, axes - 1, card).T
+    elif np.isin(axes, (1, 2, 3)).all() and "LOADCASE" not in card.options:
+        rows, axes = geometry.nodes(ids, card), axes - 1
+    else:
+        return False
+    acting[card.keyword].add(rows, axes, values, amplitude, step)
+    return True
+
+
+def _read_row(card: Card, row: Row, acting: Acting, geometry: Geometry, amplitude: int, step: int) -> None:
+    """Read a row of such a card."""
     if card.keyword == "BOUNDARY":
         _support(row, acting["BOUNDARY"], geometry, amplitude)
     elif card.keyword == "CLOAD":

@@ -66,6 +66,7 @@ class Geometry:
     twin: Ints  # the row of the node of which each is a copy
 
     def __init__(self) -> None:
+        self.notes: list[str] = []
         self.node_cards: list[tuple[Ints, Array]] = []
         self.cells: list[Cells] = []
         self.others: list[Cells] = []  # springs, masses, …
@@ -108,7 +109,7 @@ class Geometry:
             card.wrong(f"element {kind} is not supported.{nearest(kind, ELEMENT_TYPES)} There are {solids}")
         if width is None:
             width = len(ELEMENTS[ELEMENT_TYPES[kind]].shape.nodes)
-        table = card.ids(1 + width)
+        table = card.ids(1 + width, self.notes)
         cells = Cells(kind, table[:, 0], table[:, 1:], card.place)
         (self.cells if kind in ELEMENT_TYPES else self.others).append(cells)
         if "ELSET" in card.options:
@@ -161,9 +162,9 @@ class Geometry:
         """Return the ids of elements of a number or the name of a set."""
         return self.ids_of(word, at, "ELSET")
 
-    def nodes(self, word: str, at: Row | Card) -> Ints:
-        """Return the rows of nodes that a number or the name of a set means."""
-        ids = self.ids_of(word, at, "NSET")
+    def nodes(self, word: str | Ints, at: Row | Card) -> Ints:
+        """Return the rows of nodes of some ids, or that a number or the name of a set means."""
+        ids = self.ids_of(word, at, "NSET") if isinstance(word, str) else word
         rows = self.mesh.node_rows(ids)
         if (rows < 0).any():
             at.wrong(f"there is no node {ids[rows < 0][0]}")
@@ -208,16 +209,17 @@ class Geometry:
             return np.unique(found)
         return np.unique(np.concatenate([block.nodes.ravel() for block in self.surface_blocks(name, at)]))
 
-    def faces(self, ids: Ints, number: int, at: Row | Card) -> Ints:
-        """Return the face of a number of some elements, (k, 2)."""
+    def faces(self, ids: Ints, numbers: int | Ints, at: Row | Card) -> Ints:
+        """Return the faces of some elements by their numbers from 0, (k, 2)."""
         known, order, sides = self._elements
         rows = rows_of_ids(known, ids, order)
         if (rows < 0).any():
             at.wrong(f"there is no solid element {ids[rows < 0][0]}")
-        if (sides[rows, number] < 0).any():
-            i = np.argmin(sides[rows, number])
-            at.wrong(f"element {ids[i]} has {(sides[rows[i]] >= 0).sum()} faces; got number {number + 1}")
-        return np.column_stack([rows, sides[rows, number]])
+        if ((found := sides[rows, numbers]) < 0).any():
+            i = np.argmin(found)
+            number = np.broadcast_to(numbers, rows.shape)[i] + 1
+            at.wrong(f"element {ids[i]} has {(sides[rows[i]] >= 0).sum()} faces; got number {number}")
+        return np.column_stack([rows, found])
 
     @cached_property
     def _elements(self) -> tuple[Ints, Ints, Ints]:
@@ -253,7 +255,7 @@ class Geometry:
         """Return ids and places of all nodes, with further ones where reference nodes have no ROT NODE."""
         new = [(place, ref) for place, (ref, rotation) in self.references.items() if not rotation]
         refs = np.array([ref for _, ref in new], dtype=np.int64)
-        at, more = rows_of_ids(ids, refs), ids.max() + 1 + np.arange(len(new))
+        at, more = rows_of_ids(ids, refs), ids.max(initial=0) + 1 + np.arange(len(new))
         self.references |= {place: (ref, i) for (place, ref), i in zip(new, more.tolist(), strict=True)}
         return np.append(ids, more), np.vstack([points, points[at]])
 

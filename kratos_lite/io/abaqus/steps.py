@@ -89,7 +89,8 @@ class _Cases(Building):
             model.supports = model.supports.acting(after.time.end)
         if any(step.numbers()[1:]):
             model.notes.append("bounds of frequencies are ignored: the lowest ones are found")
-        return Case(model, modes=self.count(step), preload=before is not None and not after, after=after)
+        preload = before is not None and after is None and _is_stressed(model)
+        return Case(model, modes=self.count(step), preload=preload, after=after)
 
     def _case_of(self, step: Step) -> Case:
         """Return the case that is made of a step already."""
@@ -226,6 +227,13 @@ class _Cases(Building):
         model = self.model(large, now)
         self.act(model, steps)
         return model
+
+
+def _is_stressed(model: Model) -> bool:
+    """Return whether stress, loads, temperatures or displacements are given to a linear model."""
+    loads, groups = model.loads, model.element_groups()
+    acts = model.supports.values.any() or any(load.forces(model.mesh, groups).any() for load in loads)
+    return bool(acts or model.prestress is not None)
 
 
 def _sweep(low: float, high: float, count: int, bias: float, modes: int) -> Callable[[Model], Array]:

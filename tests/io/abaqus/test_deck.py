@@ -75,8 +75,24 @@ def test_hydrostatic_pressure_by_faces_and_by_a_surface(read: Read) -> None:
     free = CUBE.replace("Bottom,1,3", "1,1,3\n2,2,3\n4,3")
     for model, step in (("", f"*DLOAD\n{faces}"), (surface, "*DSLOAD\nSKIN,P,7.\n")):
         case = read(f"{model}*STEP\n*STATIC\n{step}*END STEP\n", free)
+        assert not case.model.is_nonlinear  # no load follows the body
         stress = kl.run(case).result.stress("element")
         assert np.abs(stress - [-7, -7, -7, 0, 0, 0]).max() < 1e-12
+
+
+def test_single_loads_add_as_those_of_sets_do(read: Read) -> None:
+    groups = "*NSET,NSET=A\n5,6,7\n*ELSET,ELSET=B\n1\n"
+    singles = "5,1,2.\n6,1,2.\n7,1,2.\n7,3,1.\n7,3,1.\n*DLOAD\n1,P3,2.\n1 , p3 ,1.\n1,P5,4.\n"
+    sets = "A,1,2.\n7,3,2.\n*DLOAD\nB,P3,3.\nB,P5,4.\n"
+    step = "*STEP\n*STATIC\n*CLOAD\n{}*END STEP\n"
+    ours, theirs = (solved(read(groups + step.format(text))) for text in (singles, sets))
+    assert np.abs(ours - theirs).max() < 1e-12 * np.abs(theirs).max()
+
+
+def test_numbers_behind_the_nodes_of_an_element_are_ignored_with_a_note(read: Read) -> None:
+    case = read(STEP, CUBE.replace("\n5,6,7,8\n", "\n5,6,7,8,9,\n"))
+    assert case.model.mesh.blocks[0].nodes.tolist() == [[0, 1, 2, 3, 4, 5, 6, 7]]
+    assert any("what stands behind 9 numbers is ignored" in note for note in case.model.notes)
 
 
 @pytest.mark.parametrize("name", ["Tetrahedron10", "Wedge15", "Hexahedron20"])
@@ -142,6 +158,9 @@ WRONG = {  # what is added to the cube, and the message, which begins with the l
     "*FOO\n" + STEP: "0: *FOO: this card is not known",
     "*CONTACT PAIR, INTERACTION=A\n" + STEP: "*CONTACTPAIR: contact is not supported",
     "*STEP\n*STATIC\n*CLOAD\n99,1,1.\n*END STEP\n": "3: there is no node 99",
+    "*STEP\n*STATIC\n*CLOAD\n7,1,1.\n99,1,1.\n*END STEP\n": "4: there is no node 99",
+    "*STEP\n*STATIC\n*DLOAD\n1,P1,1.\n9,P1,1.\n*END STEP\n": "4: there is no solid element 9",
+    "*STEP\n*STATIC\n*CLOAD\n7,1,1.\n7,P1,1.\n*END STEP\n": "4: 'P1' is not a number",
     "*STEP\n*STATIC\n*CLOAD\nTOPP,1,1.\n*END STEP\n": "3: there is no NSET 'TOPP'. Did you mean TOP",
     "*STEP\n*STATIC\n*CLOAD\nTOP,7,1.\n*END STEP\n": "3: a force on solids has direction 1, 2 or 3, on",
     "*STEP\n*STATIC\n*DLOAD\nEALL,P7,1.\n*END STEP\n": "3: a face is P1, P2, … P6; got 'P7'",
@@ -156,6 +175,9 @@ WRONG = {  # what is added to the cube, and the message, which begins with the l
     "*STEP\n*STATIC\n*DLOAD\nEALL,CENTRIF,1.,0,0,0,0,0,1.\nEALL,CENTRIF,1.,0,0,0,0,1.,0.\n*END STEP\n": (
         "4: an element turns about another axis already"
     ),
+    "*EQUATION\n0\n" + STEP: "1: an equation has 1 term at least; got 0",
+    "*EQUATION\n2\n5,3,0.,6,3,-1.\n" + STEP: "1: the first term has the factor 0",
+    "*EQUATION\n2\n5,3,1.,6.5,3,-1.\n" + STEP: "1: there is no node 6.5",
     "*BOUNDARY\nTOP,XSYMM\n" + STEP: "1: 'XSYMM' is no number of a direction",
     "*BOUNDARY\nTOP,1,1,1;5\n" + STEP: "1: '1;5' is not a number",
     "*STEP, FOO=1\n*STATIC\n*END STEP\n": "0: *STEP: option FOO is not supported",
@@ -177,6 +199,11 @@ def test_damaged_decks_get_one_clear_error(text: str, read: Read) -> None:
         read(text)
     message = re.sub(r"^(\d+)", lambda m: f"job.inp:{CUBE.count(chr(10)) + 1 + int(m[1])}", WRONG[text])
     assert message in str(caught.value)
+
+
+def test_a_deck_without_nodes_says_which_is_missing(read: Read) -> None:
+    with pytest.raises(kl.InputError, match=r"job\.inp:5: element 1 names node 1, which is not there"):
+        read(STEP, re.sub(r"(?m)^\d,[01],[01],[01]\n", "", CUBE))
 
 
 def test_weight_needs_a_density(read: Read) -> None:

@@ -64,6 +64,7 @@ BESIDE = {
     "some increments": (CUBE, f"{INCREMENTS}*NODE FILE,FREQUENCY=3\nU\n*NODE PRINT,NSET=TOP\nU\n*END STEP\n"
                         f"{INCREMENTS}*EL FILE\nS\n*END STEP\n"),
     "*OUTPUT": (CUBE, f"{INCREMENTS}*OUTPUT,FREQUENCY=2\n*NODE FILE\nU\n*END STEP\n"),
+    "words of other cards": (CUBE, f"*STEP\n*STATIC\n{PULLED}*NODE PRINT,NSET=TOP\nS,U\n*END STEP\n"),
     "nothing": (CUBE, f"*STEP\n*STATIC\n{PULLED}*END STEP\n"),
     "rectangular": (TILTED, AXES.format("\n1.,2.,0.,-1.,1.,.5") + LOCAL),
     "cylindrical": (TILTED, AXES.format(",SYSTEM=CYLINDRICAL\n-1.,.3,0.,-1.,.3,1.") + LOCAL),

@@ -237,6 +237,15 @@ def test_a_deck_without_steps_is_a_model(read: Read) -> None:
     assert np.abs(u[:4]).max() == 0
 
 
+def test_a_preload_without_loads_leaves_the_frequencies(read: Read) -> None:
+    ask = "*FREQUENCY\n3\n*END STEP\n"
+    after_rest = read(f"*STEP\n*STATIC\n*END STEP\n*STEP, PERTURBATION\n{ask}").then[0]
+    found, expected = (kl.run(case).modes for case in (after_rest, read(f"*STEP\n{ask}")))
+    assert found is not None
+    assert expected is not None
+    assert np.abs(found[0] - expected[0]).max() == 0
+
+
 KINEMATIC = PLASTIC.replace("*PLASTIC", "*PLASTIC, HARDENING=KINEMATIC")
 REDUCED = CUBE.replace("C3D8,", "C3D8I,")
 NEXT = "*STEP\n*STATIC\n*CLOAD\nTOP,3,1.\n*END STEP\n"
