@@ -166,6 +166,8 @@ class Deck:
                 self._of_material(card)
                 continue
             if keyword in NO_EFFECT:
+                if "READ" in card.options:
+                    card.wrong("a start from the state of another job is not supported")
                 ignored.add(keyword)
                 continue
             self._material = None

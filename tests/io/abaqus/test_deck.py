@@ -156,6 +156,7 @@ STEP = "*STEP\n*STATIC\n*END STEP\n"
 WRONG = {  # what is added to the cube, and the message, which begins with the line in that, from 0
     "*STEP\n*STATIC\n": "0: *STEP: the step is not ended by *END STEP",
     "*FOO\n" + STEP: "0: *FOO: this card is not known",
+    "*RESTART, READ, STEP=1\n" + STEP: "*RESTART: a start from the state of another job is not supported",
     "*CONTACT PAIR, INTERACTION=A\n" + STEP: "*CONTACTPAIR: contact is not supported",
     "*STEP\n*STATIC\n*CLOAD\n99,1,1.\n*END STEP\n": "3: there is no node 99",
     "*STEP\n*STATIC\n*CLOAD\n7,1,1.\n99,1,1.\n*END STEP\n": "4: there is no node 99",
