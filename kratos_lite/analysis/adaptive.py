@@ -23,7 +23,7 @@ from kratos_lite.analysis.adaptive_levels import Level, QuantityLevel, layer_dir
 from kratos_lite.analysis.error_estimate import curved
 from kratos_lite.analysis.peak import peak
 from kratos_lite.analysis.prepared import LoadSet
-from kratos_lite.analysis.quantities import Quantity
+from kratos_lite.analysis.quantities_of_interest import Quantity
 from kratos_lite.analysis.report import RefinementStep, Report
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.static import StaticAnalysis

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from kratos_lite.analysis.error_estimate import FEW, NEGLIGIBLE, QuantityError
-from kratos_lite.analysis.quantities import Quantity
+from kratos_lite.analysis.quantities_of_interest import Quantity
 from kratos_lite.analysis.report import RefinementStep
 from kratos_lite.analysis.result import Result
 from kratos_lite.assembly.gauss_point_fields import totals, volumes

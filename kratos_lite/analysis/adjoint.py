@@ -12,13 +12,13 @@ import numpy as np
 
 from kratos_lite.analysis.fields import Fields
 from kratos_lite.analysis.nodal_loads import nodal_forces
-from kratos_lite.analysis.quantities import Compliance, Quantity
+from kratos_lite.analysis.quantities_of_interest import Compliance, Quantity
 from kratos_lite.assembly.attached import Attached
 from kratos_lite.assembly.gauss_point_fields import internal_load, virtual_work, work_by_coordinates
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model.free_motions import FreeMotions
+from kratos_lite.model.loads.merging import joined
 from kratos_lite.model.loads.temperature import heated
-from kratos_lite.model.loads.together import joined
 from kratos_lite.model.local_axes import Cartesian
 from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.analysis.adaptive import check_geometry, check_quantity
-from kratos_lite.analysis.quantities import Quantity
+from kratos_lite.analysis.quantities_of_interest import Quantity
 from kratos_lite.errors import InputError
 from kratos_lite.mesh.refinement import refine
 from kratos_lite.model.refined import refined

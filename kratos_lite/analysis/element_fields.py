@@ -18,7 +18,7 @@ from kratos_lite.typing import Array, Csr
 from kratos_lite.validation import choice, short
 
 if TYPE_CHECKING:
-    from kratos_lite.assembly.recovery import Recovery
+    from kratos_lite.assembly.nodal_recovery import Recovery
     from kratos_lite.mesh.locate import Located
     from kratos_lite.model.local_axes import LocalAxes
     from kratos_lite.model.ties import Coupling
@@ -59,7 +59,7 @@ class ElementFields:
         if place == "gauss":
             return in_order(self.groups, [at_gauss(points, g, u, stress=stress) for g in self.groups])
         if place == "raw":
-            from kratos_lite.assembly.nodal_values import extrapolated
+            from kratos_lite.assembly.nodal_extrapolation import extrapolated
 
             return in_order(self.groups, [extrapolated(points, g, u, stress=stress) for g in self.groups])
         if place == "node":
@@ -84,8 +84,8 @@ class ElementFields:
         InputError
             An element class has a strain of its own, but no B-operator.
         """
-        from kratos_lite.assembly.nodal_values import at_located  # as for the recovery
-        from kratos_lite.assembly.recovery import recovered_at
+        from kratos_lite.assembly.nodal_extrapolation import at_located  # as for the recovery
+        from kratos_lite.assembly.nodal_recovery import recovered_at
 
         if recovered:
             return recovered_at(self._recovery, located, self._strained, stress=stress)
@@ -93,13 +93,13 @@ class ElementFields:
 
     @cached_property
     def _recovery(self) -> Recovery:
-        from kratos_lite.assembly.recovery import Recovery  # a quick start for results
+        from kratos_lite.assembly.nodal_recovery import Recovery  # a quick start for results
 
         return Recovery(self.mesh, self.groups)
 
     def _averages(self, stress: bool) -> tuple[Array, Array]:
         """Return the mean over the volume of each element (m, 6) and averaged nodal values (n, 6)."""
-        from kratos_lite.assembly.nodal_values import averages  # as for the recovery
+        from kratos_lite.assembly.nodal_extrapolation import averages  # as for the recovery
 
         mesh = self.mesh
         return averages(mesh.points, self.groups, self._strained, mesh.n_elements, stress=stress)
@@ -277,7 +277,7 @@ class ElementFields:
 
     def _extrapolated(self, values: list[Array], place: str) -> Any:
         """Return values (m, g, ...) of the groups at nodes of elements, or averaged there."""
-        from kratos_lite.assembly.nodal_values import averaged, extrapolation  # as for the recovery
+        from kratos_lite.assembly.nodal_extrapolation import averaged, extrapolation  # as for the recovery
 
         tail = values[0].shape[2:]
         flat = [value.reshape(*value.shape[:2], -1) for value in values]
@@ -298,7 +298,7 @@ class ElementFields:
         -------
         (..., parts)
         """
-        from kratos_lite.assembly.nodal_values import extrapolated_at  # as for the recovery
+        from kratos_lite.assembly.nodal_extrapolation import extrapolated_at  # as for the recovery
 
         tail: tuple[int, ...] = ()
 

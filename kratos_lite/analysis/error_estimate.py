@@ -20,8 +20,8 @@ from kratos_lite.tabular import unit_name
 from kratos_lite.typing import Array, Mask
 
 if TYPE_CHECKING:
-    from kratos_lite.analysis.quantities import Quantity
-    from kratos_lite.assembly.recovery import Recovery
+    from kratos_lite.analysis.quantities_of_interest import Quantity
+    from kratos_lite.assembly.nodal_recovery import Recovery
     from kratos_lite.model.structure import Structure
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from kratos_lite.analysis.harmonic import HarmonicLoads, HarmonicResponse
     from kratos_lite.analysis.matrices import LocalSystem, Matrices
     from kratos_lite.analysis.preload import Preload
-    from kratos_lite.analysis.quantities import Quantity
+    from kratos_lite.analysis.quantities_of_interest import Quantity
     from kratos_lite.analysis.quasi_static import QuasiStaticAnalysis
     from kratos_lite.analysis.transient import TransientAnalysis
 

@@ -13,8 +13,8 @@ from kratos_lite.mesh.facets import unit_normals
 from kratos_lite.mesh.selection import spread
 from kratos_lite.model.attachments import MARKS, SHOWN
 from kratos_lite.model.loads.base import Drawn, Load
+from kratos_lite.model.loads.merging import joined
 from kratos_lite.model.loads.temperature import Temperature
-from kratos_lite.model.loads.together import joined
 from kratos_lite.model.structure import Structure
 from kratos_lite.model.supports import AXES, DirichletCondition, axis_numbers
 from kratos_lite.tabular import in_units

@@ -16,8 +16,8 @@ from kratos_lite.model.checks import check_carried
 from kratos_lite.model.loads import Load, TimeDependentLoad
 from kratos_lite.model.loads.base import InTime
 from kratos_lite.model.loads.body import Gravity
+from kratos_lite.model.loads.merging import joined
 from kratos_lite.model.loads.temperature import Temperature, heated
-from kratos_lite.model.loads.together import joined
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.tangents import Changes

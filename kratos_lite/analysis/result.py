@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from kratos_lite.analysis.error_estimate import ErrorEstimate, QuantityError
     from kratos_lite.analysis.point_values import LineValues, PointValues
-    from kratos_lite.analysis.quantities import Quantity
+    from kratos_lite.analysis.quantities_of_interest import Quantity
     from kratos_lite.analysis.section import Section
     from kratos_lite.mesh.locate import Located
     from kratos_lite.model.local_axes import LocalAxes
@@ -318,7 +318,7 @@ class Result(ElementFields, Tabular):
             return self._error
         analysis = self._current_analysis("the error of a quantity")
         from kratos_lite.analysis.error_estimate import error_of
-        from kratos_lite.analysis.quantities import Quantity
+        from kratos_lite.analysis.quantities_of_interest import Quantity
 
         quantity = instance(of, "of", Quantity, "kl.DisplacementAt((1, 0, 0), 'z')")
         how = analysis.adjoint, analysis.model, self._strained, self._recovery
@@ -370,7 +370,7 @@ class Result(ElementFields, Tabular):
         [5e-06]
         """
         from kratos_lite.analysis.adjoint import gradient_of  # rarely needed
-        from kratos_lite.analysis.quantities import Quantity
+        from kratos_lite.analysis.quantities_of_interest import Quantity
 
         quantity = instance(of, "of", Quantity, "kl.DisplacementAt((1, 0, 0), 'z')")
         self._check_linear("a gradient")

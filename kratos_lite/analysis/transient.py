@@ -19,7 +19,7 @@ from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.integrators.base import INTEGRATORS, ModelIntegrator, check_stable
 from kratos_lite.analysis.integrators.generalized_alpha import Newmark
 from kratos_lite.analysis.modal import critical_rates
-from kratos_lite.analysis.nonlinear_motion import NonlinearMotion
+from kratos_lite.analysis.nonlinear_equations import NonlinearEquations
 from kratos_lite.analysis.result import Result, result_of
 from kratos_lite.analysis.solution_checks import check_deformation
 from kratos_lite.analysis.state import MODEL_FIELDS, ModelInTime, State, check_state
@@ -94,7 +94,7 @@ class TransientAnalysis(ModelInTime):
         if not isinstance(self.integrator, ModelIntegrator):
             raise InputError(f"an integrator such as Newmark() or its name is needed; got {integrator!r}")
         lumped = flag(lumped, "lumped") or self.integrator.lumps_mass
-        kind = NonlinearMotion if model.is_nonlinear else EquationsOfMotion
+        kind = NonlinearEquations if model.is_nonlinear else EquationsOfMotion
         plain = not model.is_nonlinear and model.motion is None
         how: dict[str, Any] = {"solver": "auto", "use": "steps"} if plain else {}
         e = kind(model, lumped=lumped, rayleigh=rayleigh, progress=progress, **how)

@@ -1,4 +1,4 @@
-"""Inertia: the matrices of the mass of elements, at rest or flowing through their mesh.
+"""Mass and convective matrices of elements, at rest or flowing through their mesh.
 
     M_ij = ∫ ρ N_i N_j,    G_ij = ∫ ρ N_i c·grad N_j,    H_ij = ∫ ρ (c·grad N_i)(c·grad N_j)
 

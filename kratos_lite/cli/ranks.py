@@ -109,13 +109,13 @@ def solve_parts(options: Namespace) -> tuple[list[str], list[str]]:
 
 
 def _solve_part(ranks: Alone, options: Namespace) -> tuple[list[str], list[str]]:
-    from kratos_lite.analysis.part_analysis import solve_part
+    from kratos_lite.analysis.partitioned_static import solve_part
     from kratos_lite.cli.apply_options import case_of
     from kratos_lite.distributed.partition import Partition
     from kratos_lite.io.outputs import check_outputs
     from kratos_lite.io.run import check_case
     from kratos_lite.io.runners.outcome import Outcome
-    from kratos_lite.io.writers.pieces import write_pieces
+    from kratos_lite.io.writers.pvtu import write_pieces
 
     with ranks.agree_on_errors():
         case = case_of(options, part=ranks.rank)

@@ -8,7 +8,7 @@ from meshes import KINDS
 
 import kratos_lite as kl
 from kratos_lite.analysis.error_estimate import SAFETY
-from kratos_lite.assembly.recovery import Recovery
+from kratos_lite.assembly.nodal_recovery import Recovery
 from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.verification import fields, scenes
 from kratos_lite.verification.meshes import on_boundary, straight

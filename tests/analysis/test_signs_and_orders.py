@@ -6,7 +6,7 @@ import pytest
 import kratos_lite as kl
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.solution_checks import check_solution
-from kratos_lite.assembly.nodal_values import extrapolation
+from kratos_lite.assembly.nodal_extrapolation import extrapolation
 from kratos_lite.errors import SolveError
 from kratos_lite.model.checks import equilibrium
 from kratos_lite.solvers.constraints import rigid_modes

@@ -8,7 +8,7 @@ from rounding import all_close, close
 from systems import stiffness_of
 
 import kratos_lite as kl
-from kratos_lite.assembly import element_groups, mass_and_convection, nodal_values
+from kratos_lite.assembly import element_groups, mass_and_convection, nodal_extrapolation
 from kratos_lite.assembly import gauss_point_fields as fields
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.model import checks
@@ -51,7 +51,7 @@ def everything(points, groups, u):
         found[f"strain {i}"] = fields.at_gauss(points, group, u, stress=False)
     found["internal load"] = fields.internal_load(points, groups, u)
     for what in (True, False):
-        means, nodal = nodal_values.averages(points, groups, u, m, stress=what)
+        means, nodal = nodal_extrapolation.averages(points, groups, u, m, stress=what)
         found |= {f"means {what}": means, f"nodal {what}": nodal}
     for name, value in zip(("energy", "mises", "row"), fields.totals(points, groups, u), strict=True):
         found[name] = np.array(value)
@@ -206,7 +206,7 @@ def test_nodal_values_of_a_uniform_strain_are_that_strain_however_many_elements_
     mesh = kl.box(cells=(2, 2, 1))
     strain = 1e-3 * np.array([1.0, -2.0, 3.0, 0.0, 0.0, 0.0])
     groups = kl.Model(mesh, WOOD).element_groups()
-    means, nodal = nodal_values.averages(
+    means, nodal = nodal_extrapolation.averages(
         mesh.points, groups, mesh.points * strain[:3], mesh.n_elements, stress=False
     )
     for found in (means, nodal):

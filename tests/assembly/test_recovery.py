@@ -9,10 +9,10 @@ from meshes import KINDS
 
 import kratos_lite as kl
 from kratos_lite import voigt
-from kratos_lite.assembly import polynomial_fit, recovery
+from kratos_lite.assembly import nodal_recovery, polynomial_fit
+from kratos_lite.assembly.nodal_recovery import Recovery, sampling
 from kratos_lite.assembly.patches import patches
 from kratos_lite.assembly.polynomial_fit import Lists, Samples, fit, lists
-from kratos_lite.assembly.recovery import Recovery, sampling
 from kratos_lite.mesh.refinement import refine
 from kratos_lite.verification import scenes
 from kratos_lite.verification.errors import errors
@@ -25,7 +25,7 @@ STEEL = kl.Isotropic3D(E=210e9, nu=0.3)
 def numpy_alone(monkeypatch):
     """Compute with the reference of the kernels."""
     monkeypatch.setattr(polynomial_fit, "kernels", lambda name: None)
-    monkeypatch.setattr(recovery, "kernels", lambda name: None)
+    monkeypatch.setattr(nodal_recovery, "kernels", lambda name: None)
     monkeypatch.setattr("kratos_lite.assembly.patches.kernels", lambda name: None)
 
 
@@ -124,7 +124,7 @@ def test_nodes_have_their_fraction_of_what_polynomials_leave_of_the_samples(kind
 
     def recovered(factor):
         way = replace(plain, to_nodes=factor * plain.to_nodes / plain.to_nodes.sum(axis=1).mean())
-        monkeypatch.setattr(recovery, "sampling", lambda *_: way)
+        monkeypatch.setattr(nodal_recovery, "sampling", lambda *_: way)
         return region.at_nodes(mesh.points, [values])
 
     polynomials, whole = recovered(0.0), recovered(1.0)

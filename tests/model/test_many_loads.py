@@ -8,7 +8,7 @@ import pytest
 import kratos_lite as kl
 from kratos_lite.analysis.nodal_loads import external_loads
 from kratos_lite.model.loads.base import Load, equal_loads
-from kratos_lite.model.loads.together import joined
+from kratos_lite.model.loads.merging import joined
 
 STEEL = kl.Isotropic3D(E=210e9, nu=0.3, density=7850.0)
 MESH = kl.box((2.0, 1.0, 1.0), (4, 3, 3))

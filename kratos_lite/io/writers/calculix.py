@@ -11,7 +11,7 @@ import numpy as np
 from kratos_lite import voigt
 from kratos_lite.analysis.element_fields import ElementFields
 from kratos_lite.analysis.fields import GaussPoints, known
-from kratos_lite.assembly import nodal_values
+from kratos_lite.assembly import nodal_extrapolation
 from kratos_lite.assembly.gauss_point_fields import internal_load
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.model import reference_nodes
@@ -47,7 +47,7 @@ def extrapolation(element: type[KinematicLinear], rule: Rule) -> Array:
     Corners have a fit of the functions of the corner cell, with the digits that CalculiX keeps, and mid-edge
     nodes the mean of two corners; with 27 points all nodes have a fit of their own functions.
     """
-    shape, matrix = element.shape, nodal_values.extrapolation(element, rule)
+    shape, matrix = element.shape, nodal_extrapolation.extrapolation(element, rule)
     kind = shape.__name__, len(rule)
     if kind == ("Hexahedron20", 27):
         return np.asarray(np.linalg.pinv(at_points(shape.N, rule.points)).round(5))
@@ -82,7 +82,7 @@ def at_gauss(result: ElementFields, name: str) -> list[Array]:
 def averaged(result: ElementFields, name: str) -> Array | None:
     """Return a field (n, c), extrapolated and averaged at nodes."""
     values, how = at_gauss(result, name), (result.mesh.n_nodes, extrapolation)
-    return nodal_values.averaged(result.groups, values, *how) if values else None
+    return nodal_extrapolation.averaged(result.groups, values, *how) if values else None
 
 
 def forces(result: Any) -> Array:

@@ -40,7 +40,7 @@ def write_result(path: str | Path, result: Result, mode: str | None = None) -> N
 
         write_frd(path, result.mesh, [FrdStep(at_nodes(result))])
     elif ending == ".pvtu":
-        from kratos_lite.io.writers.pieces import write_pieces  # rarely needed
+        from kratos_lite.io.writers.pvtu import write_pieces  # rarely needed
 
         write_pieces(path, result, mode or "binary")
     elif ending == ".vtu":

@@ -12,7 +12,7 @@ import numpy as np
 from kratos_lite.analysis.fields import COMPONENTS, Fields
 from kratos_lite.assembly.element_groups import ElementGroup, add_nodal
 from kratos_lite.assembly.gauss_point_fields import volumes
-from kratos_lite.assembly.nodal_values import at_located, strain_of
+from kratos_lite.assembly.nodal_extrapolation import at_located, strain_of
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import ModelError
 from kratos_lite.mesh import Where, mask_of

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from kratos_lite.analysis.fields import fields
-from kratos_lite.analysis.part_analysis import PartResult
+from kratos_lite.analysis.partitioned_static import PartResult
 from kratos_lite.analysis.result import Result
 from kratos_lite.atomic import all_or_none, write_whole
 from kratos_lite.distributed.communicator import ALONE, Alone

@@ -1,4 +1,4 @@
-"""Together: of many loads, constant ones that differ in faces and size alone are evaluated as one load."""
+"""Merging: of many loads, constant ones that differ in faces and size alone are evaluated as one load."""
 
 from __future__ import annotations
 

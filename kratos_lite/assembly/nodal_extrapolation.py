@@ -1,4 +1,4 @@
-"""Nodal values: stresses and strains at Gauss points, extrapolated to nodes and averaged there; at points."""
+"""Nodal extrapolation: stresses and strains at Gauss points taken to nodes and averaged there; at points."""
 
 from __future__ import annotations
 

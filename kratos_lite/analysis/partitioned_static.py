@@ -1,4 +1,4 @@
-"""Static analysis of a mesh in parts, one for each process: each solves an ordinary model of its part."""
+"""Static analysis of a mesh in parts, one for each process, which solves an ordinary model of its part."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Recovered nodal values: stresses or strains of patches of elements, fitted by polynomials.
+"""Nodal recovery: the nodal stresses and strains of results, polynomials fitted to patches of elements.
 
 Coarse and curved meshes, and nodes on the surface, are where a polynomial cannot follow the samples of the
 elements at its node: the mean of what it leaves of them, extrapolated to the node, is added.
@@ -17,7 +17,7 @@ import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, as_double
 from kratos_lite.assembly.gauss_point_fields import at_gauss, volumes
-from kratos_lite.assembly.nodal_values import extrapolation
+from kratos_lite.assembly.nodal_extrapolation import extrapolation
 from kratos_lite.assembly.patches import Patches, outer_corners, patches
 from kratos_lite.assembly.polynomial_fit import Lists, Polynomials, Samples, as_rows, fit, lists
 from kratos_lite.elements import KinematicLinear

@@ -43,7 +43,7 @@ Known: TypeAlias = tuple[Array, BlockMatrix, Changes]
 """Forces (3a,) that do not balance, effective matrix and tangent of the loads, at some displacements."""
 
 
-class NonlinearMotion(EquationsOfMotion):
+class NonlinearEquations(EquationsOfMotion):
     """Equations of motion whose stiffness follows the displacements; damping is that of the initial one.
 
     What loads that follow the body have beyond those on the undeformed one counts as internal forces.
