@@ -74,6 +74,12 @@ class Registry(Generic[T]):
         self._import(name)
         return self._items[name]
 
+    def attribute(self, name: str) -> T:
+        """Return an item by its own name, as an attribute of the package that registers it."""
+        if not self._has(name):
+            raise AttributeError(f"there is no {self.kind} {name!r}")
+        return self[name]
+
     def __contains__(self, name: object) -> bool:
         if not (self._has(name) or name in self._aliases):
             self._import(*self._expected)  # one of the modules may add it as an alias

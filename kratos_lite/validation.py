@@ -269,6 +269,6 @@ def instance(
 
 
 def short(value: Any) -> str:
-    """Return a value as text of at most 100 characters, for a message."""
-    text = repr(value)
+    """Return a value as one line of at most 100 characters, for a message."""
+    text = " ".join(repr(value).split())  # arrays have lines
     return text if len(text) <= 100 else text[:97] + "..."

@@ -4,6 +4,7 @@ import sys
 
 import pytest
 
+import kratos_lite as kl
 from kratos_lite.errors import InputError
 from kratos_lite.registry import Registry
 
@@ -55,6 +56,15 @@ def test_an_unknown_name_is_refused_after_all_modules_have_been_asked_and_a_few_
     with pytest.raises(InputError, match=r"unknown color 'xyz'\. There are Red, Blue"):
         colors["xyz"]
     assert imported() == {"Red", "Blue"}
+
+
+def test_classes_are_attributes_of_the_packages_that_register_them():
+    from kratos_lite.elements import KinematicLinear3D8N
+    from kratos_lite.materials import Isotropic3D
+
+    assert (KinematicLinear3D8N, Isotropic3D) == (kl.KinematicLinear3D8N, kl.Isotropic3D)
+    with pytest.raises(ImportError, match="Isotropci3D"):
+        from kratos_lite.materials import Isotropci3D  # noqa: F401
 
 
 def test_values_import_all_or_those_whose_names_end_alike(colors):

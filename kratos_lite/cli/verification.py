@@ -56,6 +56,7 @@ def _elements_of(path: Path) -> list[str]:
 
 def _printed(names: list[str], elements: list[str]) -> list[Row]:
     """Print failures as they come and the other rows at the end, also after Ctrl-C."""
+    chosen(names)  # no table where one is unknown
     rows: list[Row] = []
     reported: set[str] = set()
     width = max([9, *(len(short(name)) + 1 for name in elements or ELEMENTS)])

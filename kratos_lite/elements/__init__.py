@@ -17,3 +17,5 @@ for _count in (4, 5, 6, 8, 10, 13, 15, 20, 27):
     _name = f"TotalLagrangianElement3D{_count}N"
     _alias = _name.replace("Total", "Updated")
     ELEMENTS.expect(_name, f"{__name__}.total_lagrangian_elements", [_alias])
+# for ``from kratos_lite.elements import …``; whose types are those of `kratos_lite`
+globals()["__getattr__"] = ELEMENTS.attribute

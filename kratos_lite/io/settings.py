@@ -11,7 +11,7 @@ from os.path import isdir
 from pathlib import Path
 from typing import Any, TypeVar
 
-from kratos_lite.errors import InputError, KratosLiteError, nearest
+from kratos_lite.errors import InputError, KratosLiteError, nearest, no_such_file
 from kratos_lite.io.text import line_column, read_bytes
 
 T = TypeVar("T")
@@ -209,7 +209,7 @@ def find_file(
             settings.files.append(other)
             where = f"{path.name} beside the run file" if other.parent == folder else str(other)
             return other, f"{name} is not there; {where} is read"
-    raise settings.error(key, f"there is no file {folder / name}; correct the name")
+    raise settings.error(key, str(no_such_file(folder / name)))
 
 
 # ---- JSON: read by the standard library, strict, with comments --------------------------------------------

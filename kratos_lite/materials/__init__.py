@@ -14,3 +14,5 @@ for _file in sorted(os.listdir(__path__[0])):
     if _file.endswith("3d.py"):
         _name = _file[:-5].title().replace("_", "")
         MATERIALS.expect(f"{_name}3D", f"{__name__}.{_file[:-3]}")
+# for ``from kratos_lite.materials import …``; whose types are those of `kratos_lite`
+globals()["__getattr__"] = MATERIALS.attribute

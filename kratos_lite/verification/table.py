@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 from fnmatch import fnmatchcase
 from itertools import groupby
@@ -32,7 +33,8 @@ def chosen(names: Sequence[str] = ()) -> list[Problem]:
     for name in names:
         if not any(_fits(problem, name) for problem in PROBLEMS):
             families = dict.fromkeys(problem.partition("/")[0] for problem in PROBLEMS)
-            hint = nearest(name, [*PROBLEMS, *families])
+            words = (f"*{word}*" for problem in PROBLEMS for word in re.split("[/_]", problem))
+            hint = nearest(name, [*families, *PROBLEMS, *words])
             raise InputError(f"no problem fits {name!r}; the families are {', '.join(families)}.{hint}")
     return [problem for problem in PROBLEMS.values() if any(_fits(problem.name, name) for name in names)]
 

@@ -254,6 +254,8 @@ def test_the_same_everywhere_by_a_function_or_a_number():
         (kl.Pressure("x+", lambda X: "deep"), "a pressure must be made of real numbers"),
         (kl.Pressure("x+", lambda X: X[:, 0] * np.nan), "a pressure must be finite"),
         (kl.Traction("x+", lambda X: X[:, 0]), r"a traction at places \(m, 3\) must have shape \(m, 3\)"),
+        (kl.Traction("x+", lambda X: tuple(X.T)), r"got \(3, \d+\); np.column_stack\(\(fx, fy, fz\)\) joins"),
+        (kl.Traction("x+", lambda X: (0, 0, X[:, 2])), r"real numbers; .* np.column_stack"),
     ],
 )
 def test_functions_of_places_that_return_nonsense(load, words):

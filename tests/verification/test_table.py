@@ -261,10 +261,11 @@ def test_the_command_lists_and_refuses(folder, capsys):
     Path("none.py").write_text("x = 1")
     for words, text in (
         (["nothing"], "no problem fits 'nothing'"),
+        (["cylindre"], "Did you mean *cylinder*"),
         (["patch", "--element", "3D9N"], "unknown element '3D9N'"),
         (["patch", "-o", "page.txt"], "is written as .md or .json"),
         (["none.py"], "none.py: defines no element"),
-        (["gone.py"], "gone.py: cannot be read"),
+        (["gone.py"], "gone.py: there is no such file"),
     ):
         assert main(["verify", *words]) == 2
         assert text in capsys.readouterr().err

@@ -17,7 +17,7 @@ from kratos_lite.mesh import Mesh
 from kratos_lite.model.local_axes import LocalAxes
 from kratos_lite.time_series import Factor, TimeSeries, function_of
 from kratos_lite.typing import Array, ArrayLike, Ints, Rows
-from kratos_lite.validation import finite, flag, instance, of_places, short, takes
+from kratos_lite.validation import finite, flag, instance, of_places, reals, short, takes
 
 if TYPE_CHECKING:
     from kratos_lite.mesh.refined_mesh import RefinedMesh
@@ -371,11 +371,12 @@ def at_places(function: OfPlace, what: str, width: tuple[int, ...]) -> Callable[
     """Return a function of places (..., 3) that checks what the given one of (m, 3) returns."""
 
     def checked(X: Array) -> Array:
-        given = of_places(function, X.reshape(-1, 3), what)
-        values, m = finite(given, what), X[..., 0].size
+        given, m = of_places(function, X.reshape(-1, 3), what), X[..., 0].size
+        cure = "np.column_stack((fx, fy, fz)) joins components (m,)" if width else ""
+        values = finite(reals(given, what, cure=cure), what)
         if values.shape not in ((m, *width), width):
-            shape = "(m, 3)" if width else "(m,)"
-            raise InputError(f"{what} at places (m, 3) must have shape {shape}; got {values.shape}")
+            shape, cure = ("(m, 3)", f"; {cure}") if width else ("(m,)", "")
+            raise InputError(f"{what} at places (m, 3) must have shape {shape}; got {values.shape}{cure}")
         return np.broadcast_to(values, (m, *width)).reshape(*X.shape[:-1], *width)
 
     return checked

@@ -98,7 +98,10 @@ BAD = [
     (changed(step=1e-9), "more than 1000000 steps"),
     (changed(end=0.0), "no step is solved"),
     (NO_END, "key 'problem_data.end_time' is missing"),
-    (imported(input_type="mdpa", input_filename="bix"), "there is no file"),
+    (
+        imported(input_type="mdpa", input_filename="bix"),
+        "bix.mdpa: there is no such file. Did you mean box.mdpa?",
+    ),
     (imported(input_filename="../box"), "leaves the folder"),
     (imported(input_filename="/box"), "leaves the folder"),
     (imported(input_type="use_input_model_part"), "input_type 'use_input_model_part' is not supported"),

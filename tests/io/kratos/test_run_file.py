@@ -142,7 +142,7 @@ def test_files_are_found_from_a_folder_above_where_kratos_is_started(folder):
     for name in ("box.mdpa", "materials.json"):
         assert f"{folder.name}/{name} is not there; {folder / name} is read" in notes
     path.write_text(text.replace(folder.name, "elsewhere"))
-    with pytest.raises(InputError, match="there is no file"):
+    with pytest.raises(InputError, match="there is no such file"):
         read_case(path)
 
 
