@@ -42,6 +42,9 @@ class MaterialPath:
     variables: dict[str, Array]
     tangent: Array
 
+    def __repr__(self) -> str:
+        return f"MaterialPath({self.law!r}, {len(self.time) - 1} steps to t = {self.time[-1]:g} s)"
+
     def columns(self) -> dict[str, Numbers]:
         """Return time, strains, stresses and internal variables, by headers with units.
 
@@ -196,6 +199,6 @@ def _step(
         if not np.isfinite(e).all():
             break
     raise SolveError(
-        f"{type(law).__name__}: no strain with the stresses asked for was found; take more steps, or "
+        f"{type(law).__name__}: no strain gives the requested stresses; take more steps, or "
         "prescribe strains beyond the strength of the law"
     )

@@ -271,7 +271,7 @@ class StaticAnalysis:
             )
         equations = self._equations if moving.any() else None
         if equations and equations.n_at_rest:
-            skipped.append(f"{equations.n_at_rest} elements, as all their nodes are held")
+            skipped.append(f"{equations.n_at_rest} elements, as all their nodes are constrained")
         if self._dirichlet.count:
             skipped.append(f"{self._dirichlet.count} prescribed degrees of freedom")
         if unused := int((~state.used).sum()):

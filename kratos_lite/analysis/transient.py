@@ -133,7 +133,7 @@ class TransientAnalysis(ModelInTime):
         if off[node, axis] > OFF_SUPPORT * np.abs(u).max(initial=0.0):
             name = self.model.supports.name(3 * int(self.equations.system.nodes[node]) + int(axis))
             raise InputError(
-                f"{what} does not fit the supports: {name} is {off[node, axis]:g} m off from where it is held"
+                f"{what} does not fit the supports: {name} is {off[node, axis]:g} m off its prescribed value"
             )
 
     def _nodal(self, values: ArrayLike, what: str) -> Array:

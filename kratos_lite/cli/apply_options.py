@@ -54,7 +54,7 @@ def case_of(options: Namespace, part: int | None = None) -> Case:
         omitted = [n for n in each.model.notes if isinstance(n, Omission)] if each.is_of_model else []
         if options.strict and omitted:
             raise InputError(
-                "\n".join([f"{options.input}: --strict: not all that is asked for is done:", *omitted])
+                "\n".join([f"{options.input}: --strict: not everything requested is done:", *omitted])
             )
     return case
 

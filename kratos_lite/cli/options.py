@@ -30,7 +30,7 @@ RESTART = "go on from a state that --state wrote; files hold the rest alone, so 
 STRESS_FREE = "do not take the DISPLACEMENT of free nodes in the file for the state without stress"
 SECTION = "force, moment and area of a cut: by a plane, x=0.5 or BOLT:x=0.5 of one part, or around a part"
 UNITS = "consistent units of all numbers here and in the file, a label: auto, mm N MPa t … (SI)"
-VTU = "how .vtu files store their numbers: quickest, smallest, or to be read by eye (binary)"
+VTU = "how .vtu files store their numbers: fastest, smallest, or readable by eye (binary)"
 
 
 class Option(NamedTuple):

@@ -98,7 +98,7 @@ def stiffness(element: Any, C: Array) -> Array:
     miss, size = np.abs(r - K[first] @ u.ravel()).max(), np.abs(K[first]).max() * np.abs(u).max()
     if not miss <= LINEAR * size:
         raise InputError(
-            f"{name}.local_system is not linear: at a random u, r_int misses K u by {miss / size:.1e} of "
+            f"{name}.local_system is not linear: at a random u, r_int is not K u, by {miss / size:.1e} of "
             "|K| |u|; elements of small strains return K, and r_int = K u"
         )
     miss, size = np.abs(K - np.swapaxes(K, -1, -2)).max(), np.abs(K).max()

@@ -406,7 +406,7 @@ class Supports:
         dofs = np.append(self.dependents().independents, self.followers.independents)
         for dof in dofs[~self.mesh.used_nodes()[dofs // 3] & ~self.fixed.flat[dofs]][:1]:
             raise ModelError(
-                f"equations leave {self.name(int(dof))} free, which no element uses; hold it and, if it is a "
+                f"equations leave {self.name(int(dof))} free, which no element uses; fix it and, if it is a "
                 "reference node, its rotations"
             )
         return []

@@ -192,7 +192,7 @@ def _cholesky(band: Array, width: int, dofs: Ints) -> Callable[[Array], Array]:
         node, axis = divmod(int(dofs[info - 1]), 3)
         raise SolveError(
             f"the matrix is not positive definite: the pivot of node row {node}, axis {'xyz'[axis]}, is "
-            "not > 0; the body has lost its stiffness or can still move; take a smaller step or hold it"
+            "not > 0; the body has lost its stiffness or can still move; take a smaller step or add supports"
         )
     return lambda b: dpbtrs(factor, b, lower=1, overwrite_b=1)[0]
 

@@ -345,7 +345,7 @@ def check(errors: Array, allowed: Array) -> None:
     if not (errors <= allowed).all():  # nor if one is NaN
         worst = int(np.argmax(np.nan_to_num(errors / allowed, nan=np.inf)))
         raise SolveError(
-            f"mode {worst + 1} misses its equation by {errors[worst]:.1e} of its "
+            f"mode {worst + 1} has a residual of {errors[worst]:.1e} of its "
             "terms, which is more than rounding explains; ask for another number of modes, and look for very "
             "thin elements, a large stiffness contrast or nearly free parts"
         )

@@ -61,7 +61,7 @@ def convergence_figure(
     unknowns, percent = unknowns[errors > 0], 100 * errors[errors > 0]
     axes.plot(unknowns, percent, "o-", color=BLUE, lw=1.8, ms=5, label="reported")
     if goal is not None:
-        axes.axhline(100 * goal, color=RED, lw=1.2, ls=(0, (4, 3)), label="asked for", zorder=1)
+        axes.axhline(100 * goal, color=RED, lw=1.2, ls=(0, (4, 3)), label="requested", zorder=1)
     for number, point in enumerate(zip(unknowns, percent, strict=True), 1):
         axes.annotate(str(number), point, (4, 4), textcoords="offset points", size=8, color="0.35")
     label(axes, "unknowns", f"error of {of} in %" if of else "error in %", title)

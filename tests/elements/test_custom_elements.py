@@ -308,7 +308,10 @@ def test_a_mixin_and_a_built_in_helper_are_refused_too():
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        (lambda K, u, r: (K, r + r**2), "Own.local_system is not linear: at a random u, r_int misses K u"),
+        (
+            lambda K, u, r: (K, r + r**2),
+            "Own.local_system is not linear: at a random u, r_int is not K u",
+        ),
         (lambda K, u, r: (K * (1 + abs(u).max()), r * (1 + abs(u).max())), "is not linear"),
         (lambda K, u, r: (K, r + 1.0), "is not linear"),
         (lambda K, u, r: (np.triu(K), (np.triu(K) @ u.ravel()).reshape(8, 3)), "K that is not symmetric"),

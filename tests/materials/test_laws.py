@@ -279,6 +279,7 @@ def test_the_pyramid_meets_the_strengths_of_mohr_and_coulomb(make):
         strength = tension if strain[-1] > 0 else -compression
         assert abs(uniaxial(law, strain, law.initial_state())[0][-1] / strength - 1) < 1e-9
     path = kl.material_point(law, {"xy": [2e-4]}, steps=20, confined=True)
+    assert repr(path).endswith("20 steps to t = 1 s)")  # no columns of numbers
     if make is kl.CoulombSoftening3D:  # dilatant and confined: the larger pressure carries more
         s = tensor(path.stress[-1].T).T
         ends = np.linalg.eigvalsh(s)[[2, 0]]

@@ -140,7 +140,7 @@ def test_what_was_held_may_be_moved_later():
     model = block((6, 2, 2))
     model.fix(lambda X: X[:, 0] < 1.1)
     ready = model.static()
-    assert any("all their nodes are held" in text for text in ready.solve().report.skipped)
+    assert any("all their nodes are constrained" in text for text in ready.solve().report.skipped)
     model.fix(lambda X: X[:, 0] < 1e-9, "x", 1e-3, override=True)
     after, expected = ready.solve(), model.solve()
     close(after.u, expected.u)

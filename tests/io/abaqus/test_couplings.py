@@ -218,7 +218,7 @@ def test_reference_nodes_are_no_forgotten_nodes(read: Read) -> None:
     assert [text for text in model.check() if "belong to no element" in text]
 
 
-LOOSE = "free, which no element uses; hold it and, if it is a reference node, its rotations"
+LOOSE = "free, which no element uses; fix it and, if it is a reference node, its rotations"
 WRONG = {  # text, and the message
     RIGID + STATIC + "*CLOAD\n20,5,1.\n": "rotations of the rigid body of node 20 are directions 1, 2, 3 of",
     RIGID + LARGE + "*BOUNDARY\n20,1,1,.1\n": "with NLGEOM its rotation must be held at 0",

@@ -178,7 +178,7 @@ def test_strict_refuses_a_file_of_which_kratos_would_do_more(folder, run, comman
     assert run(command, path).code == 0
     said = run(command, "--strict", path)
     assert said.refuses(
-        "--strict: not all that is asked for", "output_processes.files[0]: save_restart_process is not"
+        "--strict: not everything requested is done", "output_processes.files[0]: save_restart_process is not"
     )
     write(folder, content | {"output_proceses": {}})
     assert run(command, path).code == 0
