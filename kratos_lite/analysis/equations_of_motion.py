@@ -21,7 +21,7 @@ from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.linear_solver import LinearSolver
 from kratos_lite.solvers.mass import Mass
-from kratos_lite.solvers.plan import LIGHT, Facts, Plan, choose
+from kratos_lite.solvers.plan import LIGHT, Facts, choose
 from kratos_lite.typing import Array, Mask, Progress
 from kratos_lite.validation import finite
 
@@ -179,7 +179,7 @@ class EquationsOfMotion:
         cure = "let it turn about a principal axis through its center of mass"
         self.free_motions.check([(np.arange(len(load)), load)], moving=True, cure=cure)
         held = system.constraint_map.holding(self.free_motions.constrained[system.nodes])
-        equations = LinearSolver(self.K, held, system.points, Plan("direct"))
+        equations = replace(system.equations, constraint_map=held)
         u0 = equations.solve(system.gather(load), 1e-12, system.progress, np.zeros_like(held.c)).x
         return self.terms.stiffening(u0.reshape(-1, 3))
 
@@ -309,7 +309,8 @@ class EquationsOfMotion:
         plan = choose("auto", Facts(n, use="steps"))
         nodal, symmetric = mass * self.mass.nodal, self.is_symmetric(time, c)
         made = replace(made, plan=plan, mass=nodal, symmetric=symmetric)
-        if isinstance(self.K, BlockMatrix) or np.abs(nodal).max() > LIGHT * self.system.norm:
+        heavy = np.abs(nodal).max() > LIGHT * self.system.norm
+        if isinstance(self.K, BlockMatrix) or heavy or self.terms:
             made.K = self.matrix(time, *factors)
         else:
             made.K = self.K.with_mass(mass, self.mass.times, partial(self._elastic, *factors))

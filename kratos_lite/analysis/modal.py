@@ -16,11 +16,14 @@ from kratos_lite.errors import InputError, ModelError, SolveError
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.complex_eigen import Pencil, unresisted_modes
 from kratos_lite.solvers.constraints import ConstraintMap, rigid_modes
-from kratos_lite.solvers.eigen import Operator, Problem, dense_modes, is_small, modes_near
+from kratos_lite.solvers.eigen import TOLERANCE, Operator, Problem, dense_modes, is_small, modes_near
 from kratos_lite.solvers.linear_solver import LinearSolver
 from kratos_lite.solvers.plan import DENSE_MODES, FALLBACK_LIMIT, Facts, choose
 from kratos_lite.typing import Array, Complexes, Progress
 from kratos_lite.validation import instance, number, whole_number
+
+OF_REPORT = 1e-6
+"""Relative error of the square of a critical rate that a report states."""
 
 
 def natural_modes(
@@ -217,10 +220,10 @@ def critical_rate(model: Structure, count: int = 1) -> Array:
     return critical_rates(e, count)
 
 
-def critical_rates(e: EquationsOfMotion, count: int) -> Array:
+def critical_rates(e: EquationsOfMotion, count: int, tolerance: float = TOLERANCE) -> Array:
     """Return the lowest critical rates (count,) of equations whose supports hold all rigid motions."""
     few = 100 if count == 1 else DENSE_MODES  # one by iteration takes a tenth of the time of all
-    largest = _largest(e, _critical_terms(e), e.system.equations, count, few)[0]
+    largest = _largest(e, _critical_terms(e), e.system.equations, count, few, tolerance)[0]
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.sort(np.where(largest > 0, 1 / np.sqrt(np.maximum(largest, 1e-300)), np.inf))
 
@@ -248,7 +251,12 @@ def buckling(
 
 
 def _largest(
-    e: EquationsOfMotion, H: BlockMatrix, solver: LinearSolver, count: int, few: int
+    e: EquationsOfMotion,
+    H: BlockMatrix,
+    solver: LinearSolver,
+    count: int,
+    few: int,
+    tolerance: float = TOLERANCE,
 ) -> tuple[Array, Array]:
     """Return the largest μ (count,) of H x = μ K x, descending, and x (q, count); of `few` by LAPACK."""
     constraints, n = e.system.constraint_map, len(e.system.constraint_map.free)
@@ -263,7 +271,9 @@ def _largest(
         return values[::-1], vectors[:, ::-1]
     times_H, times_K = (_reduced_product(constraints, A.times) for A in (H, solver))
     norms = H.norm(), solver.norm
-    problem = Problem(n, lambda X: -times_H(X), times_K, solver.precondition, norms, power=2)
+    problem = Problem(
+        n, lambda X: -times_H(X), times_K, solver.precondition, norms, power=2, tolerance=tolerance
+    )
     values, vectors = problem.lowest(count)
     return -values, vectors.T
 

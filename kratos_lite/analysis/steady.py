@@ -5,7 +5,7 @@ from __future__ import annotations
 from kratos_lite.ale.checks import critical_rate_estimate, near_critical
 from kratos_lite.analysis.derived_quantities import motion_summary
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
-from kratos_lite.analysis.modal import critical_rates
+from kratos_lite.analysis.modal import OF_REPORT, critical_rates
 from kratos_lite.analysis.nodal_loads import at_temperature, initial_loads, stress_load
 from kratos_lite.analysis.result import Result, result_of
 from kratos_lite.analysis.solution_checks import Phases, check_arguments, check_deformation, check_solution
@@ -13,7 +13,7 @@ from kratos_lite.model.checks import check_loads, equilibrium
 from kratos_lite.model.loads.base import equal_loads
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.linear_solver import LinearSolver
-from kratos_lite.solvers.plan import Facts, choose
+from kratos_lite.solvers.plan import REPEATED_LIMIT, Facts, choose
 from kratos_lite.typing import Progress
 
 
@@ -24,7 +24,7 @@ def solve_steady(
     check_arguments(solver, tolerance)
     phase = Phases(progress)
     with phase("check"):
-        e = EquationsOfMotion(model, free=False, steady=True, progress=progress)
+        e = EquationsOfMotion(model, free=False, steady=True, solver=solver, progress=progress)
         assert e.terms is not None
         warnings, changing, motion, rate = list(e.warnings), [], e.terms.motion, e.rates(0.0)[0]
         if not motion.steady:
@@ -40,8 +40,9 @@ def solve_steady(
         A, symmetric = e.matrix(0.0, 0.0, 0.0, 1.0), e.is_symmetric(0.0, 0.0)
     with phase("solve"):
         n, constraints = len(e.system.nodes), e.system.constraint_map
-        plan = choose(solver, Facts(len(constraints.free), 3 * n, symmetric, "motion"))
-        equations = LinearSolver(A, constraints, e.system.points, plan, symmetric=symmetric)
+        plan = choose(solver, Facts(len(constraints.free), 3 * n, symmetric, "steps"))
+        near = e.system.equations if plan.iterates else None
+        equations = LinearSolver(A, constraints, e.system.points, plan, symmetric, near)
         solution = equations.solve(forces, tolerance, progress)
     with phase("verify"):
         u = solution.x
@@ -56,8 +57,8 @@ def solve_steady(
         check_solution(solution, u, balance)
         critical = None
         if rate:
-            if solution.method == "direct":
-                critical = float(critical_rates(e, 1)[0])
+            if len(constraints.free) <= REPEATED_LIMIT:
+                critical = float(critical_rates(e, 1, OF_REPORT)[0])
             limit = critical_rate_estimate(e.terms) if critical is None else critical
             warnings += near_critical(motion, 0.0, limit, critical is not None)
     report = {

@@ -18,7 +18,7 @@ from kratos_lite.analysis.derived_quantities import (
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.integrators.base import INTEGRATORS, ModelIntegrator, check_stable
 from kratos_lite.analysis.integrators.generalized_alpha import Newmark
-from kratos_lite.analysis.modal import critical_rates
+from kratos_lite.analysis.modal import OF_REPORT, critical_rates
 from kratos_lite.analysis.nonlinear_equations import NonlinearEquations
 from kratos_lite.analysis.result import Result, result_of
 from kratos_lite.analysis.solution_checks import check_deformation
@@ -95,8 +95,7 @@ class TransientAnalysis(ModelInTime):
             raise InputError(f"an integrator such as Newmark() or its name is needed; got {integrator!r}")
         lumped = flag(lumped, "lumped") or self.integrator.lumps_mass
         kind = NonlinearEquations if model.is_nonlinear else EquationsOfMotion
-        plain = not model.is_nonlinear and model.motion is None
-        how: dict[str, Any] = {"solver": "auto", "use": "steps"} if plain else {}
+        how: dict[str, Any] = {} if model.is_nonlinear else {"solver": "auto", "use": "steps"}
         e = kind(model, lumped=lumped, rayleigh=rayleigh, progress=progress, **how)
         self.equations = e
         e.warnings += equal_loads(model.loads, model.named_loads)
@@ -367,7 +366,7 @@ class CriticalRateMonitor:
         if e.terms is None or self._done:
             return
         if free <= REPEATED_LIMIT and not e.free_motions.any:
-            self.critical = self.of_mesh = float(critical_rates(e, 1)[0])
+            self.critical = self.of_mesh = float(critical_rates(e, 1, OF_REPORT)[0])
         else:
             self.critical = critical_rate_estimate(e.terms)
 

@@ -45,18 +45,19 @@ CORRECTED = 1e-3
 class Iterated:
     """What solves A x = b, (n,) or (n, k), by iterations, and about as well as a correction needs it."""
 
-    equations: LinearSolver
+    equations: LinearSolver  # of A / c
+    c: float
 
     def __call__(self, b: Array) -> Array:
         """Return x."""
-        columns = b.reshape(len(b), -1).T
+        columns = (b / self.c).reshape(len(b), -1).T
         x = [self.equations.solve(np.ascontiguousarray(column), RESIDUAL).x for column in columns]
         return np.stack(x, axis=1).reshape(b.shape)
 
     def correction(self, b: Array) -> Array:
         """Return about x of one b (n,)."""
         # Source: Eisenstat & Walker, SIAM J. Sci. Comput. 17 (1996) 16-32 (inexact Newton methods).
-        return self.equations.solve(b, CORRECTED, start=np.zeros_like(b)).x
+        return self.equations.solve(b / self.c, CORRECTED, start=np.zeros_like(b)).x
 
 
 FORMULATIONS: Registry[type[Formulation]] = Registry("formulation of a finite-element body")
@@ -102,14 +103,18 @@ class Formulation(ABC):
         """Stiffness matrix (3n, 3n) of small strains in N/m."""
         return assemble_stiffness(self.points, self.groups, self.pattern)
 
-    def _inverse_with(self, K: BlockMatrix, c: float, symmetric: bool = True, iterate: bool = False) -> Solve:
-        """Return what solves (M + c K) x = b by a factorization, or by conjugate gradients with multigrid."""
+    def _inverse_with(
+        self, K: BlockMatrix, c: float, symmetric: bool = True, moved: Array | None = None
+    ) -> Solve:
+        """Return what solves (M + c K) x = b by a factorization, or by multigrid of `moved` points (n, 3)."""
+        if moved is not None:
+            A = BlockMatrix(K.data.copy(), K.indices, K.indptr)
+            A.add_scalar(self.mass.data / c)
+            every = ConstraintMap(np.arange(self.points.size), np.zeros(self.points.size))
+            method, mass = plan.Plan("amg", "a matrix for each step"), self.mass.nodal / c
+            return Iterated(LinearSolver(A, every, moved, method, groups=self.groups, mass=mass), c)
         A = BlockMatrix(c * K.data, K.indices, K.indptr)
         A.add_scalar(self.mass.data)
-        if iterate:
-            every = ConstraintMap(np.arange(self.points.size), np.zeros(self.points.size))
-            method = plan.Plan("amg", "a matrix for each step")
-            return Iterated(LinearSolver(A, every, self.points, method))
         factorizer = self._factorizer if symmetric else self._factorizer_unsymmetric
         return factorizer.factorize(A)
 
@@ -188,7 +193,8 @@ class TotalLagrangian(Formulation):
 
     def solver(self, q: Array, c: float) -> Solve:
         """Return what solves (M + c K(q)) x = b."""
-        return self._inverse_with(self.stiffness(q), c, iterate=self._is_large)
+        moved = self.points + q.reshape(-1, 3) if self._is_large else None
+        return self._inverse_with(self.stiffness(q), c, moved=moved)
 
     def load_over(self, q: Array, dq: Array, damping: float) -> Array:
         """Return the load of the energy–momentum method; see `Formulation`."""
@@ -282,7 +288,8 @@ class Corotational(Formulation):
         return rotated
 
     def _inverse(self, c: float) -> Solve:
-        return self._inverse_with(self.K0, c, iterate=self.points.size > plan.REPEATED_LIMIT)
+        large = self.points.size > plan.REPEATED_LIMIT
+        return self._inverse_with(self.K0, c, moved=self.points if large else None)
 
 
 class Modal(Corotational):

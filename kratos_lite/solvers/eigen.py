@@ -157,7 +157,8 @@ class Problem:
     progress: Progress | None = None
     power: int = 1  # of λ in its error; 2 where `precondition` is about M⁻¹
     coarse: tuple[Problem, Operator] | None = None  # equations of fewer components, and from these to all
-    wanted: int = 1  # vectors of a block that are found to TOLERANCE, the others to ROUGH
+    wanted: int = 1  # vectors of a block that are found to `tolerance`, the others to ROUGH
+    tolerance: float = TOLERANCE  # relative error of λ
 
     def lowest(self, count: int) -> tuple[Array, Array]:
         """Return the lowest λ (count,) beside the known ones, ascending, and x (count, n), x M x^T = 1."""
@@ -167,10 +168,10 @@ class Problem:
         def converged(squares: Array, errors: Array) -> bool:
             nonlocal smallest
             largest = float(errors[:count].max())
-            smallest = min(smallest, max(largest, TOLERANCE))
+            smallest = min(smallest, max(largest, self.tolerance))
             if self.progress:
-                self.progress("modes", 0.99 * float(np.log(smallest) / np.log(TOLERANCE)))
-            return largest <= TOLERANCE
+                self.progress("modes", 0.99 * float(np.log(smallest) / np.log(self.tolerance)))
+            return largest <= self.tolerance
 
         X, problem = self._roughly(count + GUARDS + count // 6), replace(self, wanted=count)
         while True:
@@ -184,7 +185,7 @@ class Problem:
                 return bool(squares[0] < last or lower > last or errors[0] <= NEAR)  # noqa: B023
 
             others, Y, _ = replace(self, known=known)._descend(self._start(SECOND), decided)
-            if others[0] > last - TOLERANCE * abs(last):
+            if others[0] > last - self.tolerance * abs(last):
                 self._check(squares[:count], X[:count])
                 return squares[:count], X[:count]
             X = np.vstack([X, Y])
@@ -212,7 +213,7 @@ class Problem:
             W, MW = self._independent(np.vstack([W, _random(m - len(W), self.n)]))
         S, KS, MS = (np.empty((3 * m, self.n)) for _ in range(3))
         squares, errors, A = np.full(m, np.inf), np.full(m, np.inf), np.zeros((0, 0))
-        limits = np.where(np.arange(m) < self.wanted, TOLERANCE, ROUGH)
+        limits = np.where(np.arange(m) < self.wanted, self.tolerance, ROUGH)
         used, allowed, best, best_at = 0, EPS, np.inf, 0
         for step in range(STEPS):
             new = slice(used, used + len(W))

@@ -20,8 +20,8 @@ DENSE_MAX = 10_000  # degrees of freedom of a full matrix, 0.8 GB several times;
 DIRECT_LIMIT = 10_000  # factorization without kernels; with them, iterations go on to round-off (8N cubes)
 SUPERLU_LIMIT = 30_000  # SuperLU takes less time than some hundred iterations (stretched boxes)
 FALLBACK_LIMIT = 150_000  # so does PARDISO; above, no factorization takes over from iterations (boxes)
-REPEATED_LIMIT = 30_000  # a matrix that serves many times is factorized (transient boxes)
-STEPPED_LIMIT = 4_000  # displacements, factors in each step (8N cubes: 41 ms, multigrid 35; 6,600: 99 and 45)
+REPEATED_LIMIT = 30_000  # a matrix that serves many times is factorized; motions get critical rates (boxes)
+STEPPED_LIMIT = 4_000  # factors beside a near state or matrix (8N cubes: 41 ms, multigrid 35; 6,600: 99, 45)
 DENSE_MODES = 1_200  # all modes at once, none is missed (8N cubes, 882: 80 ms, some by iteration 43)
 MUMPS_LIMIT = 6_000  # MUMPS takes no longer than iterations: 0.2 s; at 26,000 five times as long (boxes)
 MUMPS_FALLBACK = 300_000  # a factorization by MUMPS takes over where iterations fail (boxes)
@@ -48,11 +48,6 @@ BAND_NUMBERS = 50_000_000  # a band of more numbers (0.4 GB) is not made
 
 METHODS = ("auto", "dense", "direct", "amg")
 REQUESTED = "requested"
-MANY_TIMES = {
-    "steps": (STEPPED_LIMIT, "factors are fastest over many steps", "few iterations from the last state"),
-    "motion": (REPEATED_LIMIT, "the factors give critical rates, too", "multigrid takes least memory"),
-}
-"""Uses of a matrix that serves many times: unknowns up to which it is factorized, why, and why not."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +71,7 @@ class Facts:
     unknowns: int  # free degrees of freedom
     dofs: int = 0  # all degrees of freedom
     symmetric: bool = True  # whether the matrix is symmetric positive definite
-    use: str = "once"  # or for several vectors at once, ``modes``; one of `MANY_TIMES`
+    use: str = "once"  # several vectors at once: ``modes``; a near state or matrix is known: ``steps``
     # whether there are kernels of multigrid
     compiled: Callable[[], bool] = lambda: kernels("multigrid") is not None
     # largest ratio among elements that can have pressures of their own, and among plain ones
@@ -92,8 +87,8 @@ class Facts:
 def choose(solver: str, facts: Facts) -> Plan:
     """Return how to solve a system."""
     choice(solver, "solver", METHODS)
-    if facts.use in MANY_TIMES:
-        return _many_times(solver, facts)
+    if facts.use == "steps":
+        return _of_steps(solver, facts)
     plan = _by_size(facts) if solver == "auto" else Plan(solver, REQUESTED)
     if plan.method == "dense" and facts.dofs > DENSE_MAX:
         raise InputError(f"solver='dense' is for up to {DENSE_MAX} degrees of freedom; got {facts.dofs}")
@@ -123,13 +118,15 @@ def _by_size(facts: Facts) -> Plan:
     return Plan("amg", f"{n} unknowns > {limit}: multigrid is fastest and takes least memory")
 
 
-def _many_times(solver: str, facts: Facts) -> Plan:
-    n, (limit, few, many) = facts.unknowns, MANY_TIMES[facts.use]
+def _of_steps(solver: str, facts: Facts) -> Plan:
+    n = facts.unknowns
     if not facts.symmetric:
         return Plan("direct", "the matrix of a motion with damping is not symmetric")
-    if solver not in ("auto", "amg") or (solver == "auto" and n <= limit):
-        return Plan("direct", f"{n} unknowns ≤ {limit}: {few}" if solver == "auto" else REQUESTED)
-    reason = f"{n} unknowns > {limit}: {many}" if solver == "auto" else REQUESTED
+    if solver not in ("auto", "amg") or (solver == "auto" and n <= STEPPED_LIMIT):
+        few = f"{n} unknowns ≤ {STEPPED_LIMIT}: factors are fastest"
+        return Plan("direct", few if solver == "auto" else REQUESTED)
+    many = f"{n} unknowns > {STEPPED_LIMIT}: few iterations from what is near"
+    reason = many if solver == "auto" else REQUESTED
     return Plan("amg", reason, max(facts.bulk_over_shear()) <= NEAR_HALF and needs_no_matrix(facts))
 
 

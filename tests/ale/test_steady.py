@@ -248,3 +248,22 @@ def test_a_damped_window_has_its_closed_form(rate, ends, wheels):
         errors.append(np.abs(u - exact(x)).max() / np.abs(exact(x)).max())
     assert errors[1] < 2e-4
     assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.05)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.97, 1.3])
+def test_multigrid_of_the_body_at_rest_comes_to_what_factors_give(share, wheels, monkeypatch):
+    # Beyond the critical rate the matrix is not positive definite any more.
+    monkeypatch.setattr("kratos_lite.solvers.plan.STEPPED_LIMIT", 0)
+
+    def turning(rate):
+        model = wheels.disk("20N", 2, 16)
+        model.add(kl.Pressure("outer", lambda X: 1e5 * (1 + X[:, 0] * X[:, 1])))
+        model.add(Rotation("z", rate=rate, stiffening=True))
+        return model
+
+    (critical,) = kl.critical_rate(turning(1.0))
+    model = turning(share * critical)
+    found, exact = model.solve(), model.solve(solver="direct")
+    assert found.report.iterations > 0 or share > 1
+    assert found.report.motion["critical_rate"] == pytest.approx(critical, rel=1e-6)
+    assert np.abs(found.u - exact.u).max() < 1e-8 * np.abs(exact.u).max()
