@@ -68,7 +68,7 @@ OTHERS: dict[str, Callable[[argparse.Namespace], int | None]] = {
     "effectivity": lambda o: accuracy.effectivity(o.scenes, o.elements),
     "adaptive": lambda o: accuracy.adaptive(o.scenes, o.elements),
     "edges": lambda o: accuracy.edges(),
-    "dynamics": lambda o: dynamics.dynamics(),
+    "dynamics": lambda o: dynamics.dynamics(o.pythons.get("Kratos", o.pythons.get("", ""))),
     "laws": lambda o: laws.laws(
         o.pythons.get("Kratos", o.pythons.get("", "")), o.cells or laws.CELLS, o.path
     ),

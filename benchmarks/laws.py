@@ -66,9 +66,9 @@ def laws(kratos: str, cells: Sequence[int] = CELLS, path: Path = ROOT) -> None:
         PAGE.write_text(page(load(RESULTS)), encoding="utf-8")
 
 
-def timed(python: str, *words: Any) -> Row:
+def timed(python: str, *words: Any, code: Sequence[str] = ("-m", "benchmarks.laws")) -> Row:
     """Return what a process says, with its seconds."""
-    command, start = [python, "-m", "benchmarks.laws", *map(str, words)], perf_counter()
+    command, start = [python, *code, *map(str, words)], perf_counter()
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     try:
         done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=LIMIT, check=True)
@@ -83,21 +83,23 @@ def timed(python: str, *words: Any) -> Row:
 
 def page(found: Row) -> str:
     """Return the page of what is kept."""
-    body = []
-    for row in found["rows"]:
-        ours, kratos = row["ours"], row["Kratos"]
-        cells = [row["law"], str(ours["unknowns"]), times(ours)]
-        if "failed" in kratos:
-            body.append([*cells, kratos["failed"], "", ""])
-            continue
-        ratios = " / ".join(ratio(ours.get(name), kratos.get(name)) or "–" for name in CLOCKS)
-        body.append([*cells, times(kratos), ratios, f"{abs(ours['u'] / kratos['u'] - 1):.0e}"])
+    body = [[row["law"], *compared(row)] for row in found["rows"]]
     head = ["law", "unknowns", "kratos_lite (iterations)", "Kratos (iterations)", "ratio", "difference"]
     said = [
         POINTS.format(cores, ", ".join(f"{name} {value:.1f}" for name, value in laws.items()))
         for cores, laws in found["points"].items()
     ]
     return TEXT.format(steps=STEPS) + table(head, body) + "".join(said) + "\n"
+
+
+def compared(row: Row) -> list[str]:
+    """Return cells of a process beside Kratos: unknowns, times, their ratio, the difference."""
+    ours, kratos = row["ours"], row["Kratos"]
+    cells = [str(ours["unknowns"]), times(ours)]
+    if "failed" in kratos:
+        return [*cells, kratos["failed"], "", ""]
+    ratios = " / ".join(ratio(ours.get(name), kratos.get(name)) or "–" for name in CLOCKS)
+    return [*cells, times(kratos), ratios, f"{abs(ours['u'] / kratos['u'] - 1):.0e}"]
 
 
 def times(row: Row) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.nodal_loads import at_temperature
+from kratos_lite.assembly.block_matrix import rows_of_numbers
 from kratos_lite.assembly.element_groups import group_of_element
 from kratos_lite.assembly.gauss_point_fields import internal_load
 from kratos_lite.assembly.sparsity_pattern import dofs_of
@@ -61,22 +62,21 @@ def matrices_of(
 
     def whole(A: Any, square: bool = True) -> csr_array[Any, Any]:
         """Return a matrix (3a, ...) with the rows, and columns if it is square, of all degrees of freedom."""
-        made = A = A.tocsr()
-        if len(dofs) < 3 * n:
-            indptr = np.zeros(3 * n + 1, dtype=A.indptr.dtype)
-            indptr[dofs + 1] = np.diff(A.indptr)
-            indices = dofs.astype(A.indices.dtype)[A.indices] if square else A.indices
-            shape = 3 * n, 3 * n if square else A.shape[1]
-            made = csr_array((A.data, indices, np.cumsum(indptr, dtype=indptr.dtype)), shape=shape)
-        made.eliminate_zeros()
-        made.sort_indices()
-        return made
+        if len(dofs) == 3 * n:
+            return A
+        indptr = np.zeros(3 * n + 1, dtype=A.indptr.dtype)
+        indptr[dofs + 1] = np.diff(A.indptr)
+        indices = dofs.astype(A.indices.dtype)[A.indices] if square else A.indices
+        shape = 3 * n, 3 * n if square else A.shape[1]
+        return csr_array((A.data, indices, np.cumsum(indptr, dtype=indptr.dtype)), shape=shape)
 
     damped = e.terms is not None or any(e.rayleigh)
-    C = e.matrix(t, 0.0, 1.0, 0.0).scipy() if damped else csr_array((e.size, e.size))
+    C = rows_of_numbers(e.matrix(t, 0.0, 1.0, 0.0)) if damped else csr_array((e.size, e.size))
+    K, M = e.matrix(t, 0.0, 0.0, 1.0) if damped else e.system.assembled(), e.mass.matrix()
+    M.eliminate_zeros()
     return Matrices(
-        K=whole((e.K if e.terms is None else e.matrix(t, 0.0, 0.0, 1.0)).scipy()),
-        M=whole(e.mass.matrix()),
+        K=whole(rows_of_numbers(K)),
+        M=whole(M),
         C=whole(C),
         f=e.system.scatter(e.load(t)).ravel().copy(),
         T=whole(e.system.constraint_map.transform_matrix(), square=False),

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.native import kernels
-from kratos_lite.typing import Array, Bsr, Ints, Rows
+from kratos_lite.typing import Array, Bsr, Csr, Ints, Rows
 
 
 def block_rows(indptr: Rows) -> Ints:
@@ -74,3 +74,14 @@ class BlockMatrix:
             diagonals += m[:, None]
         else:
             diagonals[at] += m[:, None]
+
+
+def rows_of_numbers(A: BlockMatrix | Csr) -> Csr:
+    """Return a matrix as CSR (3n, 3n): of blocks, moved in place, or of numbers for all three components."""
+    from scipy.sparse import csr_array, eye_array, kron
+
+    compiled = kernels("sparse")
+    if compiled is None or max(3 * len(A.indices), A.data.size) > np.iinfo(np.int32).max:
+        return A.scipy().tocsr() if isinstance(A, BlockMatrix) else kron(A, eye_array(3), "csr")
+    indptr, indices, data = compiled.rows_of_numbers(A.indptr, A.indices, A.data)
+    return csr_array((data.ravel(), indices, indptr), shape=(len(indptr) - 1,) * 2)

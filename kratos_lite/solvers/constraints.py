@@ -143,8 +143,8 @@ class ConstraintMap:
 
         if self.T is not None:
             return self.T
-        q = len(self.free)
-        return csr_array((np.ones(q), (self.free, np.arange(q))), shape=(len(self.c), q))
+        q, before = len(self.free), np.cumsum(np.append(False, self.is_free))
+        return csr_array((np.ones(q), np.arange(q), before), shape=(len(self.c), q))
 
     def expand(self, q: Array, c: Array | None = None) -> Array:
         """Return all displacements T q + c, (N,); `c` replaces that of the map."""

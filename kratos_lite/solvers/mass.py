@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.assembly import mass_and_convection
+from kratos_lite.assembly.block_matrix import rows_of_numbers
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.mass_and_convection import inertia_matrices
 from kratos_lite.assembly.sparsity_pattern import Pattern
@@ -112,9 +113,7 @@ class Mass:
 
     def matrix(self) -> Csr:
         """Return the mass matrix of all components, (3n, 3n) in kg."""
-        from scipy.sparse import csr_array, eye_array, kron
-
-        M = csr_array(kron(self.scalar, eye_array(3), format="csr"))
+        M = rows_of_numbers(self.scalar)
         return M if self.attached is None else M + self.attached
 
     @cached_property

@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 from computing import compiled, printed, same_on_all_threads
 from rounding import all_close
+from scipy.sparse import csr_array, kron
 from systems import stiffness_of
 
 import kratos_lite as kl
 from kratos_lite import native
-from kratos_lite.assembly.block_matrix import BlockMatrix
+from kratos_lite.assembly.block_matrix import BlockMatrix, rows_of_numbers
 from kratos_lite.errors import InputError
 from kratos_lite.native import described, kernels, threads
 from tests.ale.test_kernel import VELOCITY, inertia_matrices
@@ -43,9 +44,21 @@ def test_product_is_that_of_scipy_on_any_number_of_threads():
     same_on_all_threads(lambda: A @ x)
 
 
+def test_rows_of_numbers_are_those_of_scipy():
+    A = matrix()
+    diagonals = csr_array((A.data[:, 1, 2].copy(), A.indices, A.indptr), shape=(len(A.indptr) - 1,) * 2)
+    expected = A.scipy().tocsr(), kron(diagonals, np.eye(3), format="csr")
+    for given, want in zip((A, diagonals), expected, strict=True):
+        found = rows_of_numbers(given)
+        assert found.has_canonical_format
+        assert abs(found - want).nnz == 0
+
+
 @compiled
 def test_wrong_shapes_are_refused():
     A = matrix()
+    with pytest.raises(ValueError, match="data must be"):
+        rows_of_numbers(BlockMatrix(A.data[:5], A.indices, A.indptr))
     with pytest.raises(ValueError, match="three numbers for each row"):
         A @ np.zeros(5)
 
