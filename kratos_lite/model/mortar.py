@@ -156,7 +156,7 @@ def _segments(
 
 
 def _candidates(a: Cells, b: Cells, tolerance: float | None) -> Iterator[tuple[Ints, Ints]]:
-    """Yield pairs of cells that face each other and are near, some at a time."""
+    """Yield pairs of cells that face each other, are near and lie one above the other, some at a time."""
     from scipy.spatial import cKDTree
 
     reach = (1 + NEAR) * (a.radius + b.radius.max()) + (tolerance or 0.0)
@@ -167,6 +167,9 @@ def _candidates(a: Cells, b: Cells, tolerance: float | None) -> Iterator[tuple[I
     near = apart <= (1 + NEAR) * (a.radius[i] + b.radius[j]) + (tolerance or 0.0)
     near &= np.abs((a.axes[i, 2] * b.axes[j, 2]).sum(axis=1)) >= FACING
     i, j = i[near], j[near]
+    A, B = a.on_planes(a.X[i], i), a.on_planes(b.X[j], i)
+    over = (A.min(axis=1) < B.max(axis=1)) & (B.min(axis=1) < A.max(axis=1))
+    i, j = (cells[over[:, :2].all(axis=1)] for cells in (i, j))
     for first in range(0, len(i), PAIRS):
         yield i[first : first + PAIRS], j[first : first + PAIRS]
 

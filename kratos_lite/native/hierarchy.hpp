@@ -71,11 +71,15 @@ public:
     }
 
     // Coarsen the last level, of blocks `data`, by smoothed aggregation until little is left.
-    // B (n, 3, 6 sets) are its rigid modes and others that take little energy, zero at fixed components.
-    void coarsen(Graph graph, const double* data, Bytes fixed, Doubles B) {
+    // B (n, 3, 6 sets) are its rigid modes and others that take little energy, zero at fixed components.  With
+    // `ties`, which the level has worked in, `data` are without them.
+    void coarsen(Graph graph, const double* data, Bytes fixed, Doubles B, const Ties* ties = nullptr) {
         sets = static_cast<int>(B.size() / (fixed.size() * MODES));
         CoarseMatrix matrix;
-        levels.back().graph = graph;
+        if (levels.back().elements) levels.back().graph = graph;
+        if (ties) ties->fill_rows(B, MODES * sets);
+        if (ties && !levels.back().elements)
+            levels.back().clusters.near = find_clusters(graph, data, 3, fixed, X.data(), settings.theta, FAR).near;
         while (true) {
             Level& fine = levels.back();
             if (fine.size() <= settings.full || levels.size() > 20) break;
@@ -84,7 +88,7 @@ public:
             bool planes = !fine.clusters.near.empty();
             const Doubles kept = planes || sets > 1 ? B : Doubles();
             const auto is_large = [&](double share) { return next.data.size() > share * fine.numbers(); };
-            int64_t count = add_transfer(graph, data, fixed, B, R, next);
+            int64_t count = add_transfer(graph, data, fixed, B, R, next, std::exchange(ties, nullptr));
             if (count && planes && is_large(LARGEST_PLANES)) {
                 transfers.pop_back();
                 fine.clusters.near = {};
@@ -291,13 +295,13 @@ private:
 
     // Aggregate, smooth and multiply; returns the number of coarse nodes, or 0 if nothing is gained.
     int64_t add_transfer(const Graph& g, const double* data, const Bytes& fixed, Doubles& B, Doubles& R,
-                         CoarseMatrix& next) {
-        return with_size(levels.back().b, [&](auto b) { return add_transfer<b>(g, data, fixed, B, R, next); });
+                         CoarseMatrix& next, const Ties* ties = nullptr) {
+        return with_size(levels.back().b, [&](auto b) { return add_transfer<b>(g, data, fixed, B, R, next, ties); });
     }
 
     template <int b>
     int64_t add_transfer(const Graph& g, const double* data, const Bytes& fixed, Doubles& B, Doubles& R,
-                         CoarseMatrix& next) {
+                         CoarseMatrix& next, const Ties* ties) {
         const Level& fine = levels.back();
         const Bytes excluded = fine.excluded(fixed);
         Bytes strong = strong_links(g, data, b * b, settings.theta);
@@ -309,12 +313,18 @@ private:
                                                : aggregate_clusters<b>(g, data, clusters, excluded, strong, of);
         const int32_t nodes = count * sets;
         if (count == 0 || nodes * MODES > 0.9 * b * g.rows) return 0;
+        if (ties) join_dependents(*ties, of);
         R = tentative_prolongator<b>(of, count, B, sets);
         const Smoothing smoothing{g, data, fixed, of, B, sets, 4.0 / 3.0 / fine.largest};
-        const Transfer& t = transfers.emplace_back(clusters.empty() ? smoothed_prolongator<b>(smoothing, inverse.data())
-                                                                    : smoothed_prolongator<b>(smoothing, clusters),
-                                                   nodes);
-        next = galerkin<b>(g, data, t.P, t.columns, nodes);
+        Prolongator P = clusters.empty() ? smoothed_prolongator<b>(smoothing, inverse.data())
+                                         : smoothed_prolongator<b>(smoothing, clusters);
+        const Transfer& t = transfers.emplace_back(std::move(P), nodes);
+        if (!ties) {
+            next = galerkin<b>(g, data, t.P, t.columns, nodes);
+            return nodes;
+        }
+        const Prolongator tied = with_dependents(t.P, *ties, nodes);
+        next = galerkin<b>(g, data, tied, Transposed(nodes, tied.indptr, tied.indices), nodes);
         return nodes;
     }
 
