@@ -225,6 +225,14 @@ def critical_rates(e: EquationsOfMotion, count: int) -> Array:
         return np.sort(np.where(largest > 0, 1 / np.sqrt(np.maximum(largest, 1e-300)), np.inf))
 
 
+def lowest_critical_rate(e: EquationsOfMotion) -> float | None:
+    """Return the lowest critical rate; None where no iteration finds it, as among many that are alike."""
+    try:
+        return float(critical_rates(e, 1)[0])
+    except SolveError:
+        return None
+
+
 def buckling(
     model: Structure, count: int, preload: Preload, progress: Progress | None = None
 ) -> tuple[Array, Array]:
