@@ -12,7 +12,7 @@ from kratos_lite.analysis.fields import COMPONENTS
 from kratos_lite.errors import InputError, SolveError
 from kratos_lite.materials import Material
 from kratos_lite.typing import Array, Mask, Numbers
-from kratos_lite.validation import choice, finite, instance, number, whole_number
+from kratos_lite.validation import choice, finite, flag, instance, number, whole_number
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -143,8 +143,9 @@ def material_point(
         raise InputError(f"{', '.join(both)} has a strain and a stress prescribed; give one of them")
     prescribed = strains | stresses
     counts = {len(values) for values in prescribed.values()}
-    if len(counts) != 1:
+    if len(counts) != 1 or 0 in counts:
         raise InputError("give targets, such as strain={'xx': [0.01, -0.01]}, as many for each component")
+    confined = flag(confined, "confined")
     held = np.array([name in strains or (confined and name not in stresses) for name in COMPONENTS])
     wanted = np.array([prescribed.get(name, np.zeros(counts.copy().pop())) for name in COMPONENTS]).T
     e, s, state = np.zeros(6), np.zeros(6), law.initial_state()

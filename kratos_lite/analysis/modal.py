@@ -16,7 +16,7 @@ from kratos_lite.errors import InputError, ModelError, SolveError
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.complex_eigen import Pencil, unresisted_modes
 from kratos_lite.solvers.constraints import ConstraintMap, rigid_modes
-from kratos_lite.solvers.eigen import TOLERANCE, Operator, Problem, dense_modes, is_small, modes_near
+from kratos_lite.solvers.eigen import TOLERANCE, Operator, Problem, dense_modes, is_small, modes, modes_near
 from kratos_lite.solvers.linear_solver import LinearSolver
 from kratos_lite.solvers.plan import DENSE_MODES, FALLBACK_LIMIT, Facts, choose
 from kratos_lite.typing import Array, Complexes, Progress
@@ -67,7 +67,13 @@ def natural_modes(
             K = K if K_g is None else K + reduced(e, K_g)
             omega, shapes = dense_modes(K if isinstance(K, np.ndarray) else K.toarray(), M.toarray(), count)
         else:
-            omega, shapes = _by_iteration(e, equations, count, progress, K_g)
+            try:
+                omega, shapes = _by_iteration(e, equations, count, progress, K_g)
+            except SolveError:  # multigrid is poor, such as where mid-edge nodes alone are held
+                if equations.plan.method == "direct" or n > FALLBACK_LIMIT:
+                    raise
+                K = equations.reduced_matrix + (0 if K_g is None else reduced(e, K_g))
+                omega, shapes = modes(K, constraints.reduce_matrix(e.mass.matrix()), count, progress)
     if K_g is not None and not omega[0] > 0:  # ω² is not, or its sign is rounding
         raise ModelError("the preload is beyond buckling; take less than model.buckling(1) times these loads")
     return omega, expanded(e, shapes)
@@ -226,6 +232,14 @@ def critical_rates(e: EquationsOfMotion, count: int, tolerance: float = TOLERANC
     largest = _largest(e, _critical_terms(e), e.system.equations, count, few, tolerance)[0]
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.sort(np.where(largest > 0, 1 / np.sqrt(np.maximum(largest, 1e-300)), np.inf))
+
+
+def lowest_critical_rate(e: EquationsOfMotion) -> float | None:
+    """Return the lowest critical rate; None where no iteration finds it, as among many that are alike."""
+    try:
+        return float(critical_rates(e, 1, OF_REPORT)[0])
+    except SolveError:
+        return None
 
 
 def buckling(

@@ -171,8 +171,10 @@ def _by_plane(mesh: Mesh, plane: Plane, part: WhereElements) -> tuple[str, Array
     n, offset = plane.normal, plane.offset
     d = mesh.points @ n - offset
     d[np.abs(d) <= ON_PLANE * np.linalg.norm(np.ptp(mesh.extent, axis=0))] = 0.0
+    if not inside.any():
+        raise MeshError("the part of a section has no elements; leave it out for all")
     used = mesh.used_nodes(inside)
-    low, high = float(d[used].min(initial=np.inf)), float(d[used].max(initial=-np.inf))
+    low, high = float(d[used].min()), float(d[used].max())
     axis = "xyz"[int(n.argmax())] if n.max() == 1 else f"({', '.join(f'{c:.4g}' for c in n)})·X"
     name, spans = (
         in_units(text, mesh.units)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from kratos_lite.ale.checks import critical_rate_estimate, near_critical
 from kratos_lite.analysis.derived_quantities import motion_summary
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
-from kratos_lite.analysis.modal import OF_REPORT, critical_rates
+from kratos_lite.analysis.modal import lowest_critical_rate
 from kratos_lite.analysis.nodal_loads import at_temperature, initial_loads, stress_load
 from kratos_lite.analysis.result import Result, result_of
 from kratos_lite.analysis.solution_checks import Phases, check_arguments, check_deformation, check_solution
@@ -58,7 +58,7 @@ def solve_steady(
         critical = None
         if rate:
             if len(constraints.free) <= REPEATED_LIMIT:
-                critical = float(critical_rates(e, 1, OF_REPORT)[0])
+                critical = lowest_critical_rate(e)
             limit = critical_rate_estimate(e.terms) if critical is None else critical
             warnings += near_critical(motion, 0.0, limit, critical is not None)
     report = {

@@ -18,7 +18,7 @@ from kratos_lite.analysis.derived_quantities import (
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.integrators.base import INTEGRATORS, ModelIntegrator, check_stable
 from kratos_lite.analysis.integrators.generalized_alpha import Newmark
-from kratos_lite.analysis.modal import OF_REPORT, critical_rates
+from kratos_lite.analysis.modal import lowest_critical_rate
 from kratos_lite.analysis.nonlinear_equations import NonlinearEquations
 from kratos_lite.analysis.result import Result, result_of
 from kratos_lite.analysis.solution_checks import check_deformation
@@ -366,9 +366,8 @@ class CriticalRateMonitor:
         if e.terms is None or self._done:
             return
         if free <= REPEATED_LIMIT and not e.free_motions.any:
-            self.critical = self.of_mesh = float(critical_rates(e, 1, OF_REPORT)[0])
-        else:
-            self.critical = critical_rate_estimate(e.terms)
+            self.of_mesh = lowest_critical_rate(e)
+        self.critical = critical_rate_estimate(e.terms) if self.of_mesh is None else self.of_mesh
 
     def check(self, time: float) -> None:
         """Warn if the rate of a time in s is near the critical one, and no warning came before."""

@@ -107,7 +107,7 @@ class Parser(argparse.ArgumentParser):
 def build_parser() -> Parser:
     """Return the parser of all commands."""
     description = "Finite elements for solids: from an input file to displacements and stresses."
-    style: dict[str, Any] = {"formatter_class": Formatter}
+    style: dict[str, Any] = {"formatter_class": Formatter, "allow_abbrev": False}
     parser = Parser(prog="kratos-lite", description=description, epilog=EXIT_CODES, **style)
     parser.add_argument("--version", action="version", version=f"kratos-lite {__version__}")
     case = Parser(add_help=False, **style)

@@ -115,7 +115,7 @@ class J2Plasticity3D(IsotropicLaw):
         if not ((np.diff(p) > 0).all() and (np.diff(stress) >= 0).all()):
             raise MaterialError(
                 "the plastic strains of a curve grow from 0, and its stresses do not fall from yield_stress "
-                f"{self.yield_stress:g} Pa; got {self.curve}"
+                f"{self.yield_stress:g} Pa at 0, which is no row of it; got {self.curve}"
             )
         if self.saturation_stress and self.saturation_stress < self.yield_stress:
             raise MaterialError(

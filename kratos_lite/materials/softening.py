@@ -16,7 +16,7 @@ from kratos_lite.materials.material import GaussState, Material, Response
 from kratos_lite.materials.softening_curves import CURVES, EXPONENTIAL, PEAKED, PERFECT, POINTS, POLYNOMIAL
 from kratos_lite.materials.yield_surfaces import SURFACES, WITH_ANGLE, Invariants, Surface
 from kratos_lite.typing import Array, ArrayLike
-from kratos_lite.validation import Axes
+from kratos_lite.validation import Axes, short
 
 FLOWING, CLOSE, BAND, MOST_RETURNS = 1e-10, 1e-4, 0.05, 100
 """Excess, in parts of the yield stress, that flows, and that ends the return; how it fades; steps of it."""
@@ -24,6 +24,8 @@ MOST = 0.9999
 """Fraction of the fracture energy that is dissipated at most."""
 STEP = 1e-30
 """Imaginary strain of derivatives, which are exact for any so small."""
+NEARLY_0 = 1e-3
+"""Fraction of the last plastic strain of a curve that the first may be, of total strains less σ / E."""
 NO_SIZE = 1e-200
 """Radius in m of a point without an element, at which nothing falls, but what hardens does."""
 
@@ -161,8 +163,16 @@ class Softening(IsotropicLaw, family=True):
             raise MaterialError(
                 f"curve 4 needs two strains that grow and the terms of a polynomial in Pa; got {rows}"
             )
-        if self.curve == POINTS and not (rows[0] == rows[1] > (1,) and is_growing):
-            raise MaterialError(f"curve 6 needs strains from 0 that grow, and as many stresses; got {rows}")
+        if self.curve == POINTS and not (
+            rows[0] == rows[1] > (1,)
+            and is_growing
+            and np.min(self.stresses) > 0
+            and abs(np.take(self.strains, 0)) <= NEARLY_0 * np.max(self.strains)
+        ):
+            got = short([self.strains, self.stresses])
+            raise MaterialError(
+                f"curve 6 needs strains from 0 that grow, and as many stresses > 0; got {got}"
+            )
 
     def response(self, strain: Array, state: GaussState, dt: float) -> Response:
         """Return stress and internal variables; SolveError for what would snap back."""

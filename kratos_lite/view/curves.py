@@ -21,6 +21,7 @@ def line_figure(
     for (name, values), (dashes, color, width) in zip(curves.items(), STYLES, strict=False):
         axes.plot(x, values, ls=dashes, color=color, lw=width, label=name)
     axes.margins(x=0)
+    axes.locator_params("x", nbins=5)  # numbers with units need place
     label(axes, "distance along the line", next(iter(curves)), title)
     return figure
 

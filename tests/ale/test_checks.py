@@ -120,6 +120,21 @@ def test_windows_near_their_critical_speed(ends, share, wheels):
     assert any("m/s is near the critical one, 192.6 m/s on" in t for t in model.solve().report.warnings)
 
 
+def test_a_rod_whose_critical_speeds_are_all_alike_is_solved():
+    """No iteration finds the lowest of so many; u = F L / (E A (1 - v²/c²)) all the same."""
+    model = kl.Model(kl.box((20, 1, 1), (80, 1, 1)), kl.Isotropic3D(E=1e6, nu=0.0, density=1e3))
+    model.fix(lambda X: np.ones(len(X), dtype=bool), "yz")
+    model.fix("x-", "x")
+    model.add(kl.Traction("x+", (10.0, 0, 0)))
+    model.add(Translation("x", rate=10.0, boundaries="natural"))
+    result = model.solve()
+    u, motion = result.displacement("x+")[:, 0], result.report.motion
+    assert np.abs(u / (10 * 20 / 1e6 / (1 - 0.1)) - 1).max() < 1e-12
+    assert motion["critical_rate"] is None
+    assert motion["margin"] == 1 - 10 / motion["critical_rate_of_waves"]
+    assert not any("critical" in text for text in model.transient().equations.warnings)
+
+
 def test_free_rotor(wheels):
     model = wheels.disk("20N", 1, 24, hub="free")
     rim = model.mesh.nodes("inner")

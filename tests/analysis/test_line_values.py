@@ -1,5 +1,7 @@
 """Values along lines, and the membrane and bending parts of stresses, beside closed forms."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -135,3 +137,15 @@ def test_plot_draws_the_stress_with_its_parts(tmp_path):
     for values in ("von_mises", "s1", "ux", "exx", "displacement"):
         assert len(line.plot(values=values).axes[0].lines) == 1
     assert (line.plot(values="szz").axes[0].lines[0].get_ydata() == 0).all()  # not its rounding
+
+
+def test_numbers_below_a_line_stand_apart():
+    pytest.importorskip("matplotlib")
+    mesh = kl.box((2000, 200, 200))
+    mesh.use_units("mm N MPa t")
+    line = held(mesh, np.zeros((8, 3)), kl.Isotropic3D(E=E, nu=0.0)).along((0, 9, 9), (2000, 9, 9), n=3)
+    figure = line.plot()
+    figure.canvas.draw()
+    boxes = [text.get_window_extent() for text in figure.axes[0].get_xticklabels()]
+    assert len(boxes) > 2
+    assert all(a.x1 < b.x0 for a, b in pairwise(boxes))

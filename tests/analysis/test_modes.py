@@ -138,3 +138,14 @@ def test_what_is_refused():
                 find(count)
     with pytest.raises(InputError, match="a critical rate belongs to a motion"):
         modal.critical_rate(column(1))
+
+
+def test_a_beam_that_mid_edge_nodes_alone_guide_has_the_modes_of_one_that_is_free_there():
+    """Bending in one plane: u_z of the middle is 0 by symmetry, whether it is held or not."""
+    model = kl.Model(kl.box((10, 0.1, 0.1), (40, 1, 1), "20N"), kl.Isotropic3D(E=1e6, nu=0.0, density=1.0))
+    model.fix("x-")
+    model.fix("x+", "yz")
+    free, _ = model.modes(1)
+    model.fix(lambda X: X[:, 2] == 0.05, "z")
+    held, _ = model.modes(1)
+    assert abs(held[0] / free[0] - 1) < 1e-6

@@ -350,6 +350,7 @@ def test_cuts_that_are_none(where, words):
     ("where", "part", "words"),
     [
         (("x", 1.5), "x-", "part 'x-' has no elements"),
+        (("x", 1.5), [], "the part of a section has no elements"),
         (("x", 1.5), [3], "the section x = 1.5 m misses the part, which spans 3 … 4 m there"),
         ([0], [3], "part belongs to a section by a plane"),
     ],

@@ -24,6 +24,7 @@ GUST = Path(__file__).parents[2] / "examples" / "tower" / "gust.py"
             ["solve", "a.json", "--gravty=0,0,1"],
             "error: --gravty: there is no such option. Did you mean --gra",
         ),
+        (["solve", "a.json", "--line"], "--line: there is no such option. Did you mean --linear?"),
         (["solve", "a.json", "--tracton", "z+:0,0,1"], "Did you mean --traction or --translation"),
         (["check", "a.json", "-gravty", "0,0,1"], "Did you mean --gravity?"),
         (["info", "a.json", "--fix", "z-:xyz"], "--fix: info does not take it; solve and check do"),

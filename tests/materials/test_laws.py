@@ -191,7 +191,7 @@ def test_the_elastic_part_at_large_strains_is_the_work_of_its_stress():
 @pytest.mark.parametrize("curve", [[(0.0, 300e6)], [(0.1, 200e6)], [(0.1, 300e6), (0.1, 400e6)]])
 def test_a_curve_that_falls_or_turns_back_is_refused(curve):
     with pytest.raises(
-        MaterialError, match="the plastic strains of a curve grow from 0, and its stresses do"
+        MaterialError, match=r"the plastic strains of a curve grow from 0, .* at 0, which is no row of it"
     ):
         kl.J2Plasticity3D(200e9, 0.3, 250e6, curve=curve)
 
@@ -519,6 +519,8 @@ def test_a_law_cannot_use_its_own_tangent_at_rest(monkeypatch):
         (lambda: kl.J2Softening3D(1.0, 0.2, 1.0, 1.0, curve=2), "curve 2 needs peak .MAXIMUM_STRESS. > 1"),
         (lambda: kl.J2Softening3D(1.0, 0.2, 1.0, 1.0, curve=4), "curve 4 needs two strains"),
         (lambda: kl.J2Softening3D(1, 0.2, 1, 1, 6, strains=(0, 1), stresses=(1,)), "curve 6 needs strains"),
+        (lambda: kl.J2Softening3D(1, 0.2, 1, 1, 6, strains=(1, 2), stresses=(1, 2)), "strains from 0"),
+        (lambda: kl.J2Softening3D(1, 0.2, 1, 1, 6, strains=(0, 1), stresses=(1, -1)), "stresses > 0"),
         (lambda: kl.J2Softening3D(1.0, 0.2, 1.0, 1.0, linear_until=1.0), "linear_until .* must lie in 0 … 1"),
         (lambda: kl.J2Softening3D(1, 0.2, 1, 1, potential="Treska"), "one of VonMises, .*got 'Treska'"),
         (lambda: kl.TrescaSoftening3D(1, 0.2, 1, 1, potential="DruckerPrager"), "FRICTION_ANGLE"),
@@ -573,6 +575,10 @@ def test_an_internal_variable_that_a_law_or_its_state_does_not_have():
     with pytest.raises(MaterialError, match=says):
         kl.material_point(Misspelt(), {"xx": [0.1]})
     law = kl.J2Plasticity3D(200e9, 0.3, 250e6)
+    with pytest.raises(kl.InputError, match="confined must be True or False; got 'no'"):
+        kl.material_point(law, {"xx": [0.1]}, confined="no")
+    with pytest.raises(kl.InputError, match="give targets"):
+        kl.material_point(law, {"xx": []})
     with pytest.raises(MaterialError, match=r"'back_stress', which .*start with its initial_state"):
         law.evaluate(np.zeros(6), {}, 1.0)
 
