@@ -220,7 +220,7 @@ class Problem:
             S[new], MS[new], KS[new] = W, MW, self.K(W)
             used, before = new.stop, squares
             A = _bordered(A, KS[new] @ S[:used].T)
-            G = _bordered(np.eye(new.start), MS[new] @ S[:used].T)
+            G = MS[:used] @ S[:used].T  # whole: where M is stiff, what rounding leaves of it counts
             squares, C = _ritz(A, G, m)
             active = np.flatnonzero((errors > limits) | (squares < before - limits * np.abs(squares)))
             last = C[:, active]
