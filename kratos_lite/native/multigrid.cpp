@@ -183,7 +183,6 @@ public:
     Hierarchy hierarchy;
 
 private:
-    // Make the coarser levels, once.
     // Aggregate the last level, of a matrix, where it can without ties, whose rows are wide.
     void coarsen_matrix(const Matrix& finest, const Bytes& fixed, Doubles B) {
         const bool apart = finest.untied && hierarchy.levels.back().clusters.empty();
@@ -192,6 +191,7 @@ private:
         hierarchy.coarsen(K.graph(), K.data.data(), fixed, std::move(B), ties && ties->size() ? ties : nullptr);
     }
 
+    // Make the coarser levels, once.
     template <class F>
     void coarsen(const F& make) {
         GilReleased release;
