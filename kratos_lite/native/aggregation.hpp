@@ -107,8 +107,7 @@ inline void orthonormalize(double* Q, int64_t m, double* r, int modes) {
 // (n, sets, b, 6); returns R (count, sets, 6, 6 sets), which is B of the coarse nodes: `sets` of them for
 // each aggregate.  A mode that an aggregate cannot tell from the modes before it (few nodes, fixed
 // components) becomes zero.
-template <int b>
-Doubles tentative_prolongator(const Ints& of, int32_t count, Doubles& B, int sets) {
+inline Doubles tentative_prolongator(int b, const Ints& of, int32_t count, Doubles& B, int sets) {
     const int modes = MODES * sets;
     Doubles R(static_cast<size_t>(count) * modes * modes, 0.0), T(sets > 1 ? B.size() : 0, 0.0);
     Doubles& to = sets > 1 ? T : B;
@@ -118,14 +117,18 @@ Doubles tentative_prolongator(const Ints& of, int32_t count, Doubles& B, int set
         Doubles Q;
         for (int64_t a = first; a < last; ++a) {
             const int64_t m = static_cast<int64_t>(starts[a + 1] - starts[a]) * b;
-            const auto node = [&](int64_t k) { return static_cast<int64_t>(members[starts[a] + k / b]); };
             Q.resize(m * modes);
-            for (int64_t k = 0; k < m; ++k)
-                for (int c = 0; c < modes; ++c) Q[c * m + k] = B[(node(k) * b + k % b) * modes + c];
+            const auto each = [&](const auto& f) {  // number of Q, row and mode
+                for (int64_t k = 0; k < m; ++k) {
+                    const int64_t node = members[starts[a] + k / b], r = k % b;
+                    for (int c = 0; c < modes; ++c) f(Q[c * m + k], node, r, c);
+                }
+            };
+            each([&](double& q, int64_t node, int64_t r, int c) { q = B[(node * b + r) * modes + c]; });
             orthonormalize(Q.data(), m, &R[a * modes * modes], modes);
-            for (int64_t k = 0; k < m; ++k)
-                for (int c = 0; c < modes; ++c)
-                    to[((node(k) * sets + c / MODES) * b + k % b) * MODES + c % MODES] = Q[c * m + k];
+            each([&](double& q, int64_t node, int64_t r, int c) {
+                to[((node * sets + c / MODES) * b + r) * MODES + c % MODES] = q;
+            });
         }
     });
     if (sets > 1) B.swap(T);
@@ -140,6 +143,7 @@ struct Prolongator {
 
 // What the smoothing of a prolongator needs: the matrix, the aggregates and the tentative prolongator.
 struct Smoothing {
+    int b;
     Graph g;
     const double* A;
     const Bytes& fixed;
@@ -158,7 +162,6 @@ struct Smoothing {
     }
 
     // P = T - omega smoothed of one block in row i and a column, a coarse node.
-    template <int b>
     KL_INLINE void store(int64_t i, int32_t column, const double* smoothed, float* P) const {
         const bool own = column / sets == of[i];
         for (int e = 0; e < b * MODES; ++e) {
@@ -189,21 +192,22 @@ KL_INLINE void smooth_rows(const Smoothing& s, const double* Dinv, Prolongator& 
         for (int32_t c = 0; c < count; ++c) {
             double smoothed[size] = {};
             add_product<b, b>(smoothed, Dinv + i * b * b, &row[c * size]);
-            s.store<b>(i, columns[c], smoothed, &P.data[static_cast<int64_t>(start + c) * size]);
+            s.store(i, columns[c], smoothed, &P.data[static_cast<int64_t>(start + c) * size]);
         }
     }
 }
 
-template <int b>
-Prolongator smoothed_prolongator(const Smoothing& s, const double* Dinv) {
+inline Prolongator smoothed_prolongator(const Smoothing& s, const double* Dinv) {
     const Graph& g = s.g;
     Prolongator P;
     UnionRows(g.rows, s.coarse_nodes(), [&](int64_t i, const auto& add) {
         s.add_columns(i, add);
     }).copy_to(P.indptr, P.indices);
-    P.data.resize(P.indices.size() * b * MODES + 8);  // vectors read beyond the end
+    P.data.resize(P.indices.size() * s.b * MODES + 8);  // vectors read beyond the end
     parallel_ranges(g.rows, ROW_GRAIN, [&](int64_t first, int64_t last) {
-        dispatch<double>([&](auto) KL_INLINE_LAMBDA { smooth_rows<b>(s, Dinv, P, first, last); });
+        with_size(s.b, [&](auto b) {
+            dispatch<double>([&](auto) KL_INLINE_LAMBDA { smooth_rows<decltype(b)::value>(s, Dinv, P, first, last); });
+        });
     });
     return P;
 }

@@ -8,9 +8,8 @@ namespace kl {
 
 // Aggregates of whole clusters.  Between clusters geometry weakens links, which are weak only at a
 // stiffness contrast.
-template <int b>
-int32_t aggregate_clusters(const Graph& g, const double* A, const Clusters& clusters,
-                           const Bytes& excluded, const Bytes& strong, Ints& of) {
+inline int32_t aggregate_clusters(int b, const Graph& g, const double* A, const Clusters& clusters, const Bytes& excluded,
+                                  const Bytes& strong, Ints& of) {
     const Doubles own = diagonal_norms(g, A, b * b);
     const auto alone = [&](int64_t i) {
         return clusters.starts[clusters.of[i] + 1] - clusters.starts[clusters.of[i]] == 1;
@@ -61,9 +60,8 @@ KL_INLINE void cluster_product(const Smoothing& s, const int32_t* members, int64
 }
 
 // P = T - omega D^-1 A T with the clusters' D; each node has the columns of its whole cluster.
-template <int b>
-Prolongator smoothed_prolongator(const Smoothing& s, const Clusters& clusters) {
-    constexpr int size = b * MODES;
+inline Prolongator smoothed_prolongator(const Smoothing& s, const Clusters& clusters) {
+    const int b = s.b, size = b * MODES;
     Ints starts, columns;
     UnionRows(clusters.count(), s.coarse_nodes(), [&](int64_t c, const auto& add) {
         for (int32_t p = clusters.starts[c]; p < clusters.starts[c + 1]; ++p) s.add_columns(clusters.members[p], add);
@@ -84,17 +82,19 @@ Prolongator smoothed_prolongator(const Smoothing& s, const Clusters& clusters) {
             const int32_t* own = columns.data() + starts[c];
             const int64_t count = starts[c + 1] - starts[c];
             X.assign(static_cast<size_t>(count * nodes * size), 0.0);
-            dispatch<double>([&](auto) KL_INLINE_LAMBDA {
-                cluster_product<b>(s, &clusters.members[start], nodes, own, count, X.data());
-                for (int64_t e = 0; e < count; ++e)
-                    substitute_six(clusters.exact, start * b, (start + nodes) * b, &X[e * nodes * size]);
+            with_size(b, [&](auto B) {
+                dispatch<double>([&](auto) KL_INLINE_LAMBDA {
+                    cluster_product<decltype(B)::value>(s, &clusters.members[start], nodes, own, count, X.data());
+                    for (int64_t e = 0; e < count; ++e)
+                        substitute_six(clusters.exact, start * b, (start + nodes) * b, &X[e * nodes * size]);
+                });
             });
             for (int64_t p = 0; p < nodes; ++p) {
                 const int64_t i = clusters.members[start + p];
                 if (s.of[i] < 0) continue;
                 std::copy_n(own, count, P.indices.begin() + P.indptr[i]);
                 for (int64_t e = 0; e < count; ++e)
-                    s.store<b>(i, own[e], &X[(e * nodes + p) * size], &P.data[(P.indptr[i] + e) * size]);
+                    s.store(i, own[e], &X[(e * nodes + p) * size], &P.data[(P.indptr[i] + e) * size]);
             }
         }
     });

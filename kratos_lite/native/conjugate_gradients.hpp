@@ -1,8 +1,6 @@
 // Conjugate gradients preconditioned by a multigrid hierarchy.
 
 #pragma once
-#include <functional>
-
 #include "hierarchy.hpp"
 
 namespace kl {
@@ -16,9 +14,9 @@ constexpr int STALLED = 200;  // iterations without a new smallest residual; thi
 
 // Conjugate gradients on A x = b with the V-cycle; A's rows at fixed components are left out.
 // Source: Saad, Iterative Methods for Sparse Linear Systems (2003), algorithm 9.1.
-template <class Product>
+template <class Product, class Each>
 Outcome conjugate_gradients(const Product& times_A, const Bytes& fixed, Hierarchy& M, const double* b, double* x,
-                            double tolerance, double norm_A, int most, const std::function<bool(double)>& each) {
+                            double tolerance, double norm_A, int most, const Each& each) {
     const int64_t n = static_cast<int64_t>(fixed.size());
     Doubles r(b, b + n), z(n + 1), p, Ap(n);  // products without a matrix read a number behind the last
     std::fill(x, x + n, 0.0);

@@ -227,8 +227,8 @@ public:
           n(3 * A.rows), size(n + this->S.size()), forces(n), u(n), p(size - n), rest(size - n) {}
 
     // x (n + pressures) of K u = b; `each` takes the residuals as shares of the first, and may say stop.
-    Outcome solve(const double* b, double* out, double tolerance, double norm, const Limits& limits,
-                  const std::function<bool(double)>& each) {
+    template <class Each>
+    Outcome solve(const double* b, double* out, double tolerance, double norm, const Limits& limits, const Each& each) {
         Doubles x(size, 0.0), found, r(size);
         std::fill(out, out + n, 0.0);
         const double norm_b = std::sqrt(dot(b, b, n));

@@ -69,9 +69,8 @@ KL_INLINE void galerkin_rows(const Graph& g, const double* A, const Prolongator&
 }
 
 // The sum over the rows of g; P may have more.
-template <int b>
-CoarseMatrix galerkin_sum(const Graph& g, const double* A, const Prolongator& P, const Transposed& columns,
-                          int32_t count) {
+inline CoarseMatrix galerkin_sum(int b, const Graph& g, const double* A, const Prolongator& P,
+                                 const Transposed& columns, int32_t count) {
     CoarseMatrix AP, C;
     UnionRows(g.rows, count, [&](int64_t i, const auto& add) {
         if (P.indptr[i] == P.indptr[i + 1]) return;
@@ -86,15 +85,18 @@ CoarseMatrix galerkin_sum(const Graph& g, const double* A, const Prolongator& P,
     const int64_t slabs = wanted_threads() > 1 ? 2 * wanted_threads() : 1;
     parallel(slabs, [&](int64_t s) {
         const int64_t first = count * s / slabs, last = count * (s + 1) / slabs;
-        dispatch<double>([&](auto) KL_INLINE_LAMBDA { galerkin_rows<b>(g, A, P, columns, AP, C, first, last); });
+        with_size(b, [&](auto B) {
+            dispatch<double>([&](auto) KL_INLINE_LAMBDA {
+                galerkin_rows<decltype(B)::value>(g, A, P, columns, AP, C, first, last);
+            });
+        });
     });
     return C;
 }
 
-template <int b>
-CoarseMatrix galerkin(const Graph& g, const double* A, const Prolongator& P, const Transposed& columns,
-                      int32_t count) {
-    CoarseMatrix C = galerkin_sum<b>(g, A, P, columns, count);
+inline CoarseMatrix galerkin(int b, const Graph& g, const double* A, const Prolongator& P, const Transposed& columns,
+                             int32_t count) {
+    CoarseMatrix C = galerkin_sum(b, g, A, P, columns, count);
     // Components without stiffness (modes that an aggregate cannot tell apart) stand alone.
     for (int32_t I = 0; I < count; ++I)
         for (int32_t k = C.indptr[I]; k < C.indptr[I + 1]; ++k)

@@ -62,7 +62,7 @@ public:
         X.clear();
         settings.thin = std::max(settings.thin, 1);
         const Transfer& t = transfers.emplace_back(std::move(P), nodes);
-        const CoarseMatrix plate = galerkin<3>(fine.graph, data, t.P, t.columns, nodes);
+        const CoarseMatrix plate = galerkin(3, fine.graph, data, t.P, t.columns, nodes);
         const Bytes fixed(int64_t{nodes} * MODES, 0);
         Level& coarse = add_coarse(plate, fixed);
         coarse.largest = largest_eigenvalue(coarse);
@@ -296,13 +296,8 @@ private:
     // Aggregate, smooth and multiply; returns the number of coarse nodes, or 0 if nothing is gained.
     int64_t add_transfer(const Graph& g, const double* data, const Bytes& fixed, Doubles& B, Doubles& R,
                          CoarseMatrix& next, const Ties* ties = nullptr) {
-        return with_size(levels.back().b, [&](auto b) { return add_transfer<b>(g, data, fixed, B, R, next, ties); });
-    }
-
-    template <int b>
-    int64_t add_transfer(const Graph& g, const double* data, const Bytes& fixed, Doubles& B, Doubles& R,
-                         CoarseMatrix& next, const Ties* ties) {
         const Level& fine = levels.back();
+        const int b = fine.b;
         const Bytes excluded = fine.excluded(fixed);
         Bytes strong = strong_links(g, data, b * b, settings.theta);
         Ints& of = aggregates;
@@ -310,21 +305,21 @@ private:
         if (strong.empty()) strong = clusters.near;
         for (size_t k = 0; k < clusters.near.size(); ++k) strong[k] &= clusters.near[k];
         const int32_t count = clusters.empty() ? aggregate(g, excluded, strong, of)
-                                               : aggregate_clusters<b>(g, data, clusters, excluded, strong, of);
+                                               : aggregate_clusters(b, g, data, clusters, excluded, strong, of);
         const int32_t nodes = count * sets;
         if (count == 0 || nodes * MODES > 0.9 * b * g.rows) return 0;
         if (ties) join_dependents(*ties, of);
-        R = tentative_prolongator<b>(of, count, B, sets);
-        const Smoothing smoothing{g, data, fixed, of, B, sets, 4.0 / 3.0 / fine.largest};
-        Prolongator P = clusters.empty() ? smoothed_prolongator<b>(smoothing, inverse.data())
-                                         : smoothed_prolongator<b>(smoothing, clusters);
+        R = tentative_prolongator(b, of, count, B, sets);
+        const Smoothing smoothing{b, g, data, fixed, of, B, sets, 4.0 / 3.0 / fine.largest};
+        Prolongator P = clusters.empty() ? smoothed_prolongator(smoothing, inverse.data())
+                                         : smoothed_prolongator(smoothing, clusters);
         const Transfer& t = transfers.emplace_back(std::move(P), nodes);
         if (!ties) {
-            next = galerkin<b>(g, data, t.P, t.columns, nodes);
+            next = galerkin(b, g, data, t.P, t.columns, nodes);
             return nodes;
         }
         const Prolongator tied = with_dependents(t.P, *ties, nodes);
-        next = galerkin<b>(g, data, tied, Transposed(nodes, tied.indptr, tied.indices), nodes);
+        next = galerkin(b, g, data, tied, Transposed(nodes, tied.indptr, tied.indices), nodes);
         return nodes;
     }
 

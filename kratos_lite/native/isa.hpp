@@ -110,6 +110,9 @@ private:
 
 template <int bytes, class T, class F>
 KL_INLINE void call(const F& f) {
+    // GCC 12 may leave the stack of such a function misaligned for arrays there which loops reach by a pointer
+    // alone, as at -O2: a variable that is aligned by itself keeps it aligned.
+    alignas(bytes) [[maybe_unused]] volatile char aligned = 0;
     f(std::integral_constant<int, bytes / sizeof(T)>());
 }
 

@@ -11,6 +11,7 @@
 
 #include "element_products.hpp"
 #include "sparse.hpp"
+#include "turns.hpp"
 
 namespace kl {
 
@@ -122,20 +123,20 @@ public:
         }
         for (const ProductGroup& s : groups)
             over(s, [&](int64_t first, int64_t last) { run(s, x, room.data() + 4 * (s.first + first * s.w.k), first, last); });
-        const auto force = [&](int64_t i) KL_INLINE_LAMBDA {
-            vec<T, 4> sum = {};
+        const auto force = [&](int64_t i, vec<T, 4>& sum) KL_INLINE_LAMBDA {
+            sum = vec<T, 4>{};
             for (int32_t p = start[i]; p < start[i + 1]; ++p)
                 sum += *reinterpret_cast<const vec<T, 4>*>(room.data() + 4 * static_cast<int64_t>(met[p]));
-            return sum;
         };
         std::vector<T> passed_on(tied ? 4 * ties.size() : 0);
         parallel_ranges(tied ? ties.size() : 0, NODES, [&](int64_t first, int64_t last) {
             for (int64_t t = first; t < last; ++t)
-                *reinterpret_cast<vec<T, 4>*>(&passed_on[4 * t]) = force(ties.dependents[t] / 3);
+                force(ties.dependents[t] / 3, *reinterpret_cast<vec<T, 4>*>(&passed_on[4 * t]));
         });
         parallel_ranges(n, NODES, [&](int64_t first, int64_t last) {
             for (int64_t i = first; i < last; ++i) {
-                vec<T, 4> sum = force(i);
+                vec<T, 4> sum;
+                force(i, sum);
                 for (int32_t k = tied ? ties.of[i] : 0; tied && k < ties.of[i + 1]; ++k) {
                     const Ties::Share& s = ties.shares[k];
                     const T weight = static_cast<T>(s.weight), *f = &passed_on[4 * static_cast<int64_t>(s.tie)];

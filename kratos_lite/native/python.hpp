@@ -281,7 +281,7 @@ struct Signature {
     }
 
     template <class T>
-    T converted(PyObject* given, size_t i) const {
+    __attribute__((noinline)) T converted(PyObject* given, size_t i) const {
         try {
             return Given<T>::of(given);
         } catch (const Mismatch& mismatch) {

@@ -123,9 +123,7 @@ public:
         const Ints group = of.copy();
         for (int32_t each : group) require(each < count, "there is no such aggregate");
         Doubles T = modes.copy();
-        const Doubles R = without_gil([&] {
-            return with_size(last.b, [&](auto b) { return tentative_prolongator<b>(group, count, T, 1); });
-        });
+        const Doubles R = without_gil([&] { return tentative_prolongator(last.b, group, count, T, 1); });
         return std::make_tuple(Array<double>(T), Array<double>(R));
     }
 
@@ -136,10 +134,8 @@ public:
         require(of.size() * last.b == all() && T.size() == MODES * all(), "T must be (all, b, 6)");
         const Ints group = of.copy();
         const Doubles modes = T.copy();
-        const Smoothing smoothing{last.graph, blocks.data.data(), fixed, group, modes, 1, 4.0 / 3.0 / last.largest};
-        Prolongator P = without_gil([&] {
-            return with_size(last.b, [&](auto b) { return smoothed_prolongator<b>(smoothing, hierarchy.inverse.data()); });
-        });
+        const Smoothing smoothing{last.b, last.graph, blocks.data.data(), fixed, group, modes, 1, 4.0 / 3.0 / last.largest};
+        Prolongator P = without_gil([&] { return smoothed_prolongator(smoothing, hierarchy.inverse.data()); });
         P.data.resize(P.indices.size() * last.b * MODES);
         return std::make_tuple(Array<int32_t>(P.indptr), Array<int32_t>(P.indices), Array<float>(P.data));
     }
@@ -154,9 +150,7 @@ public:
         const CoarseMatrix C = without_gil([&] {
             const Ints starts(P.indptr.begin(), P.indptr.begin() + last.n + 1);
             const Transposed columns(count, starts, {P.indices.begin(), P.indices.begin() + starts.back()});
-            return with_size(last.b, [&](auto b) {
-                return galerkin_sum<b>(last.graph, blocks.data.data(), P, columns, count);
-            });
+            return galerkin_sum(last.b, last.graph, blocks.data.data(), P, columns, count);
         });
         return std::make_tuple(Array<int32_t>(C.indptr), Array<int32_t>(C.indices), Array<double>(C.data));
     }

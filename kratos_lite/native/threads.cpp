@@ -1,10 +1,12 @@
 // The pool of threads of the process: they wait passively, and are left to the operating system at its end, as
 // joining them there can hang.
 
+#include <chrono>
 #include <condition_variable>
 #include <exception>
 #include <mutex>
 #include <system_error>
+#include <thread>
 #include <utility>
 #include <vector>
 #ifndef _WIN32
@@ -63,7 +65,7 @@ public:
     }
 
     // It returns when every task is done, whether or not all threads woke up in time to help.
-    void run(int64_t tasks, const std::function<void(int64_t)>& task, Interruption interrupt) {
+    void run(int64_t tasks, const Task& task, Interruption interrupt) {
         {
             std::lock_guard<std::mutex> lock(mutex);
             job = &task;
@@ -89,7 +91,7 @@ public:
     }
 
 private:
-    void work(const std::function<void(int64_t)>& task, int64_t tasks, Interruption interrupt) {
+    void work(const Task& task, int64_t tasks, Interruption interrupt) {
         for (int64_t i; (i = next++) < tasks;) {
             try {
                 watch.look(interrupt);
@@ -128,7 +130,7 @@ private:
     std::vector<std::thread> workers;
     std::mutex mutex;
     std::condition_variable start, done;
-    const std::function<void(int64_t)>* job = nullptr;
+    const Task* job = nullptr;
     std::atomic<int64_t> next{0};
     std::atomic<bool> given_up{false};  // a task has failed, so that the others need not be finished
     int64_t total = 0;
@@ -140,7 +142,7 @@ private:
 
 class Shared final : public Threads {
 public:
-    void run(int64_t tasks, const std::function<void(int64_t)>& task, Interruption interrupt) override {
+    void run(int64_t tasks, const Task& task, Interruption interrupt) override {
         if (tasks > 1 && wanted > 1 && !busy.exchange(true)) {
             const Free again{busy};
             return ready().run(tasks, task, interrupt);

@@ -5,21 +5,24 @@
 
 #pragma once
 #include <atomic>
-#include <chrono>
 #include <cstdint>
-#include <functional>
-#include <stdexcept>
-#include <thread>
-#include <utility>
 
 namespace kl {
 
 using Interruption = void (*)();
 
+// A function of the number of a task, which lives with its caller; std::function takes long to compile.
+struct Task {
+    const void* function;
+    void (*call)(const void* function, int64_t task);
+
+    void operator()(int64_t task) const { call(function, task); }
+};
+
 // The pool, in threads.cpp.
 class Threads {
 public:
-    virtual void run(int64_t tasks, const std::function<void(int64_t)>& task, Interruption interrupt) = 0;
+    virtual void run(int64_t tasks, const Task& task, Interruption interrupt) = 0;
     virtual void look(Interruption interrupt) = 0;
 
     std::atomic<int> wanted{1};
@@ -50,7 +53,8 @@ inline int wanted_threads() { return threads()->wanted; }
 // within a task, runs its tasks itself.
 template <class F>
 void parallel(int64_t tasks, const F& f) {
-    threads()->run(tasks, std::cref(f), interruption());
+    const auto call = [](const void* function, int64_t task) { (*static_cast<const F*>(function))(task); };
+    threads()->run(tasks, {&f, call}, interruption());
 }
 
 // parallel over ranges [first, last) of at most `grain` of n items.
@@ -63,34 +67,5 @@ void parallel_ranges(int64_t n, int64_t grain, const F& f) {
 }
 
 constexpr int64_t MANY = 1 << 16;  // after as many small steps, it is time to look
-
-// What serves one thread at a time: the others wait for their turn.  A thread that has it already, in a callback
-// or in a handler of signals, would wait for itself, and is refused.
-class Turns {
-public:
-    class Turn {
-    public:
-        explicit Turn(Turns& of) : turns(&of) {
-            const auto own = std::this_thread::get_id();
-            if (turns->owner == own) throw std::logic_error("it is at work: a callback cannot use it");
-            for (std::thread::id none; !turns->owner.compare_exchange_weak(none, own); none = {}) {
-                std::this_thread::sleep_for(std::chrono::microseconds(50));
-                look();
-            }
-        }
-        ~Turn() {
-            if (turns) turns->owner = std::thread::id();
-        }
-        Turn(Turn&& other) noexcept : turns(std::exchange(other.turns, nullptr)) {}
-
-    private:
-        Turns* turns;
-    };
-
-    Turn take() { return Turn(*this); }
-
-private:
-    std::atomic<std::thread::id> owner{std::thread::id()};
-};
 
 }  // namespace kl

@@ -114,7 +114,7 @@ void* operator new(size_t n) { bytes += n; return std::malloc(n); }
 void operator delete(void* p) noexcept { std::free(p); }
 void operator delete(void* p, size_t) noexcept { std::free(p); }
 struct Serial final : Threads {
-    void run(int64_t n, const std::function<void(int64_t)>& f, Interruption) override { while (n--) f(n); }
+    void run(int64_t n, const Task& f, Interruption) override { while (n--) f(n); }
     void look(Interruption) override {}
 };
 int main() {
