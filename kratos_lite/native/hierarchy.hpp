@@ -71,15 +71,11 @@ public:
     }
 
     // Coarsen the last level, of blocks `data`, by smoothed aggregation until little is left.
-    // B (n, 3, 6 sets) are its rigid modes and others that take little energy, zero at fixed components.  With
-    // `ties`, which the level has worked in, `data` are without them.
-    void coarsen(Graph graph, const double* data, Bytes fixed, Doubles B, const Ties* ties = nullptr) {
+    // B (n, 3, 6 sets) are its rigid modes and others that take little energy, zero at fixed components.
+    void coarsen(Graph graph, const double* data, Bytes fixed, Doubles B) {
         sets = static_cast<int>(B.size() / (fixed.size() * MODES));
         CoarseMatrix matrix;
-        if (levels.back().elements) levels.back().graph = graph;
-        if (ties) ties->fill_rows(B, MODES * sets);
-        if (ties && !levels.back().elements)
-            levels.back().clusters.near = find_clusters(graph, data, 3, fixed, X.data(), settings.theta, FAR).near;
+        levels.back().graph = graph;
         while (true) {
             Level& fine = levels.back();
             if (fine.size() <= settings.full || levels.size() > 20) break;
@@ -88,7 +84,7 @@ public:
             bool planes = !fine.clusters.near.empty();
             const Doubles kept = planes || sets > 1 ? B : Doubles();
             const auto is_large = [&](double share) { return next.data.size() > share * fine.numbers(); };
-            int64_t count = add_transfer(graph, data, fixed, B, R, next, std::exchange(ties, nullptr));
+            int64_t count = add_transfer(graph, data, fixed, B, R, next);
             if (count && planes && is_large(LARGEST_PLANES)) {
                 transfers.pop_back();
                 fine.clusters.near = {};
@@ -295,7 +291,7 @@ private:
 
     // Aggregate, smooth and multiply; returns the number of coarse nodes, or 0 if nothing is gained.
     int64_t add_transfer(const Graph& g, const double* data, const Bytes& fixed, Doubles& B, Doubles& R,
-                         CoarseMatrix& next, const Ties* ties = nullptr) {
+                         CoarseMatrix& next) {
         const Level& fine = levels.back();
         const int b = fine.b;
         const Bytes excluded = fine.excluded(fixed);
@@ -308,18 +304,12 @@ private:
                                                : aggregate_clusters(b, g, data, clusters, excluded, strong, of);
         const int32_t nodes = count * sets;
         if (count == 0 || nodes * MODES > 0.9 * b * g.rows) return 0;
-        if (ties) join_dependents(*ties, of);
         R = tentative_prolongator(b, of, count, B, sets);
         const Smoothing smoothing{b, g, data, fixed, of, B, sets, 4.0 / 3.0 / fine.largest};
-        Prolongator P = clusters.empty() ? smoothed_prolongator(smoothing, inverse.data())
-                                         : smoothed_prolongator(smoothing, clusters);
-        const Transfer& t = transfers.emplace_back(std::move(P), nodes);
-        if (!ties) {
-            next = galerkin(b, g, data, t.P, t.columns, nodes);
-            return nodes;
-        }
-        const Prolongator tied = with_dependents(t.P, *ties, nodes);
-        next = galerkin(b, g, data, tied, Transposed(nodes, tied.indptr, tied.indices), nodes);
+        const Transfer& t = transfers.emplace_back(clusters.empty() ? smoothed_prolongator(smoothing, inverse.data())
+                                                                    : smoothed_prolongator(smoothing, clusters),
+                                                   nodes);
+        next = galerkin(b, g, data, t.P, t.columns, nodes);
         return nodes;
     }
 

@@ -187,7 +187,8 @@ class LinearSolver:
         if isinstance(self.K, BlockMatrix):
             return constrained(self.K, T, free)
         if isinstance(self.K, MatrixFree):
-            return self.K.tie(on_all(T, free))
+            assembled = self.K.assembled
+            return self.K.tie(on_all(T, free), lambda: constrained(assembled(), T, free))
         D = (self.K.D.tocsr() @ on_all(T, free)).tobsr(self.K.D.blocksize)
         return replace(self.K, A=constrained(self.K.A, T, free), D=D)
 
@@ -300,9 +301,7 @@ def constrained(K: BlockMatrix, T: Any, free: Ints) -> BlockMatrix:
     half.sort_indices()
     change = half + half.T
     change.sort_indices()  # sums of sorted rows are made three times as fast
-    tied = BlockMatrix.of(A + change)
-    tied.ties = K, full
-    return tied
+    return BlockMatrix.of(A + change)
 
 
 def on_all(T: Any, free: Ints) -> Any:
