@@ -75,7 +75,8 @@ def timed(python: str, *words: Any, code: Sequence[str] = ("-m", "benchmarks.law
     except subprocess.TimeoutExpired:
         return {"failed": f"> {LIMIT} s"}
     except subprocess.CalledProcessError as error:
-        return {"failed": error.stderr.strip().splitlines()[-1][:200]}
+        said = error.stderr.strip() or f"ended with {error.returncode}"
+        return {"failed": said.splitlines()[-1][:200]}
     used, passed = resource.getrusage(resource.RUSAGE_CHILDREN), perf_counter() - start
     processors = used.ru_utime - before.ru_utime + used.ru_stime - before.ru_stime
     return json.loads(done.stdout.splitlines()[-1]) | {"seconds": passed, "processors": processors}

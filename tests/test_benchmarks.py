@@ -288,13 +288,13 @@ def test_modes_and_steps_beside_statics(monkeypatch):
     assert min(times) > 0
     more = [[what, 3 * m.mesh.n_nodes, 3.0, 2.0] for what, m, *_ in dynamics.others((1, 1, 1, 2))]
     monkeypatch.delitem(dynamics.RUNS, "6 modes")
-    runs, large = [*dynamics.processes("", 2)], dynamics.one("1") | dict.fromkeys(dynamics.CLOCKS, 8.0)
+    runs, large = [*dynamics.processes("", 2)], dynamics.one("1") | dict.fromkeys(laws.CLOCKS, 8.0)
     assert [run["ours"]["unknowns"] for run in runs] == [135]
     rows = [row | {"static": 2.0, "modes 6": 5.0}]
     page = dynamics.page({"rows": rows, "others": more, "processes": runs, "million": large})
     assert "| 8N | 336 | 2 | 5 (2.5) | " in page
     assert "| `matrices()` / assembly of K | 135 | 3 | 2 | 1.5 |" in page
-    assert "135 unknowns of 27N in such a process: 8/8 s" in page
+    assert "135 unknowns of 27N in such a process: 8 / 8 s" in page
 
 
 def test_laws_beside_another_program():
