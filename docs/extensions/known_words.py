@@ -11,7 +11,6 @@ from kratos_lite.analysis.fields import FIELDS
 from kratos_lite.analysis.subjects import names_of_parts
 from kratos_lite.io.formats.mdpa.scan import LISTS, TOP
 from kratos_lite.io.kratos import (
-    eigenvalues,
     expected_values,
     expressions,
     keys,
@@ -86,9 +85,9 @@ TABLES: dict[str, Callable[[], list[str]]] = {
     "solver_settings": lambda: [_code(sorted(keys.SOLVER.keys() - keys.ELSEWHERE.keys()))],
     "dynamic": lambda: [_code(keys.IN_TIME)],
     "eigenvalues": lambda: [
-        _code(eigenvalues.EIGEN_KEYS),
+        _code(keys.EIGEN_KEYS),
         "",
-        *_table(*((f"`{k}`", _code(v)) for k, v in eigenvalues.KEYS.items()), head="| solver | keys |"),
+        *_table(*((f"`{k}`", _code(v)) for k, v in keys.EIGENSOLVERS.items()), head="| solver | keys |"),
     ],
     "fields": _fields,
     "ale": lambda: _table(*((f"`{k}`", _code(v)) for k, v in motion.KEYS.items()), head="| motion | keys |"),
