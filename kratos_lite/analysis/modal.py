@@ -18,7 +18,7 @@ from kratos_lite.solvers.complex_eigen import Pencil, unresisted_modes
 from kratos_lite.solvers.constraints import ConstraintMap, rigid_modes
 from kratos_lite.solvers.eigen import TOLERANCE, Operator, Problem, dense_modes, is_small, modes, modes_near
 from kratos_lite.solvers.linear_solver import LinearSolver
-from kratos_lite.solvers.plan import DENSE_MODES, FALLBACK_LIMIT, Facts, choose
+from kratos_lite.solvers.plan import DENSE_MODES, FALLBACK_LIMIT, REPEATED_LIMIT, Facts, choose
 from kratos_lite.typing import Array, Complexes, Progress
 from kratos_lite.validation import instance, number, whole_number
 
@@ -235,7 +235,9 @@ def critical_rates(e: EquationsOfMotion, count: int, tolerance: float = TOLERANC
 
 
 def lowest_critical_rate(e: EquationsOfMotion) -> float | None:
-    """Return the lowest critical rate; None where no iteration finds it, as among many that are alike."""
+    """Return the lowest critical rate; None if rigid modes are free, or it is not found (many unknowns)."""
+    if e.free_motions.any or len(e.system.constraint_map.free) > REPEATED_LIMIT:
+        return None
     try:
         return float(critical_rates(e, 1, OF_REPORT)[0])
     except SolveError:

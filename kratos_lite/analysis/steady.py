@@ -13,7 +13,7 @@ from kratos_lite.model.checks import check_loads, equilibrium
 from kratos_lite.model.loads.base import equal_loads
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.linear_solver import LinearSolver
-from kratos_lite.solvers.plan import REPEATED_LIMIT, Facts, choose
+from kratos_lite.solvers.plan import Facts, choose
 from kratos_lite.typing import Progress
 
 
@@ -55,10 +55,8 @@ def solve_steady(
         stresses = stresses if initial is None else stresses - initial  # as in the load
         balance = equilibrium(model.mesh.points, nodal - inner, reactions, stresses)
         check_solution(solution, u, balance)
-        critical = None
+        critical = lowest_critical_rate(e) if rate else None
         if rate:
-            if len(constraints.free) <= REPEATED_LIMIT:
-                critical = lowest_critical_rate(e)
             limit = critical_rate_estimate(e.terms) if critical is None else critical
             warnings += near_critical(motion, 0.0, limit, critical is not None)
     report = {

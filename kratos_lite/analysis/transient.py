@@ -29,7 +29,6 @@ from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.direct import one_thread
 from kratos_lite.solvers.linear_solver import Solution
 from kratos_lite.solvers.newton import SMALLEST_PART, in_parts
-from kratos_lite.solvers.plan import REPEATED_LIMIT
 from kratos_lite.typing import Array, ArrayLike, Progress
 from kratos_lite.validation import finite, flag, function_or_none
 
@@ -365,8 +364,7 @@ class CriticalRateMonitor:
         self._done = e.terms is None or not free or (e.terms.motion.steady and not e.rates(0.0)[0])
         if e.terms is None or self._done:
             return
-        if free <= REPEATED_LIMIT and not e.free_motions.any:
-            self.of_mesh = lowest_critical_rate(e)
+        self.of_mesh = lowest_critical_rate(e)
         self.critical = critical_rate_estimate(e.terms) if self.of_mesh is None else self.of_mesh
 
     def check(self, time: float) -> None:
