@@ -229,7 +229,7 @@ def test_a_further_rigid_turn(wheels):
 # ---- energy --------------------------------------------------------------------------------------------
 
 
-STEP = 2.0**-12
+STEP = 2.0**-11
 """A step whose powers are numbers without rounding: that of 1/h² and 2/h alone drifts by 1e-16 a step."""
 
 
@@ -252,14 +252,14 @@ def graded(wheels, **options):
 def test_energy_is_constant_on_a_graded_mesh(wheels):
     transient = graded(wheels)
     start = transient.energy()
-    energies = [transient.energy() for _ in kl.integrate(transient, STEP, 1000, every=250)]
-    assert np.abs(np.array(energies) / start - 1).max() < 1000 * EPS  # each step rounds once
+    energies = [transient.energy() for _ in kl.integrate(transient, STEP, 500, every=125)]
+    assert np.abs(np.array(energies) / start - 1).max() < 500 * EPS  # each step rounds once
 
 
 def test_energy_grows_without_the_skew_form(wheels):
     transient = graded(wheels, skew=False)
     start = transient.energy()
-    *_, _ = kl.integrate(transient, STEP, 2000, every=2000)
+    *_, _ = kl.integrate(transient, STEP, 1000, every=1000)
     assert transient.energy() > 1.05 * start
 
 
