@@ -62,8 +62,8 @@ def bar(kind, **options):
 
 @pytest.mark.parametrize(
     ("kind", "integrator", "h", "error"),
-    [(kl.RigidBody, integrator, 2e-3, 1e-5) for integrator in RIGID]
-    + [(kl.PseudoRigidBody, "ENERGY_MOMENTUM", 5e-3, 2e-3), (kl.PseudoRigidBody, "DEF_LIM", 1e-3, 2e-3)]
+    [(kl.RigidBody, integrator, 4e-3, 1e-5) for integrator in RIGID]
+    + [(kl.PseudoRigidBody, "ENERGY_MOMENTUM", 5e-3, 2e-3), (kl.PseudoRigidBody, "DEF_LIM", 4e-3, 2e-3)]
     + [(kl.FiniteElementBody, "ENERGY_MOMENTUM", 1e-2, 2e-3)],
 )
 def test_a_pinned_bar_is_released(kind, integrator, h, error):
@@ -93,9 +93,9 @@ PERIOD = 2.3606811980
 
 @pytest.mark.parametrize(
     ("kind", "integrator", "h"),
-    [(kl.RigidBody, integrator, PERIOD / 300) for integrator in RIGID]
-    + [(kl.PseudoRigidBody, "DEF_LIM", PERIOD / 300), (kl.FiniteElementBody, "ENERGY_MOMENTUM", PERIOD / 150)]
-    + [(kl.PseudoRigidBody, "DEF_EXP", PERIOD / 1000)],
+    [(kl.RigidBody, integrator, PERIOD / 150) for integrator in RIGID]
+    + [(kl.PseudoRigidBody, "DEF_LIM", PERIOD / 150), (kl.FiniteElementBody, "ENERGY_MOMENTUM", PERIOD / 150)]
+    + [(kl.PseudoRigidBody, "DEF_EXP", PERIOD / 750)],
 )
 def test_a_pendulum_released_from_the_level(kind, integrator, h):
     body = cube(kind, integrator, side=0.04, E=2e4, center=(1, 0, 0))
@@ -140,7 +140,7 @@ def test_a_fixed_direction_leaves_the_others_free(kind, integrator):
     body.constrain(rail)
     body.add(kl.Gravity((2.0, 0, -G)))
     body.set_velocity((1, -1, 0))
-    end(body, 1e-3, 100)
+    end(body, 2e-3, 50)
     np.testing.assert_allclose(body.position(feet)[:, 2], feet[:, 2], atol=1e-13)
     assert body.mass_center()[0] == pytest.approx(0.1 + 0.01, rel=1e-10)
     assert body.mass_center()[1] == pytest.approx(-0.1, rel=1e-10)
@@ -240,11 +240,11 @@ def test_work_of_reactions_counts():
     body.constrain(
         kl.PrescribedVelocity(body.center, (0, 0, 1), kl.TimeSeries([0, 0.1, 0.4, 0.5], [0, 1, 1, 0]))
     )
-    end(body, 1e-3, 500)
+    end(body, 5e-3, 100)
     assert body.mass_center()[2] == pytest.approx(0.4, rel=1e-9)
     assert body.kinetic_energy() == pytest.approx(0, abs=1e-12)
     assert body.external_work == pytest.approx(0, abs=1e-10)
-    end(body, 1e-3, 1)
+    end(body, 5e-3, 1)
     assert body.potential_energy() == pytest.approx(8 * G * 0.4, rel=1e-9)
 
 
@@ -256,7 +256,7 @@ def test_a_spring_swings_with_its_frequency(kind, integrator):
     body = cube(kind, integrator, E=2e6)
     k = 8.0 * (2 * np.pi) ** 2  # 1 Hz
     body.add(kl.Spring((0, 0, 0), (0, 0, 1), k, length=0.9))
-    h = 1e-2 if integrator != "DEF_EXP" else 1e-3
+    h = 2e-2 if integrator != "DEF_EXP" else 1e-3
     count = round(1 / h)
     start = float(body.energy())
     end(body, h, count // 2)
@@ -281,7 +281,7 @@ def test_a_damped_spring_decays():
     m, k, c = 8.0, 8.0 * 100, 8.0
     body.add(kl.Spring((0, 0, 0), (0, 0, 1), k, damping=c, length=0.9))
     rate, omega = c / (2 * m), np.sqrt(k / m - (c / (2 * m)) ** 2)
-    h = 5e-4
+    h = 2e-3
     steps = round(2 * np.pi / omega / h)
     end(body, h, steps)
     assert 0.1 - body.mass_center()[2] == pytest.approx(0.1 * np.exp(-rate * h * steps), rel=2e-3)

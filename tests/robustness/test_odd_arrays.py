@@ -15,7 +15,7 @@ import kratos_lite as kl
 ROCK = kl.Isotropic3D(E=1e9, nu=0.3, density=2000.0, alpha=1e-5)
 BRICK = kl.KinematicLinear3D8N
 BALL = kl.MassProperties(2.0, np.eye(3))
-CUBE, WHEEL = kl.box(), kl.annulus(0.5, 1.0, 0.2, (1, 32, 1), BRICK.__name__)
+CUBE, WHEEL = kl.box(), kl.annulus(0.5, 1.0, 0.2, (1, 12, 1), BRICK.__name__)
 VECTOR, POINT = (0.1, -0.2, 0.3), (0.5, 0.5, 0.75)
 INPUT = re.compile(r"ArrayLike|Where|Points|Sequence\[(int|float)\]|OfPlace|Factor|At\b")
 """Annotations of what users give; others are of arrays that the library makes."""
@@ -30,7 +30,7 @@ def static():
     return model
 
 
-RESULT = static().solve()
+RESULT, RESPONSE = static().solve(), static().harmonic([10.0])
 
 
 def loaded(load, amplitude=None):
@@ -195,7 +195,7 @@ CASES: Case = {
     ("Model.harmonic", "frequencies"): (lambda v: swung(frequencies=v), [10.0, 20.0]),
     ("Model.harmonic", "damping"): (lambda v: swung(damping=v), np.full(12, 0.01)),
     ("HarmonicResponse.columns", "point"): (
-        lambda v: list(static().harmonic([10.0]).columns(v).values()),
+        lambda v: list(RESPONSE.columns(v).values()),
         POINT,
     ),
     ("Result.section", "part"): (lambda v: RESULT.section(("z", 0.5), part=v).force, [0]),
@@ -271,7 +271,7 @@ CASES: Case = {
     ("Rotation", "acceleration"): (lambda v: kl.ale.Rotation("z", rate=1.0, acceleration=v).direction, 0.1),
     ("Rotation", "center_velocity"): (lambda v: turned(center_velocity=v), (0, 0, 0)),
     ("Rotation", "center_acceleration"): (lambda v: turned(center_acceleration=v), (0, 0, 0)),
-    ("Rotation", "part"): (lambda v: turned(part=v), np.arange(32)),
+    ("Rotation", "part"): (lambda v: turned(part=v), np.arange(12)),
     ("Translation", "direction"): (lambda v: kl.ale.Translation(v, rate=1.0).direction, VECTOR),
     ("Translation", "rate"): (lambda v: loaded(kl.ale.Translation("x", rate=v)), 0.1),
     ("Translation", "acceleration"): (lambda v: loaded(kl.ale.Translation("x", rate=0, acceleration=v)), 0.1),
