@@ -19,6 +19,8 @@ QUICK = ROOT / "tests" / "packages" / "quick.py"
 OLDEST = ROOT / ".ci" / "oldest.txt"
 NEWEST_WITH_OLDEST = (3, 12)
 """The newest Python for which the oldest versions are built."""
+INSTALL = ("install", "--quiet", "--disable-pip-version-check", "--no-compile")
+"""Each module is compiled when it is first imported: most never are."""
 MOST = 3 * 2**20
 """Bytes of a wheel."""
 
@@ -40,9 +42,9 @@ def run(*command: object, **environment: str) -> None:
 
 def environment(folder: Path, *packages: object) -> Path:
     """Return the interpreter of a new environment with some packages."""
-    run(sys.executable, "-m", "venv", folder)
+    run(sys.executable, "-m", "venv", "--without-pip", folder)
     python = folder / ("Scripts" if os.name == "nt" else "bin") / "python"
-    run(python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *packages)
+    run(sys.executable, "-m", "pip", "--python", python, *INSTALL, *packages)
     return python
 
 
@@ -79,7 +81,7 @@ def wheel(python: Path, source: Path, kind: str) -> Path:
 def try_wheel(made: Path, computes: str) -> None:
     """Try a wheel with the dependencies of this environment."""
     site = made.parent / "site"
-    run(sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--target", site, made)
+    run(sys.executable, "-m", "pip", *INSTALL, "--no-deps", "--target", site, made)
     run(sys.executable, QUICK, computes, site, PYTHONPATH=str(site))
 
 
