@@ -92,7 +92,7 @@ def test_series_of_steps(tmp_path, steps):
 
 def test_films_of_steps(tmp_path, steps):
     analysis, states = steps
-    kl.animate(tmp_path / "pull.gif", analysis, states=states, values="accumulated_plastic_strain")
+    kl.animate(tmp_path / "pull.gif", analysis, states=states, values="accumulated_plastic_strain", frames=2)
     assert (tmp_path / "pull.gif").read_bytes()[:6] == b"GIF89a"
     kl.plot(analysis, tmp_path / "pull.png", states=states[::3], values="plastic_strain_zz")
 

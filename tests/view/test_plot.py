@@ -408,10 +408,6 @@ def test_texts_lie_on_no_other_and_within_the_figure(size):
 # ---- limits, scale, zoom ---------------------------------------------------------------------------
 
 
-def test_limits_of_the_colors(result):
-    assert np.abs(bar(result.plot(clim=(0, 2e7)))[0] - [0, 2e7]).max() == 0
-
-
 def test_scale_of_the_displacement(result):
     figures = [result.plot(scale=scale, view="y-") for scale in (0, 100, "auto")]
     assert [f.axes[0].get_title().splitlines()[1] for f in figures] == [
@@ -519,9 +515,9 @@ def test_panels_and_their_titles_are_apart(result):
 def test_modes_are_drawn_side_by_side_with_one_amplitude():
     model = kl.Model(kl.box((4, 1, 1), (4, 1, 1)), STEEL)
     model.fix("x-")
-    omega, shapes = model.modes(3)
+    omega, shapes = model.modes(2)
     figure = model.plot(modes=shapes, titles=[f"{w:.0f} rad/s" for w in omega])
-    assert len(figure.axes) == 4
+    assert len(figure.axes) == 3
     assert np.abs(bar(figure)[0] - [0, 1]).max() < 1e-15
     assert model.plot(modes=1000 * shapes[0], title="first").axes[0].get_title() == "first"
     moved = model.plot(modes=shapes[0], view="z+").axes[0]
