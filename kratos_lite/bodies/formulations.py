@@ -101,6 +101,10 @@ class Formulation(ABC):
         self._solver: tuple[float, Solve] | None = None
         self._turned = np.full(points.size, np.nan), np.eye(3)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what is pickled: what solves is made anew."""
+        return {**vars(self), "_solver": None}
+
     @cached_property
     def pattern(self) -> Pattern:
         """The sparsity of matrices on the nodes."""

@@ -1,5 +1,7 @@
 """How finite-element bodies solve: large ones iterate, what is not needed is not made."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -60,6 +62,16 @@ def test_multigrid_of_quadratic_elements_turns_with_the_body(monkeypatch):
         residual = body.times_mass(solve(around)) + 1e-2 * (body.stiffness() @ solve(around)) - around
         assert np.abs(residual).max() < 1e-9 * np.abs(b).max()
     assert max(iterations) <= min(iterations) + 2
+
+
+@pytest.mark.parametrize("formulation", ["total_lagrangian", "corotational", "modal"])
+def test_a_pickled_body_goes_on_bit_by_bit(formulation):
+    body = spinning(formulation, None)
+    list(kl.integrate(body, 1e-3, 2))
+    other = pickle.loads(pickle.dumps(body))
+    for each in (body, other):
+        list(kl.integrate(each, 1e-3, 3))
+    np.testing.assert_array_equal(other.q, body.q)
 
 
 def test_constant_matrices_are_factorized_once(monkeypatch):
