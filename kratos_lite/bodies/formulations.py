@@ -37,27 +37,39 @@ from kratos_lite.validation import whole_number
 
 RESIDUAL = 1e-13
 """Relative residual at which an iteration stops: momentum is as exact."""
-CORRECTED = 1e-3
-"""That of a correction: the next one begins with what it leaves."""
 
 
 @dataclass
 class Iterated:
-    """What solves A x = b, (n,) or (n, k), by iterations, and about as well as a correction needs it."""
+    """What solves A x = b, (n,) or (n, k), by iterations down to a relative residual."""
 
     equations: LinearSolver  # of A / c
     c: float
 
-    def __call__(self, b: Array) -> Array:
+    def __call__(self, b: Array, residual: float = RESIDUAL) -> Array:
         """Return x."""
-        columns = (b / self.c).reshape(len(b), -1).T
-        x = [self.equations.solve(np.ascontiguousarray(column), RESIDUAL).x for column in columns]
+        columns = np.ascontiguousarray((b / self.c).reshape(len(b), -1).T)
+        x = [self.equations.solve(column, residual, reduction=residual).x for column in columns]
         return np.stack(x, axis=1).reshape(b.shape)
 
-    def correction(self, b: Array) -> Array:
-        """Return about x of one b (n,)."""
-        # Source: Eisenstat & Walker, SIAM J. Sci. Comput. 17 (1996) 16-32 (inexact Newton methods).
-        return self.equations.solve(b / self.c, CORRECTED, start=np.zeros_like(b)).x
+
+@dataclass
+class Turned:
+    """What solves R A R^T x = b, R (3, 3) at each node, by what solves A x = b."""
+
+    solve: Solve
+    R: Array
+
+    def __call__(self, b: Array, residual: float = RESIDUAL) -> Array:
+        """Return x of b (3n,) or (3n, k); see `Iterated`."""
+        columns = b.reshape(len(b) // 3, 3, -1)
+        x = correction(self.solve, np.einsum("nik,ij->njk", columns, self.R).reshape(b.shape), residual)
+        return np.asarray(np.einsum("njk,ij->nik", x.reshape(columns.shape), self.R).reshape(b.shape))
+
+
+def correction(solve: Solve, b: Array, residual: float) -> Array:
+    """Return x of A x = b; where iterations solve, down to a relative residual."""
+    return solve(b, residual) if isinstance(solve, Iterated | Turned) else solve(b)
 
 
 FORMULATIONS: Registry[type[Formulation]] = Registry("formulation of a finite-element body")
@@ -84,6 +96,14 @@ class Formulation(ABC):
         if modes is not None:
             raise InputError(f"modes are for formulation='modal'; got formulation={self.name!r}")
         self.points, self.groups, self.mass = points, groups, mass
+        self._Z = points - points.mean(axis=0)
+        self._is_large = points.size > plan.STEPPED_LIMIT  # and iterates
+        self._solver: tuple[float, Solve] | None = None
+        self._turned = np.full(points.size, np.nan), np.eye(3)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what is pickled: what solves is made anew."""
+        return {**vars(self), "_solver": None}
 
     @cached_property
     def pattern(self) -> Pattern:
@@ -102,6 +122,11 @@ class Formulation(ABC):
     def K0(self) -> BlockMatrix:
         """Stiffness matrix (3n, 3n) of small strains in N/m."""
         return assemble_stiffness(self.points, self.groups, self.pattern)
+
+    @cached_property
+    def norm(self) -> float:
+        """The largest row sum of |K0|."""
+        return self.K0.norm()
 
     def _inverse_with(
         self, K: BlockMatrix, c: float, symmetric: bool = True, moved: Array | None = None
@@ -133,6 +158,26 @@ class Formulation(ABC):
     @abstractmethod
     def solver(self, q: Array, c: float) -> Solve:
         """Return what solves (M + c K(q)) x = b."""
+
+    @cached_property
+    def _gradients(self) -> Array:
+        gradients, volume = finite_strain.nodal_gradients(self.points, self.groups)
+        return np.ascontiguousarray(gradients.T / volume)
+
+    def rotation(self, q: Array) -> Array:
+        """Return R (3, 3), the polar rotation of the mean deformation gradient."""
+        if not np.array_equal(q, self._turned[0]):  # a step asks several times for the same one
+            self._turned = q.copy(), polar(np.eye(3) + (self._gradients @ q.reshape(-1, 3)).T)
+        return self._turned[1]
+
+    def solver_at_rest(self, q: Array, c: float) -> Solve:
+        """Return what solves (M + c R K0 R^T) x = b, by one matrix of the body at rest for the same c."""
+        if self._solver is None or self._solver[0] != c:
+            self._solver = c, self._inverse(c)
+        return Turned(self._solver[1], self.rotation(q))
+
+    def _inverse(self, c: float) -> Solve:
+        return self._inverse_with(self.K0, c, moved=self.points if self._is_large else None)
 
     def mass_solver(self, q: Array) -> Solve:
         """Return what solves M x = b, for motions that the formulation has."""
@@ -177,7 +222,6 @@ class TotalLagrangian(Formulation):
     ) -> None:
         super().__init__(points, groups, mass, modes)
         finite_strain.check_elements(groups)
-        self._is_large = points.size > plan.STEPPED_LIMIT  # iterates, as the matrix is another in each step
 
     def load(self, q: Array) -> Array:
         """Return Σ F S grad N dV, (3n,) in N."""
@@ -228,17 +272,7 @@ class Corotational(Formulation):
         self, points: Array, groups: Sequence[ElementGroup], mass: Mass, modes: int | None = None
     ) -> None:
         super().__init__(points, groups, mass, modes)
-        gradients, volume = finite_strain.nodal_gradients(points, groups)
-        self._gradients = np.ascontiguousarray(gradients.T / volume)
-        self._Z = points - points.mean(axis=0)
-        self._solver: tuple[float, Solve] | None = None
-        self._turned = np.full(points.size, np.nan), np.eye(3)
-
-    def rotation(self, q: Array) -> Array:
-        """Return R (3, 3), the polar rotation of the mean deformation gradient."""
-        if not np.array_equal(q, self._turned[0]):  # a step asks several times for the same one
-            self._turned = q.copy(), polar(np.eye(3) + (self._gradients @ q.reshape(-1, 3)).T)
-        return self._turned[1]
+        self._is_large = points.size > plan.REPEATED_LIMIT
 
     def local(self, q: Array, R: Array) -> Array:
         """Return R^T d (n, 3) in m: the displacement that strains the body, seen from it."""
@@ -274,22 +308,8 @@ class Corotational(Formulation):
         return np.asarray(self._apply(v).reshape(-1, 3) @ R.T).ravel()
 
     def solver(self, q: Array, c: float) -> Solve:
-        """Return what solves (M + c R K0 R^T) x = b: R A0^-1 R^T with factors of A0 made once for each c."""
-        if self._solver is None or self._solver[0] != c:
-            self._solver = c, self._inverse(c)
-        solve, R = self._solver[1], self.rotation(q)
-
-        def rotated(b: Array) -> Array:
-            columns = b.reshape(len(self._Z), 3, -1)
-            seen = np.einsum("nik,ij->njk", columns, R).reshape(b.shape)
-            x = solve(seen).reshape(columns.shape)
-            return np.asarray(np.einsum("njk,ij->nik", x, R).reshape(b.shape))
-
-        return rotated
-
-    def _inverse(self, c: float) -> Solve:
-        large = self.points.size > plan.REPEATED_LIMIT
-        return self._inverse_with(self.K0, c, moved=self.points if large else None)
+        """Return what solves (M + c R K0 R^T) x = b."""
+        return self.solver_at_rest(q, c)
 
 
 class Modal(Corotational):

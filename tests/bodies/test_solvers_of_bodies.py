@@ -1,5 +1,7 @@
 """How finite-element bodies solve: large ones iterate, what is not needed is not made."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -62,6 +64,16 @@ def test_multigrid_of_quadratic_elements_turns_with_the_body(monkeypatch):
     assert max(iterations) <= min(iterations) + 2
 
 
+@pytest.mark.parametrize("formulation", ["total_lagrangian", "corotational", "modal"])
+def test_a_pickled_body_goes_on_bit_by_bit(formulation):
+    body = spinning(formulation, None)
+    list(kl.integrate(body, 1e-3, 2))
+    other = pickle.loads(pickle.dumps(body))
+    for each in (body, other):
+        list(kl.integrate(each, 1e-3, 3))
+    np.testing.assert_array_equal(other.q, body.q)
+
+
 def test_constant_matrices_are_factorized_once(monkeypatch):
     made = []
     kind = formulations.Factorizer
@@ -71,6 +83,22 @@ def test_constant_matrices_are_factorized_once(monkeypatch):
         made.clear()
         list(kl.integrate(spinning(formulation, "DEF_LIM"), 1e-3, 7))
         assert len(made) == count
+
+
+@pytest.mark.parametrize("limit", [10_000, 10])
+def test_a_stiff_body_keeps_one_matrix_wherever_it_turns(limit, monkeypatch):
+    monkeypatch.setattr(plan, "STEPPED_LIMIT", limit)
+    body = spinning("total_lagrangian", "ENERGY_MOMENTUM")
+    body.rotate([[0, -1, 0], [0, 0, -1], [1, 0, 0]])
+    made = []
+    for kind, name in ((formulations.Factorizer, "factorize"), (formulations.LinearSolver, "__init__")):
+        make = getattr(kind, name)
+        monkeypatch.setattr(kind, name, lambda *a, make=make, **k: made.append(1) or make(*a, **k))
+    E, L = float(body.energy()), body.angular_momentum()
+    list(kl.integrate(body, 1e-3, 7))
+    assert len(made) == 1
+    assert abs(float(body.energy()) / E - 1) < 1e-13
+    np.testing.assert_allclose(body.angular_momentum(), L, rtol=1e-13)
 
 
 def test_a_body_at_rest_builds_no_mass_matrix():

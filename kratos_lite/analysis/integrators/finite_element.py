@@ -20,7 +20,7 @@ from kratos_lite.analysis.integrators.base import BodyIntegrator
 from kratos_lite.bodies.body import Deformable
 from kratos_lite.bodies.constraint_projection import Step, constrained_step
 from kratos_lite.bodies.finite_element import FiniteElementBody
-from kratos_lite.bodies.formulations import Iterated
+from kratos_lite.bodies.formulations import Turned, correction
 from kratos_lite.bodies.linear_algebra import Solve
 from kratos_lite.errors import SolveError
 from kratos_lite.solvers.direct import one_thread
@@ -29,7 +29,9 @@ from kratos_lite.typing import Array
 _log = logging.getLogger("kratos_lite")
 STIFF = 15.0  # h ω up to which the linearly implicit integrator has never been seen to blow up
 NEWTON_MAX = 50  # iterations of one step; a step that needs more is too long
-SLOW = 0.2  # rate of an iteration with old factors above which new ones are made
+SLOW = 0.2  # rate of corrections above which another matrix is made
+FIRST = 1e-5  # relative residual down to which the first one is solved
+ROUNDING = float(np.finfo(float).eps)  # residual beside its terms that no correction makes smaller
 
 
 class _FiniteElement(BodyIntegrator[FiniteElementBody]):
@@ -107,7 +109,8 @@ class EnergyMomentum(_FiniteElement):
     def step(self, body: FiniteElementBody, h: float, v: Array) -> Array:
         """Take a step; see `BodyIntegrator.step`."""
         middle = body.q + h / 2 * body.u
-        solve = body.solver(middle, h * h / 4 * (1 + 2 * body.damping / h))
+        make = body.solver if body.constraints else body.formulation.solver_at_rest  # reactions need K(q)
+        solve = make(middle, h * h / 4 * (1 + 2 * body.damping / h))
 
         def advance(extra: Array) -> Step:
             u, load = _balanced(body, h, v, extra, solve)
@@ -119,35 +122,43 @@ class EnergyMomentum(_FiniteElement):
 def _balanced(
     body: FiniteElementBody, h: float, loading: Array, extra: Array, solve: Solve
 ) -> tuple[Array, Array]:
-    """Return the velocity at the end and the load at the middle, by Newton with factors kept a while."""
-    q, u, ratio = body.q, body.u, body.damping / h
-    correct = _corrector(solve)
-    v, last = u.copy(), np.inf
+    """Return the velocity at the end and the load at the middle, by Newton with a matrix kept a while."""
+    # A correction is solved a little better than the last one served, but not below rounding.
+    # Source: Eisenstat & Walker, SIAM J. Sci. Comput. 17 (1996) 16-32 (inexact Newton methods).
+    formulation, q, u, ratio = body.formulation, body.q, body.u, body.damping / h
+    v, start, last, moved, exactness = u, body.times_mass(u), np.inf, np.inf, FIRST
     for _ in range(NEWTON_MAX):
         dq = h / 2 * (u + v)
         load = body.external_force(q + dq / 2, body.time + h / 2, loading)
-        force = load + extra - body.formulation.load_over(q, dq, ratio)
-        step = correct(h * force - body.times_mass(v - u))
-        size, scale = float(np.abs(step).max()), float(np.abs(v).max())
-        if not np.isfinite(size):
-            break
-        v = v + step
-        if size <= body.tolerance * scale:
+        given, end = h * (load + extra), body.times_mass(v)
+        r = given - h * formulation.load_over(q, dq, ratio) - (end - start)
+        size = float(np.linalg.norm(r))
+        terms = h * formulation.norm * dq, end, given
+        rounding = ROUNDING * sum(float(np.linalg.norm(term)) for term in terms)
+        if size <= rounding:
             return v, load
-        if size > SLOW * last:
-            given = float(np.abs(correct(h * (load + extra))).max())  # at rest, loads tell what is small
-            if size <= 1e-9 * max(scale, given):
+        if size > last / 2:
+            by_loads = float(np.abs(correction(solve, given, FIRST)).max())  # of a body at rest
+            if moved <= 1e-9 * max(float(np.abs(v).max()), by_loads):
                 return v, load
-            correct = _corrector(body.formulation.increment_solver(q, h / 2 * (u + v), ratio, h * h / 2))
-        last = size
+        if size > SLOW * last:
+            if isinstance(solve, Turned):  # the body is too far from that at rest: begin again
+                v, last, exactness = u, np.inf, SLOW / 10
+                solve = body.solver(q + h / 2 * u, h * h / 4 * (1 + 2 * ratio))
+                continue
+            solve = formulation.increment_solver(q, dq, ratio, h * h / 2)
+        if size < last < np.inf:
+            exactness = size / last / 10
+        step = correction(solve, r, max(exactness, rounding / size / 2))
+        v, last, moved = v + step, size, float(np.abs(step).max())
+        if not np.isfinite(moved):
+            break
+        if moved <= body.tolerance * float(np.abs(v).max()):
+            return v, load
     raise SolveError(
         f"the energy–momentum step at t = {body.time:g} s with dt = {h:g} s does not converge; "
         "take a shorter step"
     )
-
-
-def _corrector(solve: Solve) -> Solve:
-    return solve.correction if isinstance(solve, Iterated) else solve
 
 
 def warn_of_stiffness(body: Deformable, h: float) -> None:
