@@ -27,11 +27,11 @@ from kratos_lite.solvers.eigen import (
     TOLERANCE,
     Operator,
     Problem,
+    at_random,
     check_residuals,
     combine,
     lengths_of,
     not_converged,
-    random_vectors,
 )
 from kratos_lite.solvers.plan import DENSE_MODES
 from kratos_lite.typing import Array, Complexes
@@ -88,7 +88,7 @@ class Pencil:
             return (np.zeros((0, self.rest.n)),) * 2
         R, (norm_K, norm_M) = self.rest.known[0], self.rest.norms
         rate = 1e-2 * (norm_K / norm_M) ** 0.5  # low among those of a mesh
-        products, Z = ((1.0, self.K), (rate, self.C)), random_vectors(SECOND, self.rest.n)
+        products, Z = ((1.0, self.K), (rate, self.C)), at_random(SECOND, self.rest.n)
         # of transposes, products with vectors at random tell
         pushed = np.hstack([rate * part for rate, A in products for part in (A(R), R @ A(Z).T)])
         ways, sizes, _ = np.linalg.svd(pushed, full_matrices=False)
@@ -130,26 +130,20 @@ class Pencil:
 
         Those `beside` them are followed until they are known roughly, or as farther from 0.
         """
-        number, smallest = count + beside, 1.0
-        S = np.empty((4, min(3 * number + 12, rest.n), rest.n))  # vectors V, M V, C V, K V
+        number, smallest, before = count + beside, 1.0, np.zeros((0, 0))
+        room = min(3 * number + 12, rest.n)
+        space = _Space(np.empty((4, room, rest.n)), np.zeros((3, 0, 0)))
         W, MW = rest.independent(X[lengths_of(X) > 0])
-        used, A, before = 0, np.zeros((3, 0, 0)), np.zeros((0, 0))
         for _ in range(STEPS):
-            k = used + len(W)
-            for Z, new in zip(S, (W, MW, self.C(W), self.K(W)), strict=True):
-                Z[used:k] = new
-            V, used = S[0, :k], k
-            A = np.stack([_grown(old, V, Z[:k]) for old, Z in zip(A, S[1:], strict=True)])
-            values, Y = _all_values(*A)
+            space.add(W, MW, self.C(W), self.K(W))
+            values, Y = _all_values(*space.A)
             order = np.argsort(np.abs(values), kind="stable")[: number + GUARDS]
             is_upper = values[order].imag >= 0  # conjugates span the same
             wanted, p = int(is_upper[:count].sum()), int(is_upper[:number].sum())
             Y = (Y / np.linalg.norm(Y, axis=0)).T[order[is_upper]]
             values, y = values[order[is_upper]][:p], Y[:p]
-            powers = values**2, values, np.ones_like(values)
-            residual = sum(_parts(f[:, None] * y) @ Z[:k] for f, Z in zip(powers, S[1:], strict=True))
-            W, X = rest.precondition(residual), _parts(y) @ V
-            squares = (np.abs(values) + SMALL * np.abs(values).max()) ** 2
+            residual, X = space.residual(values, y), _parts(y) @ space.V
+            W, squares = rest.precondition(residual), (np.abs(values) + SMALL * np.abs(values).max()) ** 2
             of_parts = rest.errors(residual, W, X, np.tile(squares, 2), 10 * EPS)
             errors, limits = of_parts[:p] + of_parts[p:], np.where(np.arange(p) < wanted, LIMIT, NEAR)
             is_far = np.abs(values) * (1 - np.sqrt(errors)) > np.abs(values[wanted - 1])
@@ -159,25 +153,54 @@ class Pencil:
                 rest.progress("modes", 0.99 * float(np.log(smallest) / np.log(LIMIT)))
             if not wrong.any():
                 return values[:wanted], X.reshape(2, p, -1)[:, :wanted].reshape(2 * wanted, -1)
-            W = W[np.tile(wrong, 2) & (of_parts > np.tile(limits, 2) / 2)]
-            is_full = k + len(W) > S.shape[1]
-            if is_full and np.linalg.eigvalsh(A[2] + A[2].T)[0] > -SMALL * squares.max():
-                kept = np.vstack([_parts(Y), np.pad(before, ((0, 0), (0, k - before.shape[1])))])
-                Q = np.linalg.qr(kept[lengths_of(kept) > 0].T)[0]
-                for Z in S:
-                    combine(Z, Q)
-                A, y, used = Q.T @ A @ Q, y @ Q, Q.shape[1]
-            elif is_full:  # rates beyond the critical one: modes near 0 are not the lowest energies
-                S = np.concatenate([S, np.empty_like(S)], axis=1)
+            W, k = W[np.tile(wrong, 2) & (of_parts > np.tile(limits, 2) / 2)], Y.shape[1]
+            if k + len(W) > room and space.lowest > -SMALL * squares.max():  # else these are not the lowest
+                y = y @ space.keep(np.vstack([_parts(Y), np.pad(before, ((0, 0), (0, k - before.shape[1])))]))
             before = _parts(y)
-            W, MW = rest.independent(W, S[0, :used], S[1, :used])
+            W, MW = rest.independent(W, space.V, space.S[1, : len(space.V)])
         raise not_converged(count)
 
 
-def _grown(A: Array, V: Array, AV: Array) -> Array:
-    """Return the projection of a matrix on vectors V (k, n), given that on the first of them."""
-    k = len(A)
-    return np.block([[A, V[:k] @ AV[k:].T], [V[k:] @ AV.T]])
+@dataclass
+class _Space:
+    """Vectors V (k, n), orthonormal in M, and the projections A (3, k, k) of M, C and K on them."""
+
+    S: Array  # V, M V, C V and K V, in the first k places
+    A: Array
+
+    @property
+    def V(self) -> Array:
+        """The vectors (k, n)."""
+        return self.S[0, : self.A.shape[1]]
+
+    @property
+    def lowest(self) -> float:
+        """The lowest eigenvalue of K and its transpose on the vectors, in 1/s²."""
+        return float(np.linalg.eigvalsh(self.A[2] + self.A[2].T)[0])
+
+    def add(self, *new: Array) -> None:
+        """Add vectors W (m, n), given with M W, C W and K W."""
+        k = len(self.V)
+        size = k + len(new[0])
+        if size > self.S.shape[1]:
+            self.S = np.concatenate([self.S, np.empty_like(self.S)], axis=1)
+        self.S[:, k:size] = new
+        V, *products = self.S[:, :size]
+        both = zip(self.A, products, strict=True)
+        self.A = np.stack([np.block([[A, V[:k] @ Z[k:].T], [V[k:] @ Z.T]]) for A, Z in both])
+
+    def keep(self, rows: Array) -> Array:
+        """Leave the span of combinations (m, k) of the vectors; return the new ones in the old (k, m)."""
+        Q = np.linalg.qr(rows[lengths_of(rows) > 0].T)[0]
+        for Z in self.S:
+            combine(Z, Q)
+        self.A = Q.T @ self.A @ Q
+        return Q
+
+    def residual(self, values: Complexes, y: Complexes) -> Array:
+        """Return what combinations (p, k) of the vectors miss with λ (p,), in parts (2p, n)."""
+        powers, products = (values**2, values, np.ones_like(values)), self.S[1:, : y.shape[1]]
+        return np.asarray(sum(_parts(f[:, None] * y) @ Z for f, Z in zip(powers, products, strict=True)))
 
 
 def _parts(A: Complexes) -> Array:

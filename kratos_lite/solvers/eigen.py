@@ -88,10 +88,7 @@ def modes_near(K: Csr, M: Csr, count: int, near: float) -> tuple[Array, Array]:
             x = factors.solve(f)
             return np.asarray(x - X @ ((M @ X).T @ x))  # noqa: B023
 
-        operator, start = (
-            LinearOperator((n, n), inverse, dtype=np.float64),
-            random_vectors(1 + len(squares), n)[0],
-        )
+        operator, start = LinearOperator((n, n), inverse, dtype=float), at_random(1 + len(squares), n)[0]
         try:
             options = {"ncv": min(n, 4 * count + 40), "maxiter": RESTARTS, "v0": inverse(M @ start)}
             found, Y = eigsh(K, count + GUARDS, M, shift, OPinv=operator, **options)
@@ -195,7 +192,7 @@ class Problem:
 
     def start(self, count: int) -> Array:
         """Return vectors (count, n) in which low modes are large, the same each time."""
-        return self.precondition(self.M(random_vectors(count, self.n)))
+        return self.precondition(self.M(at_random(count, self.n)))
 
     def roughly(self, count: int) -> Array:
         """Return vectors (count, n) near the lowest modes, those of the coarse level if there is one."""
@@ -213,7 +210,7 @@ class Problem:
         """Return λ, x and M x of as many vectors as X has, from these, when `done`."""
         m, (W, MW) = len(X), self.independent(X)
         while len(W) < m:  # thin bodies: one cycle leaves little but their softest motions
-            W, MW = self.independent(np.vstack([W, random_vectors(m - len(W), self.n)]))
+            W, MW = self.independent(np.vstack([W, at_random(m - len(W), self.n)]))
         S, KS, MS = (np.empty((3 * m, self.n)) for _ in range(3))
         squares, errors, A = np.full(m, np.inf), np.full(m, np.inf), np.zeros((0, 0))
         limits = np.where(np.arange(m) < self.wanted, self.tolerance, ROUGH)
@@ -277,7 +274,7 @@ class Problem:
         return np.where(lengths_of(residual) <= rounding, 0.0, energies)
 
 
-def random_vectors(count: int, n: int) -> Array:
+def at_random(count: int, n: int) -> Array:
     """Return vectors (count, n), the same each time."""
     return np.random.default_rng(count).standard_normal((count, n))
 
@@ -345,8 +342,8 @@ def check_residuals(parts: list[Any], norms: Any, shapes: Any, energies: bool = 
 
 def _check_dense(K: Any, M: Any, squares: Array, X: Array) -> None:
     """Raise SolveError unless K x = λ M x of matrices and vectors (n, count)."""
-    norms = (float(abs(A).sum(axis=0).max()) for A in (K, M))
-    check_residuals([K @ X, -squares * (M @ X)], next(norms) + squares * next(norms), X)
+    norm_K, norm_M = (float(abs(A).sum(axis=0).max()) for A in (K, M))
+    check_residuals([K @ X, -squares * (M @ X)], norm_K + squares * norm_M, X)
 
 
 def check(errors: Array, allowed: Array) -> None:
