@@ -70,7 +70,7 @@ def natural_modes(
             try:
                 omega, shapes = _by_iteration(e, equations, count, progress, K_g)
             except SolveError:  # multigrid is poor, such as where mid-edge nodes alone are held
-                if equations.plan.method == "direct" or n > FALLBACK_LIMIT:
+                if not equations.plan.iterates or n > FALLBACK_LIMIT:
                     raise
                 K = equations.reduced_matrix + (0 if K_g is None else reduced(e, K_g))
                 omega, shapes = modes(K, constraints.reduce_matrix(e.mass.matrix()), count, progress)
@@ -185,7 +185,7 @@ def complex_modes(
         try:
             values, shapes = pencil.modes(count)
         except SolveError:
-            if solver.plan.method == "direct" or pencil.rest.n > FALLBACK_LIMIT:
+            if not solver.plan.iterates or pencil.rest.n > FALLBACK_LIMIT:
                 raise
             by_factors = replace(solver, K=e.system.assembled(), plan=Plan("direct"))
             values, shapes = _pencil(e, by_factors, progress).modes(count)
