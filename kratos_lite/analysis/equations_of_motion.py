@@ -13,7 +13,7 @@ from kratos_lite.ale import Motion, MotionMatrices
 from kratos_lite.ale.checks import check_materials
 from kratos_lite.analysis.nodal_loads import AppliedLoads, at_temperature
 from kratos_lite.analysis.prescribed_motion import PrescribedMotion
-from kratos_lite.assembly.block_matrix import BlockMatrix
+from kratos_lite.assembly.block_matrix import BlockMatrix, times_numbers
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model.free_motions import FreeMotions
@@ -189,14 +189,14 @@ class EquationsOfMotion:
         return self.terms.motion.boundary_damping(self.model.mesh, self.system) if self.terms else None
 
     def times_damping(self, v: Array, time: float) -> Array:
-        """Return C v at a time."""
+        """Return C v at a time, of a vector (3a,), or without β of several (k, 3a)."""
         out = self.rayleigh[1] * (self.K @ v) if self.rayleigh[1] else np.zeros_like(v)
         if self.rayleigh[0]:
             out = out + self.rayleigh[0] * self.mass.times(v)
-        if (scalar := self._scalars(time)[1]) is not None:
-            out = out + (scalar @ v.reshape(-1, 3)).ravel()
+        if (scalar := self.scalars(time)[1]) is not None:
+            out = out + times_numbers(scalar, v)
         if self.dashpots is not None:
-            out = out + self.dashpots @ v
+            out = out + self.dashpots.times(v)
         return np.asarray(out)
 
     def times_stiffness(self, u: Array, time: float) -> Array:
@@ -204,11 +204,11 @@ class EquationsOfMotion:
         if self._product is None or not np.array_equal(self._product[0], u):
             self._product = u.copy(), self.K @ u
         out = self._product[1]
-        if (scalar := self._scalars(time)[0]) is not None:
-            out = out + (scalar @ u.reshape(-1, 3)).ravel()
+        if (scalar := self.scalars(time)[0]) is not None:
+            out = out + times_numbers(scalar, u)
         return np.asarray(out)
 
-    def _scalars(self, time: float) -> tuple[Any, Any]:
+    def scalars(self, time: float) -> tuple[Any, Any]:
         """Return what the motion adds to K and C as sparse (a, a), or None; kept for the same rates."""
         from scipy.sparse import csr_array
 

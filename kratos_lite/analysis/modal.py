@@ -11,14 +11,14 @@ from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.preload import Preload, preload_stiffness, tangent_beyond_rest
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.solution_checks import Phases
-from kratos_lite.assembly.block_matrix import BlockMatrix
+from kratos_lite.assembly.block_matrix import BlockMatrix, times_numbers
 from kratos_lite.errors import InputError, ModelError, SolveError
 from kratos_lite.model.structure import Structure
-from kratos_lite.solvers.complex_eigen import Pencil, unresisted_modes
-from kratos_lite.solvers.constraints import ConstraintMap, rigid_modes
+from kratos_lite.solvers.complex_eigen import Pencil
+from kratos_lite.solvers.constraints import ConstraintMap
 from kratos_lite.solvers.eigen import TOLERANCE, Operator, Problem, dense_modes, is_small, modes, modes_near
 from kratos_lite.solvers.linear_solver import LinearSolver
-from kratos_lite.solvers.plan import DENSE_MODES, FALLBACK_LIMIT, REPEATED_LIMIT, Facts, choose
+from kratos_lite.solvers.plan import DENSE_MODES, FALLBACK_LIMIT, REPEATED_LIMIT, Plan
 from kratos_lite.typing import Array, Complexes, Progress
 from kratos_lite.validation import instance, number, whole_number
 
@@ -70,7 +70,7 @@ def natural_modes(
             try:
                 omega, shapes = _by_iteration(e, equations, count, progress, K_g)
             except SolveError:  # multigrid is poor, such as where mid-edge nodes alone are held
-                if equations.plan.method == "direct" or n > FALLBACK_LIMIT:
+                if not equations.plan.iterates or n > FALLBACK_LIMIT:
                     raise
                 K = equations.reduced_matrix + (0 if K_g is None else reduced(e, K_g))
                 omega, shapes = modes(K, constraints.reduce_matrix(e.mass.matrix()), count, progress)
@@ -83,17 +83,23 @@ def _by_iteration(
     e: EquationsOfMotion, solver: LinearSolver, count: int, progress: Progress | None, K_g: Any = None
 ) -> tuple[Array, Array]:
     """Return ω (count,) and shapes (q, count): the rigid motions that are free, then the lowest others."""
-    constraints, rigid = e.system.constraint_map, _free_motions(e)
-    further = count - rigid.shape[2]
-    stiffness = solver.times if K_g is None else lambda u: solver.times(u) + K_g.times(u)
-    firm, norms = _firm(e, solver), (solver.norm, e.mass.norm())
-    problem = _problem(constraints, firm, stiffness, e.mass.times, rigid, norms)
+    problem = _at_rest(e, solver, progress, K_g)
     R = problem.known[0] if problem.known else np.zeros((0, problem.n))
-    if further <= 0:
+    if count <= len(R):
         return np.zeros(count), R[:count].T
-    coarse = _coarse(e, firm, rigid)
-    squares, shapes = replace(problem, progress=progress, coarse=coarse).lowest(further)
+    squares, shapes = problem.lowest(count - len(R))
     return np.sqrt(np.append(np.zeros(len(R)), np.maximum(squares, 0.0))), np.vstack([R, shapes]).T
+
+
+def _at_rest(
+    e: EquationsOfMotion, solver: LinearSolver, progress: Progress | None, K_g: Any = None
+) -> Problem:
+    """Return K x = λ M x without a motion, beside the rigid motions that are free."""
+    constraints, rigid, firm = e.system.constraint_map, _free_motions(e), _firm(e, solver)
+    stiffness = solver.times if K_g is None else lambda u: solver.times(u) + K_g.times(u)
+    norms = solver.norm, e.mass.norm()
+    problem = _problem(constraints, firm, stiffness, e.mass.times, rigid, norms)
+    return replace(problem, progress=progress, coarse=_coarse(e, firm, rigid))
 
 
 def _problem(
@@ -169,32 +175,32 @@ def complex_modes(
 ) -> tuple[Complexes, Complexes]:
     """Return λ (count,) and shapes (count, n, 3) of λ² M + λ C + K = 0; see `Model.complex_modes`."""
     phase = Phases(progress)
+    count = whole_number(count, "count")
     with phase("check"):
-        e = EquationsOfMotion(model, steady=True, progress=progress)
+        e = EquationsOfMotion(model, steady=True, solver="auto", use="modes", progress=progress)
     with phase("assemble"):
-        M, C, K = (reduced(e, e.matrix(0.0, *factors)) for factors in ((1, 0, 0), (0, 1, 0), (0, 0, 1)))
+        solver = e.system.equations
+        pencil = _pencil(e, solver, progress)
     with phase("modes"):
-        plan = choose("auto", Facts(len(e.system.constraint_map.free), use="steps"))
-        solver = replace(e.system.equations, plan=plan)
-
-        def start(number: int) -> Array:
-            return _by_iteration(e, solver, number + _free_motions(e).shape[2], progress)[1].T
-
-        rigid = unresisted_modes(M, C, K, _rigid_motions(e))
-        precondition = _preconditioner(e.system.constraint_map, _firm(e, solver))
-        pencil = Pencil(M, C, K, rigid, start, precondition)
-        values, shapes = pencil.modes(whole_number(count, "count"))
+        try:
+            values, shapes = pencil.modes(count)
+        except SolveError:
+            if not solver.plan.iterates or pencil.rest.n > FALLBACK_LIMIT:
+                raise
+            by_factors = replace(solver, K=e.system.assembled(), plan=Plan("direct"))
+            values, shapes = _pencil(e, by_factors, progress).modes(count)
     return values, expanded(e, shapes)
 
 
-def _rigid_motions(e: EquationsOfMotion) -> Array:
-    """Return the rigid motions (q, k) that supports and constraints leave to the model as a whole."""
-    constraints = e.system.constraint_map
-    rigid = rigid_modes(e.system.points)
-    rigid = rigid / np.linalg.norm(rigid, axis=0)
-    missed = constraints.transform(rigid[constraints.free]) - rigid
-    _, values, directions = np.linalg.svd(missed, full_matrices=False)
-    return np.asarray(rigid[constraints.free] @ directions[values <= 1e-12].T)
+def _pencil(e: EquationsOfMotion, solver: LinearSolver, progress: Progress | None) -> Pencil:
+    """Return λ² M + λ C + K of a model with its motion at the time 0."""
+    of_K, rest = e.scalars(0.0)[0], _at_rest(e, solver, progress)
+
+    def stiffness(u: Array) -> Array:
+        return solver.times(u) if of_K is None else solver.times(u) + times_numbers(of_K, u)
+
+    both = (lambda v: e.times_damping(v, 0.0)), stiffness
+    return Pencil(rest, *(_reduced_product(e.system.constraint_map, times) for times in both))
 
 
 def critical_rate(model: Structure, count: int = 1) -> Array:

@@ -85,3 +85,14 @@ def rows_of_numbers(A: BlockMatrix | Csr) -> Csr:
         return A.scipy().tocsr() if isinstance(A, BlockMatrix) else kron(A, eye_array(3), "csr")
     indptr, indices, data = compiled.rows_of_numbers(A.indptr, A.indices, A.data)
     return csr_array((data.ravel(), indices, indptr), shape=(len(indptr) - 1,) * 2)
+
+
+def times_numbers(A: Csr, v: Array) -> Array:
+    """Return A v, alike for all three components, of a nodal vector (3n,), or of several (k, 3n)."""
+    compiled = kernels("sparse")
+    vectors = np.ascontiguousarray(v).reshape(-1, 3 * A.shape[0])
+    if compiled is not None:
+        return np.asarray(compiled.multiply(A.indptr, A.indices, A.data, vectors).reshape(v.shape))
+    nodal = np.moveaxis(vectors.reshape(len(vectors), -1, 3), 0, 2)
+    product = (A @ nodal.reshape(len(nodal), -1)).reshape(nodal.shape)
+    return np.asarray(np.moveaxis(product, 2, 0).reshape(v.shape))

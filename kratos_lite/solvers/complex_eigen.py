@@ -1,37 +1,43 @@
 """Complex modes: eigenvalues of λ² M + λ C + K nearest to 0, from a space that begins with real modes.
 
-Motions that K and C do not resist are taken out first: their eigenvalue 0 stands twice with one shape, so
-that rounding would spoil it by its square root.
+A space of real vectors grows by what a cycle of multigrid of the body at rest makes of residuals; when it is
+large, what is nearest to 0 stays, with what that was a step before.  Motions that K and C do not resist are
+taken out first: their eigenvalue 0 stands twice with one shape, so that rounding would spoil it by its square
+root.
 
-Sources: Tisseur & Meerbergen, SIAM Review 43 (2001) 235-286; Fan, Lin & Van Dooren, SIAM J. Matrix Anal.
-Appl. 26 (2004) 252-256, for the scale of λ.
+Sources: Tisseur & Meerbergen, SIAM Review 43 (2001) 235-286; Stathopoulos & Saad, Electron. Trans. Numer.
+Anal. 7 (1998) 163-181, for what stays; Fan, Lin & Van Dooren, SIAM J. Matrix Anal. Appl. 26 (2004) 252-256,
+for the scale of λ.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from kratos_lite.errors import InputError
 from kratos_lite.solvers.eigen import (
     EPS,
+    GUARDS,
+    NEAR,
+    SECOND,
+    STEPS,
     TOLERANCE,
+    Operator,
+    Problem,
+    at_random,
     check_residuals,
-    first_shift,
+    combine,
     lengths_of,
     not_converged,
-    orthonormal,
 )
 from kratos_lite.solvers.plan import DENSE_MODES
-from kratos_lite.typing import Array, Complexes, Csr
+from kratos_lite.typing import Array, Complexes
 
-EXPANSIONS = 60
-"""Times that the space of complex modes grows; more do not converge."""
-ROUNDED = 1e-8
-"""Length that a vector of length 1 has left without the span of others, below which it is rounding."""
+LIMIT = TOLERANCE**1.5
+"""Squared error of a shape, in the energy of the body at rest, where it will do."""
 SMALL = 1e-6
 """Fraction of the largest |λ| requested below which one counts as 0."""
 NEUTRAL = 1e-11
@@ -40,81 +46,166 @@ NEUTRAL = 1e-11
 
 @dataclass(frozen=True)
 class Pencil:
-    """λ² M + λ C + K, sparse (n, n), and the motions (n, k) that neither C nor K resists.
+    """λ² M + λ C + K of n components, as products with vectors, rows of arrays (k, n).
 
-    M is symmetric positive definite; C and K need not be symmetric.  The motions are columns with
-    φ^T M φ = 1, as `unresisted_modes` makes them.
+    `rest` has M, the stiffness at rest, about its inverse, and the rigid motions that are free.  C and K need
+    not be symmetric.
     """
 
-    M: Csr
-    C: Csr
-    K: Csr
-    rigid: Array
-    start: Callable[[int], Array]  # makes of a number so many real modes (k, n), and rigid motions
-    precondition: Callable[[Array], Array]  # about K⁻¹, of vectors (k, n)
+    rest: Problem
+    C: Operator
+    K: Operator
 
     def modes(self, count: int) -> tuple[Complexes, Complexes]:
         """Return λ (count,) in 1/s, nearest to 0 first, and shapes (n, count) of length 1."""
-        n, zeros = self.K.shape[0], 2 * self.rigid.shape[1]
+        n, rigid = self.rest.n, self._rigid[0]
         if count > 2 * n:
             raise InputError(f"this model has 1 … {2 * n} complex modes; got {count}")
-        values = np.zeros(zeros, dtype=complex)
-        shapes = np.repeat(self.rigid, 2, axis=1).astype(complex)
+        values = np.zeros(2 * len(rigid), dtype=complex)
+        shapes = np.repeat(rigid, 2, axis=0).astype(complex)
         whole = True
-        if (further := count - zeros) > 0:
-            whole = 2 * n <= DENSE_MODES or further > n // 4
+        if (further := count - len(values)) > 0:
+            whole = 8 * n <= DENSE_MODES or further > n // 4
             elastic, vectors = self._all() if whole else self._nearest(further)
             order = np.argsort(np.abs(elastic), kind="stable")[:further]
-            values, shapes = np.append(values, elastic[order]), np.hstack([shapes, vectors[:, order]])
-        values, shapes = values[:count], shapes[:, :count]
-        shapes = shapes / np.linalg.norm(shapes, axis=0)
-        self.check(values, shapes, energies=not whole)
-        return values, shapes
+            values, shapes = np.append(values, elastic[order]), np.vstack([shapes, vectors[order]])
+        values, shapes = values[:count], shapes[:count]
+        shapes = shapes / np.linalg.norm(shapes, axis=1)[:, None]
+        self._check(values, shapes, energies=not whole)
+        return values, shapes.T
 
-    def check(self, values: Complexes, shapes: Complexes, energies: bool = False) -> None:
+    def _check(self, values: Complexes, shapes: Complexes, energies: bool) -> None:
         """Raise SolveError unless all pairs satisfy the equations, or their products with the shapes."""
-        terms = [(values**2, self.M), (values, self.C), (np.ones_like(values), self.K)]
-        check_residuals(terms, shapes, energies)
+        squares, (norm_K, norm_M) = values**2, self.rest.norms
+        M, C, K = ((A(shapes.real) + 1j * A(shapes.imag)).T for A in (self.rest.M, self.C, self.K))
+        norms = norm_K + np.abs(squares) * norm_M
+        check_residuals([squares * M, values * C, K], norms, shapes.T, energies)
+
+    @cached_property
+    def _rigid(self) -> tuple[Array, Array]:
+        """The rigid motions (k, n) that C, K and their transposes take to 0, and the others."""
+        if self.rest.known is None:
+            return (np.zeros((0, self.rest.n)),) * 2
+        R, (norm_K, norm_M) = self.rest.known[0], self.rest.norms
+        rate = 1e-2 * (norm_K / norm_M) ** 0.5  # low among those of a mesh
+        products, Z = ((1.0, self.K), (rate, self.C)), at_random(SECOND, self.rest.n)
+        # of transposes, products with vectors at random tell
+        pushed = np.hstack([rate * part for rate, A in products for part in (A(R), R @ A(Z).T)])
+        ways, sizes, _ = np.linalg.svd(pushed, full_matrices=False)
+        neutral = sizes <= NEUTRAL * norm_K * lengths_of(R).max()
+        return ways[:, neutral].T @ R, ways[:, ~neutral].T @ R
 
     def _all(self) -> tuple[Complexes, Complexes]:
         """Return all eigenvalues but those of the rigid modes, from dense matrices."""
-        Q: Array = np.eye(self.K.shape[0])
-        if k := self.rigid.shape[1]:
-            Q = np.linalg.qr(self.M @ self.rigid, mode="complete")[0][:, k:]
-        values, vectors = _all_values(*(Q.T @ (A @ Q) for A in (self.M, self.C, self.K)))
-        return values, Q @ vectors
+        n, rigid = self.rest.n, self._rigid[0]
+        Q = (
+            np.linalg.qr(self.rest.M(rigid).T, mode="complete")[0][:, len(rigid) :]
+            if len(rigid)
+            else np.eye(n)
+        )
+        Q = np.ascontiguousarray(Q.T)
+        values, vectors = _all_values(*(Q @ A(Q).T for A in (self.rest.M, self.C, self.K)))
+        return values, vectors.T @ Q
 
     def _nearest(self, count: int) -> tuple[Complexes, Complexes]:
-        """Return eigenvalues nearest to 0, from a space that grows by what the residuals miss."""
-        # It begins with real modes, two for each pair of complex ones.
-        V = self._independent(self.start(count), np.zeros((0, self.K.shape[0])))
-        roundoff = 10 * EPS * float(abs(self.K).sum(axis=0).max())
-        for _ in range(EXPANSIONS):
-            products = [(A @ V.T).T for A in (self.M, self.C, self.K)]
-            values, Y = _all_values(*(V @ AV.T for AV in products))
-            chosen = np.argsort(np.abs(values), kind="stable")[:count]
-            values, Y = values[chosen], Y[:, chosen].T
-            MV, CV, KV = products
-            residual = values[:, None] ** 2 * (Y @ MV) + values[:, None] * (Y @ CV) + Y @ KV
-            W = [self.precondition(part) for part in (residual.real, residual.imag)]
-            energies = (residual.real * W[0] + residual.imag * W[1]).sum(axis=1)
-            sizes = (np.abs(values) + SMALL * np.abs(values).max()) ** 2
-            errors = np.abs(energies) / (sizes * (np.abs(Y) ** 2).sum(axis=1))
-            errors[np.linalg.norm(residual, axis=1) <= roundoff * np.linalg.norm(Y @ V, axis=1)] = 0.0
-            wrong = (errors > TOLERANCE**1.5) & (values.imag >= 0)  # conjugates span the same
+        """Return eigenvalues nearest to 0, and shapes: `count` and their conjugates."""
+        # It begins with real modes, two for each pair of complex ones.  After them vectors at random look for
+        # one that was missed.
+        rigid, others = self._rigid
+        rest = replace(self.rest, known=(rigid, self.rest.M(rigid)) if len(rigid) else None)
+
+        def sizes(values: Complexes) -> Array:
+            return np.asarray(np.abs(np.repeat(values, 1 + (values.imag > 0)))[:count])
+
+        values, X = self._search(rest, np.vstack([others, self.rest.roughly(count + GUARDS)]), count)
+        last = np.full(count, np.inf)
+        while (sizes(values) < last - SMALL * sizes(values).max()).any():
+            last, X = sizes(values), np.vstack([X, rest.start(SECOND)])
+            values, X = self._search(rest, X, count, SECOND)
+        shapes, pairs = X[: len(values)] + 1j * X[len(values) :], values.imag > 0
+        return np.append(values, values[pairs].conj()), np.vstack([shapes, shapes[pairs].conj()])
+
+    def _search(self, rest: Problem, X: Array, count: int, beside: int = 0) -> tuple[Complexes, Array]:
+        """Return the λ (p,) with Im λ ≥ 0 among `count`, and the parts (2p, n) of their shapes.
+
+        Those `beside` them are followed until they are known roughly, or as farther from 0.
+        """
+        number, smallest, before = count + beside, 1.0, np.zeros((0, 0))
+        room = min(3 * number + 12, rest.n)
+        space = _Space(np.empty((4, room, rest.n)), np.zeros((3, 0, 0)))
+        W, MW = rest.independent(X[lengths_of(X) > 0])
+        for _ in range(STEPS):
+            space.add(W, MW, self.C(W), self.K(W))
+            values, Y = _all_values(*space.A)
+            order = np.argsort(np.abs(values), kind="stable")[: number + GUARDS]
+            is_upper = values[order].imag >= 0  # conjugates span the same
+            wanted, p = int(is_upper[:count].sum()), int(is_upper[:number].sum())
+            Y = (Y / np.linalg.norm(Y, axis=0)).T[order[is_upper]]
+            values, y = values[order[is_upper]][:p], Y[:p]
+            residual, X = space.residual(values, y), _parts(y) @ space.V
+            W, squares = rest.precondition(residual), (np.abs(values) + SMALL * np.abs(values).max()) ** 2
+            of_parts = rest.errors(residual, W, X, np.tile(squares, 2), 10 * EPS)
+            errors, limits = of_parts[:p] + of_parts[p:], np.where(np.arange(p) < wanted, LIMIT, NEAR)
+            is_far = np.abs(values) * (1 - np.sqrt(errors)) > np.abs(values[wanted - 1])
+            wrong = (errors > limits) & ~is_far
+            smallest = min(smallest, max(float(errors[:wanted].max()), LIMIT))
+            if rest.progress:
+                rest.progress("modes", 0.99 * float(np.log(smallest) / np.log(LIMIT)))
             if not wrong.any():
-                return values, (Y @ V).T
-            V = np.vstack([V, self._independent(np.vstack([part[wrong] for part in W]), V)])
+                return values[:wanted], X.reshape(2, p, -1)[:, :wanted].reshape(2 * wanted, -1)
+            W, k = W[np.tile(wrong, 2) & (of_parts > np.tile(limits, 2) / 2)], Y.shape[1]
+            if k + len(W) > room and space.lowest > -SMALL * squares.max():  # else these are not the lowest
+                y = y @ space.keep(np.vstack([_parts(Y), np.pad(before, ((0, 0), (0, k - before.shape[1])))]))
+            before = _parts(y)
+            W, MW = rest.independent(W, space.V, space.S[1, : len(space.V)])
         raise not_converged(count)
 
-    def _independent(self, W: Array, V: Array) -> Array:
-        """Return vectors (k, n) without the rigid ones and V, orthonormal in M."""
-        known = np.vstack([self.rigid.T, V])
-        for _ in range(2):
-            W = W / np.maximum(lengths_of(W), np.finfo(float).tiny)[:, None]
-            W = W - (W @ (self.M @ known.T)) @ known
-            W = W[lengths_of(W) > ROUNDED]
-        return orthonormal(W @ (self.M @ W.T)).T @ W
+
+@dataclass
+class _Space:
+    """Vectors V (k, n), orthonormal in M, and the projections A (3, k, k) of M, C and K on them."""
+
+    S: Array  # V, M V, C V and K V, in the first k places
+    A: Array
+
+    @property
+    def V(self) -> Array:
+        """The vectors (k, n)."""
+        return self.S[0, : self.A.shape[1]]
+
+    @property
+    def lowest(self) -> float:
+        """The lowest eigenvalue of K and its transpose on the vectors, in 1/s²."""
+        return float(np.linalg.eigvalsh(self.A[2] + self.A[2].T)[0])
+
+    def add(self, *new: Array) -> None:
+        """Add vectors W (m, n), given with M W, C W and K W."""
+        k = len(self.V)
+        size = k + len(new[0])
+        if size > self.S.shape[1]:
+            self.S = np.concatenate([self.S, np.empty_like(self.S)], axis=1)
+        self.S[:, k:size] = new
+        V, *products = self.S[:, :size]
+        both = zip(self.A, products, strict=True)
+        self.A = np.stack([np.block([[A, V[:k] @ Z[k:].T], [V[k:] @ Z.T]]) for A, Z in both])
+
+    def keep(self, rows: Array) -> Array:
+        """Leave the span of combinations (m, k) of the vectors; return the new ones in the old (k, m)."""
+        Q = np.linalg.qr(rows[lengths_of(rows) > 0].T)[0]
+        for Z in self.S:
+            combine(Z, Q)
+        self.A = Q.T @ self.A @ Q
+        return Q
+
+    def residual(self, values: Complexes, y: Complexes) -> Array:
+        """Return what combinations (p, k) of the vectors miss with λ (p,), in parts (2p, n)."""
+        powers, products = (values**2, values, np.ones_like(values)), self.S[1:, : y.shape[1]]
+        return np.asarray(sum(_parts(f[:, None] * y) @ Z for f, Z in zip(powers, products, strict=True)))
+
+
+def _parts(A: Complexes) -> Array:
+    """Return the real parts of rows, and after them their imaginary parts."""
+    return np.vstack([A.real, A.imag])
 
 
 def _all_values(M: Array, C: Array, K: Array) -> tuple[Complexes, Complexes]:
@@ -125,21 +216,3 @@ def _all_values(M: Array, C: Array, K: Array) -> tuple[Complexes, Complexes]:
     zero, one = np.zeros_like(K), scale * np.eye(len(K))
     values, vectors = np.linalg.eig(np.block([[zero, one], [-K / scale, -C]]))
     return values.astype(complex), np.asarray(np.linalg.solve(L.T, vectors[: len(K)]), dtype=complex)
-
-
-def unresisted_modes(M: Any, C: Any, K: Any, candidates: Array) -> Array:
-    """Return the span (n, k) of those candidates (n, m) that C, K and their transposes take to 0.
-
-    φ^T M φ = 1 of each, and 0 of two.
-    """
-    if not candidates.shape[1]:
-        return candidates
-    L = np.linalg.cholesky(candidates.T @ (M @ candidates))
-    phi = np.linalg.solve(L, candidates.T).T
-    speed = first_shift(K, M) ** 0.5
-    pushed = [
-        np.asarray(A @ phi) / factor for A, factor in ((K, 1.0), (K.T, 1.0), (C, 1 / speed), (C.T, 1 / speed))
-    ]
-    size = np.abs(K).sum(axis=0).max() * np.linalg.norm(phi, axis=0).max()
-    _, values, directions = np.linalg.svd(np.vstack(pushed), full_matrices=False)
-    return np.asarray(phi @ directions[values <= NEUTRAL * size].T)

@@ -88,7 +88,7 @@ def modes_near(K: Csr, M: Csr, count: int, near: float) -> tuple[Array, Array]:
             x = factors.solve(f)
             return np.asarray(x - X @ ((M @ X).T @ x))  # noqa: B023
 
-        operator, start = LinearOperator((n, n), inverse, dtype=np.float64), _random(1 + len(squares), n)[0]
+        operator, start = LinearOperator((n, n), inverse, dtype=float), at_random(1 + len(squares), n)[0]
         try:
             options = {"ncv": min(n, 4 * count + 40), "maxiter": RESTARTS, "v0": inverse(M @ start)}
             found, Y = eigsh(K, count + GUARDS, M, shift, OPinv=operator, **options)
@@ -106,7 +106,7 @@ def modes_near(K: Csr, M: Csr, count: int, near: float) -> tuple[Array, Array]:
         complete = not first and shift - radius <= low and high <= shift + radius
     Y = factors.solve(M @ X[:, chosen])  # once more: high modes, in which rounding tells most, leave
     squares, C = _ritz(Y.T @ (K @ Y), Y.T @ (M @ Y), count)
-    check_residuals([(np.ones(count), K), (-squares, M)], Y @ C)
+    _check_dense(K, M, squares, Y @ C)
     return np.sqrt(np.maximum(squares, 0.0)), Y @ C
 
 
@@ -137,7 +137,7 @@ def dense_modes(K: Array, M: Array, count: int) -> tuple[Array, Array]:
             f"{count} modes cannot be found: stiffness or mass is not positive within rounding; look for "
             "lengths or constants in wrong units, and for very thin elements"
         )
-    check_residuals([(np.ones(count), K), (-squares, M)], shapes)
+    _check_dense(K, M, squares, shapes)
     return np.sqrt(np.maximum(squares, 0.0)), shapes
 
 
@@ -173,7 +173,7 @@ class Problem:
                 self.progress("modes", 0.99 * float(np.log(smallest) / np.log(self.tolerance)))
             return largest <= self.tolerance
 
-        X, problem = self._roughly(count + GUARDS + count // 6), replace(self, wanted=count)
+        X, problem = self.roughly(count + GUARDS + count // 6), replace(self, wanted=count)
         while True:
             squares, X, MX = problem._descend(X, converged)
             last = squares[count - 1]
@@ -184,33 +184,33 @@ class Problem:
                 lower = squares[0] - errors[0] * abs(squares[0])
                 return bool(squares[0] < last or lower > last or errors[0] <= NEAR)  # noqa: B023
 
-            others, Y, _ = replace(self, known=known)._descend(self._start(SECOND), decided)
+            others, Y, _ = replace(self, known=known)._descend(self.start(SECOND), decided)
             if others[0] > last - self.tolerance * abs(last):
                 self._check(squares[:count], X[:count])
                 return squares[:count], X[:count]
             X = np.vstack([X, Y])
 
-    def _start(self, count: int) -> Array:
+    def start(self, count: int) -> Array:
         """Return vectors (count, n) in which low modes are large, the same each time."""
-        return self.precondition(self.M(_random(count, self.n)))
+        return self.precondition(self.M(at_random(count, self.n)))
 
-    def _roughly(self, count: int) -> Array:
+    def roughly(self, count: int) -> Array:
         """Return vectors (count, n) near the lowest modes, those of the coarse level if there is one."""
         if self.coarse is None or self.coarse[0].n < 4 * count:
-            return self._start(count)
+            return self.start(count)
         problem, onto_all = self.coarse
         problem = replace(problem, wanted=0)
 
         def enough(squares: Array, errors: Array) -> bool:
             return bool(errors[:-GUARDS].max() <= ROUGH)
 
-        return onto_all(problem._descend(problem._start(count), enough)[1])
+        return onto_all(problem._descend(problem.start(count), enough)[1])
 
     def _descend(self, X: Array, done: Done) -> tuple[Array, Array, Array]:
         """Return λ, x and M x of as many vectors as X has, from these, when `done`."""
-        m, (W, MW) = len(X), self._independent(X)
+        m, (W, MW) = len(X), self.independent(X)
         while len(W) < m:  # thin bodies: one cycle leaves little but their softest motions
-            W, MW = self._independent(np.vstack([W, _random(m - len(W), self.n)]))
+            W, MW = self.independent(np.vstack([W, at_random(m - len(W), self.n)]))
         S, KS, MS = (np.empty((3 * m, self.n)) for _ in range(3))
         squares, errors, A = np.full(m, np.inf), np.full(m, np.inf), np.zeros((0, 0))
         limits = np.where(np.arange(m) < self.wanted, self.tolerance, ROUGH)
@@ -228,12 +228,12 @@ class Problem:
             last -= C @ (C.T @ (G @ last))
             both = np.hstack([C, last @ orthonormal(last.T @ G @ last)]) if step else C
             for V in (S, KS, MS):
-                _combine(V, both)
+                combine(V, both)
             A = both.T @ A @ both
             residual = KS[active] - squares[active, None] * MS[active]
             W = self.precondition(residual)
             gaps = (squares[-1] - squares[active]) / np.abs(squares[-1])  # beyond which others mix in
-            errors[active] = self._errors(residual, W, S[active], squares[active], allowed)
+            errors[active] = self.errors(residual, W, S[active], squares[active], allowed)
             errors[active] /= np.where(active < self.wanted, np.clip(gaps, NEAR, 1.0), 1.0)
             if done(squares, errors):
                 return squares, S[:m], MS[:m]
@@ -244,10 +244,10 @@ class Problem:
                     break
                 allowed, best_at = ROUNDING, step
             used = both.shape[1]
-            W, MW = self._independent(W[errors[active] > limits[active]], S[:used], MS[:used])
+            W, MW = self.independent(W[errors[active] > limits[active]], S[:used], MS[:used])
         raise not_converged(m)
 
-    def _independent(self, W: Array, *basis: Array) -> tuple[Array, Array]:
+    def independent(self, W: Array, *basis: Array) -> tuple[Array, Array]:
         """Return vectors W without what is known or a basis S, given with S M, orthonormal in M, and W M."""
         spans = [span for span in (self.known, basis) if span]
         cancelled = True
@@ -266,7 +266,7 @@ class Problem:
         off = np.maximum(np.abs(energies - squares) / np.abs(squares), np.abs(sizes - 1))
         check(off, RESIDUAL + ROUNDING * self.norms[0] * lengths_of(X) ** 2 / np.abs(squares))
 
-    def _errors(self, residual: Array, W: Array, X: Array, squares: Array, allowed: float) -> Array:
+    def errors(self, residual: Array, W: Array, X: Array, squares: Array, allowed: float) -> Array:
         """Return the relative errors of λ, r K⁻¹ r^T / λ or r M⁻¹ r^T / λ²; 0 where r is rounding."""
         norm_K, norm_M = self.norms
         rounding = allowed * (norm_K + squares * norm_M) * lengths_of(X)
@@ -274,7 +274,7 @@ class Problem:
         return np.where(lengths_of(residual) <= rounding, 0.0, energies)
 
 
-def _random(count: int, n: int) -> Array:
+def at_random(count: int, n: int) -> Array:
     """Return vectors (count, n), the same each time."""
     return np.random.default_rng(count).standard_normal((count, n))
 
@@ -304,7 +304,7 @@ def _bordered(A: Array, rows: Array) -> Array:
     return np.vstack([np.hstack([A, rows[:, : len(A)].T]), rows])
 
 
-def _combine(V: Array, C: Array) -> None:
+def combine(V: Array, C: Array) -> None:
     """Put combinations C (k, m) of the first k vectors of V in the places of the first m."""
     k, m = C.shape
     for start in range(0, V.shape[1], COLUMNS):
@@ -325,13 +325,12 @@ def not_converged(count: int) -> SolveError:
     )
 
 
-def check_residuals(terms: list[tuple[Any, Any]], shapes: Any, energies: bool = False) -> None:
-    """Raise SolveError unless the sum of terms, factors and matrices, is 0 for each shape (n, count).
+def check_residuals(parts: list[Any], norms: Any, shapes: Any, energies: bool = False) -> None:
+    """Raise SolveError unless the sum of parts, products of matrices, is 0 for each shape (n, count).
 
     Of `energies` it is the product with the shape that has to be 0, which is known more exactly than that.
+    The `norms` are those of the sum of matrices.
     """
-    parts = [factor * (A @ shapes) for factor, A in terms]
-    norms = sum(np.abs(factor) * float(abs(A).sum(axis=0).max()) for factor, A in terms)
     lengths = np.linalg.norm(shapes, axis=0)
     if energies:
         parts = [(shapes.conj() * part).sum(axis=0, keepdims=True) / lengths for part in parts]
@@ -339,6 +338,12 @@ def check_residuals(terms: list[tuple[Any, Any]], shapes: Any, energies: bool = 
     size = sum(np.linalg.norm(part, axis=0) for part in parts)
     allowed = RESIDUAL * size + 0.1 * ROUNDING * norms * lengths
     check(residual / size, allowed / size)
+
+
+def _check_dense(K: Any, M: Any, squares: Array, X: Array) -> None:
+    """Raise SolveError unless K x = λ M x of matrices and vectors (n, count)."""
+    norm_K, norm_M = (float(abs(A).sum(axis=0).max()) for A in (K, M))
+    check_residuals([K @ X, -squares * (M @ X)], norm_K + squares * norm_M, X)
 
 
 def check(errors: Array, allowed: Array) -> None:

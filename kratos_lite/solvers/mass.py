@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.assembly import mass_and_convection
-from kratos_lite.assembly.block_matrix import rows_of_numbers
+from kratos_lite.assembly.block_matrix import rows_of_numbers, times_numbers
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.mass_and_convection import inertia_matrices
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.errors import SolveError
-from kratos_lite.native import kernels
 from kratos_lite.solvers import direct
 from kratos_lite.solvers.constraints import ConstraintMap
 from kratos_lite.solvers.iteration import conjugate_gradients
@@ -63,17 +62,8 @@ class Mass:
 
     def times(self, v: Array) -> Array:
         """Return M v of a nodal vector (3n,), or of several (k, 3n), which read the matrix together."""
-        product = self._times(v)
+        product = times_numbers(self.scalar, v)
         return product if self.attached is None else product + (self.attached @ v.T).T
-
-    def _times(self, v: Array) -> Array:
-        M, compiled = self.scalar, kernels("sparse")
-        vectors = np.ascontiguousarray(v).reshape(-1, 3 * len(self._points))
-        if compiled is not None:
-            return compiled.multiply(M.indptr, M.indices, M.data, vectors).reshape(v.shape)
-        nodal = np.moveaxis(vectors.reshape(len(vectors), -1, 3), 0, 2)
-        product = (M @ nodal.reshape(len(nodal), -1)).reshape(nodal.shape)
-        return np.moveaxis(product, 2, 0).reshape(v.shape)
 
     def solve(self, b: Array) -> Array:
         """Return M^-1 b of nodal vectors (3n,) or columns of them (3n, k)."""

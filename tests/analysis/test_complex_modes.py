@@ -157,3 +157,24 @@ def test_frequencies_that_do_not_fit_their_shapes_are_refused(monkeypatch):
     monkeypatch.setattr(eigen.Problem, "_descend", doubled)
     with pytest.raises(SolveError, match="has a residual of"):
         kl.Model(kl.box((1, 1, 1), (2, 2, 2)), RUBBER).modes(9)
+
+
+def test_modes_that_the_start_does_not_hold_are_found(monkeypatch):
+    """Two bars apart, without a factorization: nothing leads from the modes of the first to the second."""
+    bars = {name: kl.box((3, 1, 1), (4, 1, 1), "KinematicLinear3D8N") for name in ("one", "other")}
+    model = kl.Model(kl.join(bars), RUBBER)
+    model.fix("one.z-")
+    model.fix("other.z-")
+    model.add(kl.ale.Translation("x", 20.0, boundaries="natural", damping=5.0))
+    exact, scale = spectrum(model)
+    plain = eigen.Problem.roughly
+
+    def of_the_first(self, count):
+        X = plain(self, count)
+        X[:, X.shape[1] // 2 :] = 0.0
+        return X
+
+    monkeypatch.setattr(complex_eigen, "DENSE_MODES", 0)
+    monkeypatch.setattr(eigen.Problem, "roughly", of_the_first)
+    monkeypatch.setattr("kratos_lite.solvers.direct.factorize", None)
+    compare(model, exact, scale, count=6)

@@ -51,12 +51,13 @@ def test_every_phase_is_reported_from_its_begin_to_its_end(work):
     assert {phase for phase, share in last.items() if share != 1} == set()
 
 
-def test_an_iteration_for_modes_reports_each_step():
+@pytest.mark.parametrize("method", ["modes", "complex_modes"])
+def test_an_iteration_for_modes_reports_each_step(method):
     mesh = kl.box((1.0, 1.0, 1.0), (8, 8, 8))
     model = kl.Model(mesh, kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0))
     model.fix("z-")
     calls = []
-    model.modes(2, progress=lambda phase, share: calls.append((phase, share)))
+    getattr(model, method)(2, progress=lambda phase, share: calls.append((phase, share)))
     shares = [share for phase, share in calls if phase == "modes"]
     assert len(shares) > 6
     assert shares == sorted(shares)
