@@ -48,7 +48,7 @@ DIFFERS = {
     "dloadlinIf": "9 modes of C3D8I twist stiffly: mode 4 is 249 Hz in ccx, 182.0 here, 181.9 with C3D20",
     "damper1": "damping by mass of rigid motions in HHT",
 }
-SIZES = (("C3D10", 8), ("C3D10", 13), ("C3D20R", 8), ("C3D8", 20), ("bracket", 2), ("C3D10", 18))
+SIZES = (("C3D10", 8), ("C3D10", 13), ("C3D20R", 8), ("C3D8", 20), ("bracket", 4), ("C3D10", 18))
 """Elements and cells along the short edges of a block 1 × 1 × 2 under its weight; 12 mm / n in a bracket."""
 TIMES = """Blocks 1 × 1 × 2 under their weight and a bracket of C3D10 by Gmsh (`python -m benchmarks decks`),
 and a bar with a hole that FreeCAD meshed (`python -m benchmarks decks bar.inp`), whole processes: seconds of

@@ -54,7 +54,7 @@ class ConstrainedSystem:
         ordered: bool = False,
     ) -> None:
         self.n_nodes = len(points)
-        ordered = ordered and all(map(MatrixFree.takes, groups))
+        ordered = ordered and len(groups) > 0 and all(map(MatrixFree.takes, groups))
         self.nodes, self.groups = renumber(points, groups, ordered)
         self._are_all = np.array_equal(self.nodes, np.arange(self.n_nodes))
         self.points = points[self.nodes]
