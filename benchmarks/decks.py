@@ -16,6 +16,7 @@ from time import perf_counter
 import numpy as np
 
 import kratos_lite as kl
+from benchmarks.accuracy import bracket
 from benchmarks.driver import ROOT, load, save
 from benchmarks.tables import Row, error, table
 from kratos_lite.io.abaqus.deck import Deck
@@ -47,10 +48,11 @@ DIFFERS = {
     "dloadlinIf": "9 modes of C3D8I twist stiffly: mode 4 is 249 Hz in ccx, 182.0 here, 181.9 with C3D20",
     "damper1": "damping by mass of rigid motions in HHT",
 }
-SIZES = (("C3D10", 8), ("C3D10", 13), ("C3D20R", 8), ("C3D8", 20), ("C3D10", 18))
-"""Elements and cells along the short edges of a block 1 × 1 × 2 under its weight."""
-TIMES = """Blocks 1 × 1 × 2 under their weight (`python -m benchmarks decks`), and a bar with a hole that
-FreeCAD meshed (`python -m benchmarks decks bar.inp`), whole processes: seconds of processors, and memory."""
+SIZES = (("C3D10", 8), ("C3D10", 13), ("C3D20R", 8), ("C3D8", 20), ("bracket", 4), ("C3D10", 18))
+"""Elements and cells along the short edges of a block 1 × 1 × 2 under its weight; 12 mm / n in a bracket."""
+TIMES = """Blocks 1 × 1 × 2 under their weight and a bracket of C3D10 by Gmsh (`python -m benchmarks decks`),
+and a bar with a hole that FreeCAD meshed (`python -m benchmarks decks bar.inp`), whole processes: seconds of
+processors, and memory."""
 TEXT = """# Test decks of CalculiX
 
 The decks of CalculiX's own tests that hold solids alone, here and in a live ccx {version}. *Tables*: those of
@@ -146,21 +148,29 @@ def timed(words: list[str], folder: str) -> tuple[float, float, float]:
 
 
 def write_block(path: Path, kind: str, n: int) -> int:
-    """Write the deck of a block; return its unknowns."""
-    mesh = kl.box((1.0, 1.0, 2.0), (n, n, 2 * n), ELEMENT_TYPES[kind])
+    """Write the deck of a block, or of the bracket in mm; return its unknowns."""
+    if kind == "bracket":
+        model = bracket(kind, n)
+        kind, mesh, points = "C3D10", model.mesh, 1e3 * model.mesh.points
+        forces = model.loads[0].forces(mesh, model.element_groups())
+        base, some = np.flatnonzero(model.supports.fixed[:, 0]) + 1, np.argwhere(forces).tolist()
+        load = "\n".join(["*CLOAD", *(f"{i + 1}, {j + 1}, {forces[i, j]:.15g}" for i, j in some)])
+    else:
+        mesh = kl.box((1.0, 1.0, 2.0), (n, n, 2 * n), ELEMENT_TYPES[kind])
+        points, load = mesh.points, "*DLOAD\nALL, GRAV, 9810., 0., .6, -.8"
+        base = np.flatnonzero(points[:, 2] == 0) + 1
     cells = mesh.blocks[0].nodes[:, list(mesh.blocks[0].known_shape.to_vtk)] + 1
-    base = np.flatnonzero(mesh.points[:, 2] == 0) + 1
-    enumerated = [(i, *x) for i, x in enumerate(mesh.points.tolist(), 1)]
+    enumerated = [(i, *x) for i, x in enumerate(points.tolist(), 1)]
     rows = [",\n".join(", ".join(map(str, row[i : i + 10])) for i in range(0, len(row), 10))
             for row in np.column_stack([np.arange(1, len(cells) + 1), cells]).tolist()]  # fmt: skip
     path.write_text(
         "*NODE, NSET=EVERY\n"
         + "".join("{}, {:.15g}, {:.15g}, {:.15g}\n".format(*row) for row in enumerated)
-        + f"*ELEMENT, TYPE={kind}, ELSET=BLOCK\n" + "\n".join(rows)
+        + f"*ELEMENT, TYPE={kind}, ELSET=ALL\n" + "\n".join(rows)
         + "\n*NSET, NSET=BASE\n" + ",\n".join(map(str, base.tolist()))
         + "\n*MATERIAL, NAME=STEEL\n*ELASTIC\n210000., .3\n*DENSITY\n7.85e-9\n"
-        "*SOLID SECTION, ELSET=BLOCK, MATERIAL=STEEL\n*BOUNDARY\nBASE, 1, 3\n*STEP\n*STATIC\n"
-        f"*DLOAD\nBLOCK, GRAV, 9810., 0., .6, -.8\n{ASKED}*END STEP\n"
+        "*SOLID SECTION, ELSET=ALL, MATERIAL=STEEL\n*BOUNDARY\nBASE, 1, 3\n*STEP\n*STATIC\n"
+        f"{load}\n{ASKED}*END STEP\n"
     )  # fmt: skip
     return 3 * (mesh.n_nodes - len(base))
 

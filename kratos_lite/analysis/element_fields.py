@@ -18,6 +18,7 @@ from kratos_lite.typing import Array, Csr
 from kratos_lite.validation import choice, short
 
 if TYPE_CHECKING:
+    from kratos_lite.assembly.nodal_extrapolation import Extrapolation
     from kratos_lite.assembly.nodal_recovery import Recovery
     from kratos_lite.mesh.locate import Located
     from kratos_lite.model.local_axes import LocalAxes
@@ -97,12 +98,12 @@ class ElementFields:
 
         return Recovery(self.mesh, self.groups)
 
-    def _averages(self, stress: bool) -> tuple[Array, Array]:
+    def _averages(self, stress: bool, rule: Extrapolation | None = None) -> tuple[Array, Array]:
         """Return the mean over the volume of each element (m, 6) and averaged nodal values (n, 6)."""
-        from kratos_lite.assembly.nodal_extrapolation import averages  # as for the recovery
+        from kratos_lite.assembly.nodal_extrapolation import averages, extrapolation  # as for the recovery
 
-        mesh = self.mesh
-        return averages(mesh.points, self.groups, self._strained, mesh.n_elements, stress=stress)
+        how = self.mesh.n_elements, stress, rule or extrapolation
+        return averages(self.mesh.points, self.groups, self._strained, *how)
 
     def strain(self, at: str = "gauss", local: LocalAxes | None = None) -> Any:
         """Return strains in Voigt order xx yy zz xy yz zx, with engineering shear.

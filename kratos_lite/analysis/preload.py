@@ -32,7 +32,7 @@ def preload_stiffness(e: EquationsOfMotion, preload: Preload, what: str) -> Bloc
         result = StaticAnalysis(model, progress=e.system.progress).solve(None if result is True else result)
     if result.mesh is not model.mesh or not all(group.is_linear for group in result.groups):
         raise InputError("a preload must be a linear result on the mesh of the model; got another one")
-    nodes, groups = renumber(model.mesh.n_nodes, result.groups)
+    nodes, groups = renumber(model.mesh.points, result.groups)
     pattern = model.patterns.get(len(nodes), [group.nodes for group in groups])
     data = stress_stiffness(model.mesh.points, result.groups, pattern, result.stress_in)
     if not data.any():

@@ -187,7 +187,7 @@ def system_of(
     how: dict[str, Any] = {"solver": solver, "tolerance": tolerance, "progress": progress}
     if backend == "own":
         how |= {"patterns": model.patterns, "hanging": model.mesh.hanging, "attached": model.attached}
-        return ConstrainedSystem(*what, **how)
+        return ConstrainedSystem(*what, **how, ordered=True)
     if model.attached:
         text = "leave backend and PETSc options out"
         raise ModelError(f"springs and added masses are for the own backend; {text}")

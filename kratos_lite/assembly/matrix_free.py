@@ -104,6 +104,7 @@ class MatrixFree:
 def _tables(group: ElementGroup) -> tuple[Any, ...]:
     """Return nodes, dN, weights, C and factors of a group, as kernels take them."""
     nodes, _, dN, weights = group.tables()
+    nodes = nodes[np.argsort(nodes.min(axis=1), kind="stable")]  # so that each node is read once
     C, tables = group.kernel_arguments()[0], factors(group.element.shape, group.rule)
     if tables is None:
         return nodes, dN, weights, C, None

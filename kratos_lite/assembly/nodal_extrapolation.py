@@ -42,26 +42,33 @@ def extrapolated(points: Array, group: ElementGroup, u: Array, *, stress: bool =
 
 
 def averages(
-    points: Array, groups: Sequence[ElementGroup], u: Array, n_elements: int, *, stress: bool = True
+    points: Array,
+    groups: Sequence[ElementGroup],
+    u: Array,
+    n_elements: int,
+    stress: bool,
+    rule: Extrapolation,
 ) -> tuple[Array, Array]:
     """Return stresses, or strains: means over the volume of each element (m, 6) and nodal (n, 6)."""
     total, count = np.zeros((len(points), 6)), np.zeros(len(points))
     means = np.zeros((n_elements, 6))
     for group in groups:
-        nodal, mean = _averages(points, group, u, stress)
+        nodal, mean = _averages(points, group, u, stress, rule)
         total += nodal
         means[group.rows] = mean
         count += np.bincount(group.nodes.ravel(), minlength=len(total))
     return means, total / np.maximum(count, 1)[:, None]
 
 
-def _averages(points: Array, group: ElementGroup, u: Array, stress: bool) -> tuple[Array, Array]:
+def _averages(
+    points: Array, group: ElementGroup, u: Array, stress: bool, rule: Extrapolation
+) -> tuple[Array, Array]:
     """Return the sums of the nodal values (n, 6) of a group and the means of its elements (m, 6)."""
-    to_nodes = as_double(extrapolation(group.element, group.rule))
+    to_nodes = as_double(rule(group.element, group.rule))
     if not (group.is_linear and group.is_evenly_heated):
         value, volume = at_gauss(points, group, u, stress=stress), volumes(points, group)
         means = np.einsum("mg,mgc->mc", volume / volume.sum(axis=1, keepdims=True), value)
-        return _sums(group, value, len(points)), means
+        return _sums(group, value, len(points), rule), means
     if module := compiled("gauss", group.element):
         nodal, mean = module.averages(*displaced(points, group, u, stress), to_nodes)
         return nodal, mean

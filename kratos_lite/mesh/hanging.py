@@ -44,8 +44,6 @@ class HangingNodes:
 
     def select(self, nodes: Ints, n_nodes: int) -> HangingNodes:
         """Return those of some nodes (a,), numbered by these, without other independents."""
-        if len(nodes) == n_nodes:
-            return self
         number = np.full(n_nodes, -1)
         number[nodes] = np.arange(len(nodes))
         owner = np.repeat(np.arange(len(self)), np.diff(self.start))

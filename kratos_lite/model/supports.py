@@ -422,9 +422,7 @@ class Supports:
             dof_of = np.full(fixed.shape, -1)
             dof_of[nodes] = np.arange(3 * len(nodes)).reshape(-1, 3)
             dependents = known.renumbered(dof_of.ravel())
-        if len(nodes) < len(fixed):
-            fixed, u = fixed[nodes], u[nodes]
-        return constraint_map(fixed, u, dependents)
+        return constraint_map(fixed[nodes], u[nodes], dependents)
 
     def supported(self, residual: Array) -> Array:
         """Return a residual (n, 3) where supports or constraints act, and 0 elsewhere."""

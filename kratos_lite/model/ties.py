@@ -26,6 +26,8 @@ COVERED = 0.5
 """Least fraction of each dependent face that the other part must cover."""
 HOPS = 3
 """Cells from a dependent node that is known to one that is free, at most."""
+MOSTLY = 0.5
+"""Fraction of the dependent nodes that are known from which all multipliers stay."""
 WHOLE, SAME = 1 - 1e-6, 1e-6
 """Fraction that counts as all of a part; difference of sizes of faces that counts as none."""
 
@@ -99,6 +101,8 @@ class Tie(PartTie):
 
         x, one, size = self.integrals, np.eye(3), self.mesh.points.size
         dofs = dofs_of(x.nodes)
+        if known.flat[dofs].mean() > MOSTLY:  # of a rigid part: few neighbors would take too many multipliers
+            known = np.zeros_like(known)
         free, held = (np.flatnonzero(mask) for mask in (~known.flat[dofs], known.flat[dofs]))
         T, S, near = (csr_array(kron(A, one)) for A in (x.T, x.inverse, x.neighbors))
         step = taken = near[:, held]

@@ -25,6 +25,8 @@ from kratos_lite.typing import Array, Ints, Mask, Progress
 if TYPE_CHECKING:
     from kratos_lite.mesh.hanging import HangingNodes
 
+FAR, SLAB = 5.0, 3.0
+"""Mean way from a node to the next above which nodes get an order, and the slabs of that, in spacings."""
 NO_MATRIX = "the stiffness matrix, as its products are computed element by element"
 """What is skipped with linear elements inside the quadratic ones."""
 
@@ -49,9 +51,12 @@ class ConstrainedSystem:
         progress: Progress | None = None,
         hanging: HangingNodes | None = None,
         attached: Attached | None = None,
+        ordered: bool = False,
     ) -> None:
         self.n_nodes = len(points)
-        self.nodes, self.groups = renumber(self.n_nodes, groups)
+        ordered = ordered and len(groups) > 0 and all(map(MatrixFree.takes, groups))
+        self.nodes, self.groups = renumber(points, groups, ordered)
+        self._are_all = np.array_equal(self.nodes, np.arange(self.n_nodes))
         self.points = points[self.nodes]
         self.constraint_map = constraints(self.nodes)
         self.tolerance, self.progress = tolerance, progress
@@ -162,11 +167,11 @@ class ConstrainedSystem:
 
     def gather(self, values: Array) -> Array:
         """Return nodal values (n, 3) as those of the equations, (3a,)."""
-        return values.ravel() if len(self.nodes) == self.n_nodes else values[self.nodes].ravel()
+        return values.ravel() if self._are_all else values[self.nodes].ravel()
 
     def scatter(self, values: Array) -> Array:
         """Return values of the equations (3a,) as nodal values (n, 3), 0 on nodes without equations."""
-        if len(self.nodes) == self.n_nodes:
+        if self._are_all:
             return values.reshape(-1, 3)
         out = np.zeros((self.n_nodes, 3))
         out[self.nodes] = values.reshape(-1, 3)
@@ -188,16 +193,31 @@ def stiffness_contrast(groups: Sequence[ElementGroup]) -> float:
     return max(moduli) / min(moduli)
 
 
-def renumber(n_nodes: int, groups: Sequence[ElementGroup]) -> tuple[Ints, list[ElementGroup]]:
-    """Return the rows of the nodes that elements use, and the groups numbered by them."""
-    used = np.zeros(n_nodes, dtype=bool)
+def renumber(
+    points: Array, groups: Sequence[ElementGroup], ordered: bool = False
+) -> tuple[Ints, list[ElementGroup]]:
+    """Return the rows of the nodes that elements use, and the groups numbered by them, perhaps in slabs."""
+    used, number = np.zeros(len(points), dtype=bool), np.zeros(len(points), dtype=np.int32)
     for group in groups:
         used[group.nodes] = True
     nodes = np.flatnonzero(used)
-    if len(nodes) == n_nodes:
+    if ordered and (order := in_slabs(points[nodes])) is not None:
+        nodes = nodes[order]
+    elif len(nodes) == len(points):
         return nodes, list(groups)
-    local = (np.cumsum(used) - 1).astype(np.int32)
-    return nodes, [replace(group, nodes=local[group.nodes]) for group in groups]
+    number[nodes] = np.arange(len(nodes))
+    return nodes, [replace(group, nodes=number[group.nodes]) for group in groups]
+
+
+def in_slabs(points: Array) -> Ints | None:
+    """Return an order of points (n, 3) by slabs across the longest axis and rows in these, if needed."""
+    low, size = points.min(axis=0), np.ptp(points, axis=0)
+    spacing = (np.prod(size) / len(points)) ** (1 / 3)
+    if np.linalg.norm(np.diff(points, axis=0), axis=1).mean() <= FAR * spacing:
+        return None
+    short, *others = np.argsort(size)
+    slabs = (points[:, others] - low[others]) // (SLAB * spacing)
+    return np.lexsort((points[:, short], *slabs.T))
 
 
 def select(groups: Sequence[ElementGroup], moving: Mask) -> list[ElementGroup]:

@@ -51,7 +51,9 @@ def everything(points, groups, u):
         found[f"strain {i}"] = fields.at_gauss(points, group, u, stress=False)
     found["internal load"] = fields.internal_load(points, groups, u)
     for what in (True, False):
-        means, nodal = nodal_extrapolation.averages(points, groups, u, m, stress=what)
+        means, nodal = nodal_extrapolation.averages(
+            points, groups, u, m, what, nodal_extrapolation.extrapolation
+        )
         found |= {f"means {what}": means, f"nodal {what}": nodal}
     for name, value in zip(("energy", "mises", "row"), fields.totals(points, groups, u), strict=True):
         found[name] = np.array(value)
@@ -207,7 +209,12 @@ def test_nodal_values_of_a_uniform_strain_are_that_strain_however_many_elements_
     strain = 1e-3 * np.array([1.0, -2.0, 3.0, 0.0, 0.0, 0.0])
     groups = kl.Model(mesh, WOOD).element_groups()
     means, nodal = nodal_extrapolation.averages(
-        mesh.points, groups, mesh.points * strain[:3], mesh.n_elements, stress=False
+        mesh.points,
+        groups,
+        mesh.points * strain[:3],
+        mesh.n_elements,
+        False,
+        nodal_extrapolation.extrapolation,
     )
     for found in (means, nodal):
         np.testing.assert_allclose(found, np.tile(strain, (len(found), 1)), rtol=0, atol=1e-16)

@@ -118,6 +118,28 @@ def test_renumbering_nodes_and_elements_changes_the_last_bits_only():
     np.testing.assert_allclose(v, u[order], rtol=0, atol=1e-11 * np.abs(u).max())
 
 
+def test_a_mesh_whose_nodes_are_scattered_is_solved_as_one_in_order():
+    """Its equations have another order than its nodes."""
+    mesh = kl.box((1, 1, 2), (5, 5, 10), "KinematicLinear3D10N")
+    order = np.random.default_rng(5).permutation(mesh.n_nodes)
+    old = mesh.blocks[0]
+    other = kl.Mesh(mesh.points[order], [kl.Block(old.name, np.argsort(order)[old.nodes].astype(np.int32))])
+    pushed, found = (np.isclose(mesh.points[:, 2], 2.0), np.isclose(other.points[:, 2], 2.0)), []
+    for one, ends in zip((mesh, other), pushed, strict=True):
+        model = kl.Model(one, STEEL)
+        model.fix(np.flatnonzero(one.points[:, 2] == 0))
+        model.fix(np.flatnonzero(ends), "x", 1e-3)
+        model.add(kl.Gravity((0, 5.0, -9.81)))
+        a, b = (int(np.abs(one.points - (x, 1, 2)).sum(axis=1).argmin()) for x in (0, 1))
+        model.constrain((a, "y"), {(b, "y"): 1.0})
+        analysis = model.static()
+        result, mean = analysis.solve(), kl.MeanDisplacement(np.flatnonzero(ends), "z")
+        found.append((result.u, result.reactions, result.gradient(mean, wrt="coordinates")))
+    assert (np.diff(analysis.system.nodes) < 0).any()
+    for values, same in zip(*found, strict=True):
+        np.testing.assert_allclose(same, values[order], rtol=0, atol=1e-9 * np.abs(values).max())
+
+
 def test_a_turned_body_gives_the_turned_answer():
     angle = 0.7
     R = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1.0]])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,7 +17,6 @@ from kratos_lite.io.text import read_bytes, real, shown
 from kratos_lite.native import kernels
 from kratos_lite.typing import Array, Ints
 
-_COMMENT = re.compile(rb"^[ \t]*\*\*.*$", re.MULTILINE)
 _BROKEN = re.compile(rb",[ \t]*\n")
 """Where a row goes on in the next line."""
 _OPTION = re.compile(r'\s*([^=,"]+?)\s*(?:=\s*("[^"]*"|[^,]*?))?\s*(?:,|$)')
@@ -146,15 +146,16 @@ def read_cards(path: Path, *, before: Card | None = None, depth: int = 0) -> Ite
     """Yield the cards of a deck and of the files that it includes, which may go on with a card before."""
     data = read_bytes(path)
     stars = list(_starred(data))
+    comments = [at for at in stars if data.startswith(b"**", at)]
     starts = [at for at in stars if not data.startswith(b"**", at)]
-    lead = _COMMENT.sub(b"", data[: starts[0] if starts else None])
+    lead = _uncommented(data, 0, starts[0] if starts else len(data), comments)
     if lead.strip() and before:
         before = _continued(before, str(path), 1, lead)
         yield before
     elif lead.strip() or not starts:
         found = shown(lead.strip().split(b"\n")[0]) if lead.strip() else "nothing"
         raise InputError(f"{path}: a deck begins with a card such as *NODE; got {found}")
-    has_comments, line, last = len(stars) > len(starts), 1, 0
+    line, last = 1, 0
     for at, after in zip(starts, [*starts[1:], len(data)], strict=False):
         line += data.count(b"\n", last, at)
         last, end = at, _line_end(data, at)
@@ -164,8 +165,7 @@ def read_cards(path: Path, *, before: Card | None = None, depth: int = 0) -> Ite
             if b"=" not in data[end + 1 : stop]:
                 break
             header, end = header + data[end + 1 : stop].strip(), stop
-        body = data[end:after]
-        body = _COMMENT.sub(b"", body) if has_comments and b"**" in body else body
+        body = _uncommented(data, end, after, comments)
         card = _card(header, body, str(path), line + data.count(b"\n", at, end))
         if card.keyword != "INCLUDE":
             before = card
@@ -196,6 +196,15 @@ def _starred(data: bytes) -> Iterator[int]:
             yield at
         at = data.find(b"\n", at)
         at = data.find(b"*", at) if at >= 0 else at
+
+
+def _uncommented(data: bytes, first: int, last: int, comments: list[int]) -> bytes:
+    """Return data[first:last] without the comments that begin at some places, but with their lines."""
+    parts = []
+    for at in comments[bisect_left(comments, first) : bisect_left(comments, last)]:
+        parts.append(data[first:at])
+        first = _line_end(data, at)
+    return b"".join([*parts, data[first:last]])
 
 
 def _line_end(data: bytes, at: int) -> int:

@@ -81,6 +81,9 @@ def at_gauss(result: ElementFields, name: str) -> list[Array]:
 
 def averaged(result: ElementFields, name: str) -> Array | None:
     """Return a field (n, c), extrapolated and averaged at nodes."""
+    if name in ("stress", "strain"):  # by a kernel, without those at Gauss points
+        nodal = result._averages(name == "stress", extrapolation)[1]
+        return nodal if name == "stress" else nodal * voigt.HALF_SHEAR
     values, how = at_gauss(result, name), (result.mesh.n_nodes, extrapolation)
     return nodal_extrapolation.averaged(result.groups, values, *how) if values else None
 
@@ -115,7 +118,7 @@ def error(result: ElementFields) -> Array | None:
         if (kind, len(group.rule)) not in ERRORS:
             return None
         a, b, c = ERRORS[kind, len(group.rule)]
-        principal = voigt.principal_values(result.stress_in(group))[..., ::2]
+        principal = extremes(result.stress_in(group))
         sizes = np.abs(principal).max(axis=1)
         largest = sizes.argmax(axis=1)
         chosen = principal[np.arange(len(group)), :, largest]
@@ -127,6 +130,20 @@ def error(result: ElementFields) -> Array | None:
         between = group.nodes[:, edges.max() + 1 :]
         worst[between] = worst[group.nodes[:, edges]].mean(axis=2)[:, : between.shape[1]]
     return worst
+
+
+def extremes(stress: Array) -> Array:
+    """Return the first and the third principal value (..., 2) of (..., 6), of equal ones half of the digits.
+
+    >>> extremes(np.array([30.0, 0.0, 0.0, 20.0, 0.0, 0.0])).round(12).tolist()
+    [40.0, -10.0]
+    """
+    # The roots of a cubic by cosines: a tenth of the time of eigenvalues by LAPACK.
+    radius = voigt.von_mises(stress)[..., None] * (2 / 3)
+    unit = voigt.deviator(stress) / np.maximum(radius, np.finfo(float).tiny)
+    angle = np.arccos(np.clip(4 * voigt.determinant(unit), -1.0, 1.0)) / 3
+    mean = stress[..., :3].mean(axis=-1, keepdims=True)
+    return np.asarray(mean + radius * np.cos(angle[..., None] + [0.0, 2 * np.pi / 3]))
 
 
 def displacements(model: Any, u: Array, time: float = 0.0) -> Array:

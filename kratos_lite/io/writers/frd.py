@@ -103,21 +103,42 @@ def _cells(path: str | Path, block: Block) -> tuple[int, Numbers]:
 
 def _cell_lines(number: int, ids: Numbers, material: Numbers, nodes: Numbers) -> bytes:
     """Return cells, ten nodes a line."""
-    line = f" -1%10d{number:5d}    0%5d\n"
+    m = len(ids)
+    parts = [_words(" -1", m), _integers(ids), _words(f"{number:5d}    0", m), _integers(material, 5)]
     for start in range(0, nodes.shape[1], 10):
-        line += " -2" + "%10d" * min(10, nodes.shape[1] - start) + "\n"
-    return (line * len(ids) % tuple(np.column_stack([ids, material, nodes]).ravel().tolist())).encode()
+        parts += [_words("\n -2", m), _integers(nodes[:, start : start + 10])]
+    return np.hstack([*parts, _words("\n", m)]).tobytes()
 
 
 def _rows(ids: Numbers, values: Numbers) -> bytes:
     """Return a block of values (n, c) of nodes, six a line, and its end."""
-    n, parts = len(ids), list[Numbers]()
+    n = len(ids)
+    parts = [_words(" -1", n), _integers(ids)]
     values = values.astype(np.float32).astype(float)  # as CalculiX rounds them
     for start in range(0, values.shape[1], 6):
-        head = f"{' -2':13}" * n if start else " -1%10d" * n % tuple(ids.tolist())
-        parts += [np.frombuffer(head.encode(), np.uint8).reshape(n, 13), _text(values[:, start : start + 6])]
-        parts.append(np.full((n, 1), ord("\n"), np.uint8))
-    return np.hstack(parts).tobytes() + b" -3\n"
+        parts += [_words(f"\n{' -2':13}", n)] * (start > 0) + [_text(values[:, start : start + 6])]
+    return np.hstack([*parts, _words("\n", n)]).tobytes() + b" -3\n"
+
+
+def _words(word: str, n: int) -> Numbers:
+    """Return a word as bytes, n times."""
+    return np.broadcast_to(np.frombuffer(word.encode(), np.uint8), (n, len(word)))
+
+
+def _integers(values: Numbers, width: int = 10) -> Numbers:
+    """Return whole numbers (n, ...) as bytes (n, ...), those that ``%10d`` makes of each.
+
+    >>> _integers(np.array([[120, 7]]), 4).tobytes()
+    b' 120   7'
+    """
+    text, rest = np.full((*values.shape, width), ord(" "), np.uint8), values
+    for place in range(width - 1, -1, -1):
+        above = rest // 10
+        digits = (rest - 10 * above + ord("0")).astype(np.uint8)
+        text[..., place] = digits if place == width - 1 else np.where(rest > 0, digits, ord(" "))
+        if not (rest := above).any():
+            break
+    return text.reshape(len(values), width * int(np.prod(values.shape[1:])))
 
 
 def _text(values: Array) -> Numbers:
@@ -137,8 +158,11 @@ def _text(values: Array) -> Numbers:
     text[..., 0] += (values < 0) * np.uint8(ord("-") - ord(" "))
     text[..., 9] += (power < 0) * np.uint8(ord("-") - ord("+"))
     for number, places in ((digits, (7, 6, 5, 4, 3, 1)), (np.abs(power), (11, 10))):
-        for i, place in enumerate(places):
-            text[..., place] += (number // 10**i % 10).astype(np.uint8)
+        rest = number
+        for place in places:
+            above = rest // 10
+            text[..., place] += (rest - 10 * above).astype(np.uint8)
+            rest = above
     near = np.abs(scaled - np.floor(scaled) - 0.5) < 1e-6  # where rounding takes all digits of a number
     for at in zip(*np.nonzero(near), strict=True):
         text[at] = np.frombuffer(b"%12.5E" % values[at], np.uint8)

@@ -12,6 +12,7 @@ import pytest
 import kratos_lite as kl
 from kratos_lite.io.abaqus.job import Job
 from kratos_lite.model.reference_nodes import displacements
+from kratos_lite.solvers.constraints import rigid_modes
 from tests.io.abaqus.conftest import CUBE
 
 Read = Callable[..., kl.Case]
@@ -209,6 +210,26 @@ def test_a_tie_passes_stress_on(slave: str, read: Read) -> None:
     text = TIE.replace("LOW,", f"{slave},") + STATIC + "*DLOAD\n2,P2,-5.\n" + END
     u = kl.run(read(text, APART.replace("Bottom,1,3", FREE))).result.u
     assert np.abs(u[12:16, 2] - 0.01).max() < 1e-14
+
+
+@pytest.mark.parametrize("n", [3, 4])
+def test_what_is_tied_to_finer_faces_of_a_rigid_body_moves_with_it(n: int, read: Read) -> None:
+    upper = kl.box((1, 1, 1), (n, n, 1))
+    X, cells = np.add(upper.points, (0, 0, 1)), upper.blocks[0].nodes + 100
+    lines = [f"*NODE\n20,.5,.4,2.\n21,0,0,0\n{rows(100, X)}*ELEMENT,TYPE=C3D8,ELSET=B\n{rows(100, cells)}"]
+    lines += [f"*SOLID SECTION, ELSET=B, MATERIAL=STEEL\n{RIGID.replace('NSET=TOP', 'ELSET=B')}"]
+    lines += ["*SURFACE, NAME=UP\n1,S2\n*SURFACE, NAME=LOW\nB,S1\n*TIE, NAME=T\nUP,LOW\n", STATIC]
+    case = read("".join([*lines, "*CLOAD\n20,1,1.\n20,3,-2.\n", END]))
+    result = kl.run(case).result
+    R = rigid_modes(case.model.mesh.points, np.zeros(3)).reshape(-1, 3, 6)
+    rigid, tied = (np.isin(case.model.mesh.node_ids, ids) for ids in (range(100, 100 + len(X)), range(5, 9)))
+    motion = np.linalg.lstsq(R[rigid].reshape(-1, 6), result.u[rigid].ravel())[0]
+    assert np.abs(result.u - R @ motion)[rigid | tied].max() < 1e-13
+
+
+def rows(first: int, values: np.ndarray) -> str:
+    """Return data lines with numbers from the first one."""
+    return "".join(f"{i}, {', '.join(map(str, row))}\n" for i, row in enumerate(values.tolist(), first))
 
 
 def test_reference_nodes_are_no_forgotten_nodes(read: Read) -> None:
