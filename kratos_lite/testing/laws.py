@@ -41,8 +41,7 @@ def limits(law: Material, ways: Array) -> Array:
         before = start(law, *sizes.shape)
         _, tangent, after = law.evaluate(sizes[..., None] * ways, before, DT)
         softer = np.abs(tangent - law.C).max(axis=(-2, -1)) > 1e-6 * np.abs(law.C).max()
-        beyond = _moved(before, after) > 1e-9 * sizes
-        beyond &= softer
+        beyond = softer & (_moved(before, after) > 1e-9 * sizes)
         first = beyond.argmax(axis=0)
         low, high = (np.take_along_axis(sizes, i[None], axis=0)[0] for i in (np.maximum(first - 1, 0), first))
     return np.where(beyond.any(axis=0), high, GREATEST[law.strain_measure] / 3)[:, None]
@@ -50,8 +49,7 @@ def limits(law: Material, ways: Array) -> Array:
 
 def _moved(before: GaussState, after: GaussState) -> Array:
     """Return the largest change of an internal variable at each point."""
-    changes = np.concatenate([after[name] - before[name] for name in after], axis=-1)
-    return np.asarray(np.abs(changes).max(axis=-1))
+    return np.asarray(np.abs(np.concatenate([after[n] - before[n] for n in after], axis=-1)).max(axis=-1))
 
 
 def _directions() -> Array:
