@@ -109,10 +109,11 @@ class Rotation(Motion):
         warnings = super().warnings(structure, groups)
         if any(lame_constants(group.material.C) is None for group in groups):
             warnings.append("an anisotropic material is not axisymmetric unless its axes turn with the angle")
-        moving = self.moving(structure.mesh)
-        c = self.field(structure.mesh.points[moving])
-        is_constrained = np.abs(c[structure.supports.fixed[moving]]).max(initial=0.0) > 1e-9 * np.abs(c).max()
-        if not self.stiffening and not is_constrained:
+        c = self.field(structure.mesh.points) * self.moving(structure.mesh)[:, None]
+        held, springs = np.abs(c * structure.supports.fixed).max(), structure.supports.springs
+        if springs is not None:
+            held += np.abs(springs @ c.ravel()).max() / float(abs(springs).max())
+        if not self.stiffening and not held > 1e-9 * np.abs(c).max():
             warnings.append(
                 "nothing holds the rotation about the axis: in the linear theory a free rotor is unstable at "
                 "any rate; fix the hub, or take stiffening=True"

@@ -159,7 +159,7 @@ def converge(
             "a model, with its geometry, or a function of h that returns one, without, is needed"
         )
     if uniform:
-        count = whole_number(meshes, "meshes of a model that is refined", least=3, most=20)
+        count = whole_number(meshes, "meshes of a model, unlike sizes of a function of h,", least=3, most=20)
         h = np.asarray(0.5 ** np.arange(count), float)
         check_quantity(quantity if isinstance(quantity, Quantity) else None)
         check_geometry(geometry, model.mesh)  # type: ignore[union-attr]

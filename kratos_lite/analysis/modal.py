@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import replace
 from typing import Any
 
@@ -24,6 +25,9 @@ from kratos_lite.validation import instance, number, whole_number
 
 OF_REPORT = 1e-6
 """Relative error of the square of a critical rate that a report states."""
+SMALL_STRAIN, MOST_STRAIN = 0.1, 1.0
+"""Mean strains at which buckling of small strains is doubtful, and beyond which it is of the mesh alone."""
+_log = logging.getLogger("kratos_lite")
 
 
 def natural_modes(
@@ -56,7 +60,7 @@ def natural_modes(
         if isinstance(preload, Result) and model.is_nonlinear:
             K_g = tangent_beyond_rest(e, preload)
         else:
-            K_g = None if preload is None else preload_stiffness(e, preload, "a preload of modes")
+            K_g = None if preload is None else preload_stiffness(e, preload, "a preload of modes")[0]
     with phase("modes"):
         if near is not None:
             omega, shapes = modes_near(
@@ -258,7 +262,7 @@ def buckling(
     with phase("check"):
         e = EquationsOfMotion(model, free=False, massless=True, solver="auto", progress=progress)
     with phase("assemble"):
-        K_g = preload_stiffness(e, preload, "buckling")
+        K_g, strain = preload_stiffness(e, preload, "buckling")
         K_g.data *= -1
     with phase("modes"):
         try:
@@ -268,6 +272,12 @@ def buckling(
             raise SolveError(f"{text}; if some press, the iteration failed: {error}") from None
     if not inverse[-1] > 1e-9 * K_g.norm() / e.system.norm:  # less is rounding: strains of 1e9
         raise ModelError(f"the loads have less than {count} factors > 0; ask for fewer, or reverse the loads")
+    text = f"the least factor > 0, {1 / inverse[0]:.3g}, strains the body by {strain / inverse[0]:.0%}"
+    text += ": it does not buckle at small strains; reverse the loads if these only pull"
+    if not inverse[0] * MOST_STRAIN > strain:
+        raise ModelError(text)
+    if not inverse[0] * SMALL_STRAIN > strain:
+        _log.warning("%s", text)
     shapes = expanded(e, vectors)
     return 1 / inverse, shapes / np.linalg.norm(shapes, axis=2).max(axis=1)[:, None, None]
 

@@ -22,8 +22,11 @@ Preload: TypeAlias = "Result | Load | Sequence[Load] | Literal[True]"
 """A result, loads of which one is made, or True for those of the model."""
 
 
-def preload_stiffness(e: EquationsOfMotion, preload: Preload, what: str) -> BlockMatrix:
-    """Return K_g (3a, 3a) in N/m of the stress of a preload; what needs it is named in errors."""
+def preload_stiffness(e: EquationsOfMotion, preload: Preload, what: str) -> tuple[BlockMatrix, float]:
+    """Return K_g (3a, 3a) in N/m of the stress of a preload, and the mean of its strains.
+
+    What needs it is named in errors.
+    """
     model, result = e.model, preload
     model.require_linear(what)
     if model.motion is not None:
@@ -39,7 +42,8 @@ def preload_stiffness(e: EquationsOfMotion, preload: Preload, what: str) -> Bloc
         raise ModelError("the preload makes no stress; add loads, or displace supports")
     matrix = BlockMatrix(np.zeros((len(data), 3, 3)), pattern.indices, pattern.indptr)
     matrix.add_scalar(data)
-    return matrix
+    strains = [result.stress_in(g).reshape(-1, 6) @ np.linalg.inv(g.material.C).T for g in result.groups]
+    return matrix, float(np.sqrt((np.concatenate(strains) ** 2).sum(axis=1).mean()))
 
 
 def tangent_beyond_rest(e: EquationsOfMotion, result: Result) -> BlockMatrix:

@@ -47,7 +47,7 @@ def solve_steady(
     with phase("verify"):
         u = solution.x
         warnings += check_deformation(model, e.groups, e.system.scatter(u))
-        reactions = model.supports.supported(e.system.scatter(A @ u - forces))
+        reactions = model.reactions(e.system.scatter(A @ u - forces), e.system.scatter(u))
         inner = e.system.scatter(e.times_stiffness(u, 0.0) - e.K @ u)  # what the motion adds is a force, too
         groups = at_temperature(model, e.groups, 0.0)
         stresses = stress_load(model, groups, e.system.scatter(u))

@@ -34,7 +34,9 @@ KINDS = (
 def panels_of(thing: Any, given: dict[str, Any]) -> tuple[list[Subject], Options]:
     """Return what is drawn side by side, and how."""
     if given["modes"] is not None:
-        return _phase(thing, given, *_modes(thing, given), 1.0), options_of(given, 1.0)
+        modes, options = _phase(thing, given, *_modes(thing, given), 1.0), options_of(given, 1.0)
+        options.title = given["title"] or "" if len(modes) > 1 else ""
+        return modes, options
     things, titles = _several(thing, given)
     subjects, options = [_subject(one, given) for one in things], options_of(given)
     heads = _heads(subjects, given, factor_of(subjects, options.scale))

@@ -303,10 +303,10 @@ def check_energy(work: Array, rounding: float = 0.0) -> list[str]:
     )
 
 
-def check_attached(attached: bool, motion: object) -> list[str]:
-    """Raise ModelError for springs or masses on material that moves through the mesh."""
-    if attached and motion is not None:
-        raise ModelError("springs and added masses are for material that does not move through the mesh")
+def check_attached(masses: bool, motion: object) -> list[str]:
+    """Raise ModelError for added masses on material that moves through the mesh."""
+    if masses and motion is not None:
+        raise ModelError("added masses are for material that does not move through the mesh")
     return []
 
 

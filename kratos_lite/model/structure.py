@@ -715,6 +715,6 @@ CHECKS: tuple[Callable[[Structure, Sequence[ElementGroup]], Iterable[str]], ...]
     lambda model, groups: checks.check_nodes(model.mesh, model.supports.added),
     lambda model, groups: model.supports.check_used(),
     lambda model, groups: [text for tie in model.supports.ties for text in tie._check(groups, model.motion)],
-    lambda model, groups: checks.check_attached(model.attached is not None, model.motion),
+    lambda model, groups: checks.check_attached(any(one.is_mass for one in model.attachments), model.motion),
 )
 """What is checked of each model with sound cells: a check returns warnings, or raises an error."""

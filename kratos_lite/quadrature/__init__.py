@@ -42,7 +42,7 @@ class Rule:
     points: Array
     weights: Array
     degree: int
-    name: str
+    name: str = "own"
 
     def __post_init__(self) -> None:
         for array in (self.points, self.weights):

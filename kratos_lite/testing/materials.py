@@ -22,6 +22,7 @@ from kratos_lite.testing.report import (
     run_after,
 )
 from kratos_lite.typing import Array
+from kratos_lite.validation import instance
 
 STRAIN = 1e-3 * np.array([1.0, -0.7, 0.4, 0.9, -0.3, 0.6])
 """A strain whose components are told apart by size and sign."""
@@ -49,6 +50,7 @@ def check_material(material: Material) -> list[Finding]:
     >>> all(finding.passed for finding in check_material(Isotropic3D(E=210e9, nu=0.3)))
     True
     """
+    instance(material, "a law", Material, "MyLaw(E=1e6) with its constants")
     if isinstance(material, LinearMaterial):
         return run(CHECKS, material)
     first = run([laws.contract], material)
@@ -93,7 +95,10 @@ def isotropy(material: LinearMaterial) -> Measured | str:
             "transversely_isotropic = (0, 0, 1), its axis"
         )
     turns = {f"90° about {name}": _about(unit, 90) for name, unit in zip("xyz", np.eye(3), strict=True)}
-    return _turned(material, {**turns, "37° about a skew axis": _about((1, 2, -3), 37)})
+    found, C = _turned(material, {**turns, "37° about a skew axis": _about((1, 2, -3), 37)}), material.C
+    twice = abs(C[3, 3] - C[0, 0] + C[0, 1]) < 1e-9 * C[3, 3]
+    text = f"{found.detail}: C[3, 3] = C[0, 0] - C[0, 1] is 2 μ, of engineering shear it is μ"
+    return found._replace(detail=text) if twice else found
 
 
 def _about(axis: ArrayLike, degrees: float) -> Array:

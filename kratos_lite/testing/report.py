@@ -21,6 +21,7 @@ CURES = {
     "mismatch in its core dimension": "many points come at once, strain (…, 6): strain @ C",
     "response() takes": "a law has response(self, strain, state, dt)",
     "local_system() takes": "an element has local_system(self, C, u)",
+    "LinAlgError": "K is singular, or no matrix of numbers; mend what fails before",
 }
 """What to do about errors of Python that say this."""
 

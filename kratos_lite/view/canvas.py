@@ -19,6 +19,8 @@ DPI = 150
 """Dots per inch."""
 LARGEST = 100
 """Width and height of a figure in inches."""
+LINE = 13
+"""Points from line to line beneath a title."""
 PALETTE = ("#9eb8d6", "#e0b56a", "#8fbf9a", "#d59a9a", "#b8a3d1", "#c9c9c9", "#7fb8bf", "#c7c06b")
 """Colors of materials, one after the other."""
 PREFIXED = ("m", "Pa", "N", "J", "J/m³", "m/s", "m/s²", "N m", "Hz")
@@ -132,7 +134,7 @@ def right_of(axes: Any) -> float:
 
 def entitle(axes: Any, title: str, lines: Sequence[str], rise: float = 0.0) -> None:
     """Write a title above axes and what rises so many inches above them, and small lines beneath it."""
-    axes.set_title(title, fontsize=11, pad=8 + 72 * rise + 13 * len(lines))
+    axes.set_title(title, fontsize=11, pad=8 + 72 * rise + LINE * len(lines))
     if lines:
         style = {"xycoords": "axes fraction", "textcoords": "offset points", "size": 9, "color": "0.25"}
         axes.annotate("\n".join(lines), (0.5, 1), (0, 6 + 72 * rise), ha="center", va="bottom", **style)

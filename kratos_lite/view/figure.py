@@ -92,10 +92,12 @@ def _laid_out(
     else:
         draw_triad(panels[first], scene.rows, scene.window, inch, units=subject.mesh.units)
     rise = max([0.0, *(float(max(line.get_ydata()) - high[1]) / inch for line in panels[first].lines)])
-    for axes, subject in zip(panels, scene.subjects, strict=True):
-        lines = texts(subject, options.size[0] / len(scene.subjects) ** 2) if title is None else []
-        canvas.entitle(axes, subject.title if title is None else title, lines, rise)
-    step = np.array([max(size[0], *canvas.title_widths(panels)) + GAP, size[1] + rise + GAP])
+    most = options.size[0] / len(scene.subjects) ** 2
+    lines = [texts(subject, most) if title is None else [] for subject in scene.subjects]
+    for axes, subject, some in zip(panels, scene.subjects, lines, strict=True):
+        canvas.entitle(axes, subject.title if title is None else title, some, rise)
+    height = size[1] + rise + GAP + canvas.LINE / 72 * max(map(len, lines))
+    step = np.array([max(size[0], *canvas.title_widths(panels)) + GAP, height])
     if has_rulers:
         step[0] = max(step[0], canvas.right_of(panels[first]) + GAP / 2)
     for number, axes in enumerate(panels):

@@ -115,7 +115,7 @@ def test_windows_near_their_critical_speed(ends, share, wheels):
         assert sum(words in text for text in warnings) == 1
     model = wheels.bar("8N", 10)
     model.fix("x-", "x")
-    model.add(kl.PointLoad(lambda X: np.abs(X[:, 0]) < 1e-9, (1.0, 0, 0)))
+    model.add(kl.PointLoad(lambda X: np.abs(X[:, 0]) < 1e-9, (1.0, 0, 0), each=True))
     model.add(Translation("x", rate=0.95 * wheels.c_p, boundaries="natural"))
     assert any("m/s is near the critical one, 192.6 m/s on" in t for t in model.solve().report.warnings)
 
@@ -232,7 +232,7 @@ def test_periodic_ends_take_supports_of_either_end_before_and_after(end, wheels)
         model.add(Translation("x", rate=1.0, boundaries="periodic"))
         if not before:
             model.fix(end, "x", 1e-3)
-        model.add(kl.PointLoad(lambda X: np.abs(X[:, 0]) < 1e-9, (1e3, 0.0, 0.0)))
+        model.add(kl.PointLoad(lambda X: np.abs(X[:, 0]) < 1e-9, (1e3, 0.0, 0.0), each=True))
         found.append(model.solve().u)
         for side in ("x-", "x+"):
             np.testing.assert_array_equal(found[-1][model.mesh.nodes(side), 0], 1e-3)

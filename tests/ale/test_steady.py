@@ -267,3 +267,48 @@ def test_multigrid_of_the_body_at_rest_comes_to_what_factors_give(share, wheels,
     assert found.report.iterations > 0 or share > 1
     assert found.report.motion["critical_rate"] == pytest.approx(critical, rel=1e-6)
     assert np.abs(found.u - exact.u).max() < 1e-8 * np.abs(exact.u).max()
+
+
+def test_a_beam_on_an_elastic_bed_sinks_below_a_moving_load():
+    """w = P β / 2 k √(1 - (v / v_cr)²) at the load, v_cr⁴ = 4 k E I / (ρ A)², 4 β⁴ = k / E I.
+
+    Source: Frýba, Vibration of Solids and Structures under Moving Loads (1999), chapter 13.
+    """
+    E, rho, h, k, P, share = 210e9, 7850.0, 0.1, 1e7, 1e3, 0.6  # k in N/m²
+    EI, mass = E * h**4 / 12, rho * h**2
+    beta, critical = (k / EI / 4) ** 0.25, (4 * k * EI / mass**2) ** 0.25
+    length = 4 * 2 * np.pi / beta / 2**0.5  # waves at the critical speed
+    mesh = kl.box((length, h, h), (60, 1, 1), "KinematicLinear3D20N", origin=(-length / 2, 0, 0))
+    model = kl.Model(mesh, kl.Isotropic3D(E, 0.0, rho))
+    model.fix("y-", "y")
+    model.fix((-length / 2, 0.0, 0.0), "x")
+    model.add(kl.ElasticSupport("z-", (0.0, 0.0, k / h)))
+    model.add(kl.PointLoad((0.0, h / 2, h), (0.0, 0.0, -P)))
+    model.add(Translation("x", rate=share * critical, boundaries="periodic"))
+    result = model.solve()
+    sunk = P * beta / 2 / k / np.sqrt(1 - share**2)
+    assert result.at((0.0, h / 2, h / 2)).displacement[2] == pytest.approx(-sunk, rel=1e-2)
+    assert result.report.motion["critical_rate"] == pytest.approx(critical, rel=1e-2)
+    assert result.reaction("z-")[:, 2].sum() == pytest.approx(P, rel=1e-8)
+
+
+@pytest.mark.parametrize("stiffening", [False, True])
+def test_a_hub_on_hard_springs_is_a_fixed_one(stiffening, wheels):
+    models = []
+    for hub in ("fixed", "springs"):
+        model = kl.Model(kl.annulus(0.3, 1.0, 0.25, (1, 12, 1)), wheels.steel)
+        if hub == "fixed":
+            model.fix("inner")
+        else:
+            model.add(kl.ElasticSupport("inner", (1e15, 1e15, 1e15)))
+        model.add(kl.Traction("outer", lambda X: 1e4 * (1 + X[:, 1:2]) * [1.0, 2.0, 0.5]))
+        model.add(Rotation("z", rate=20.0, stiffening=stiffening, damping=20.0))
+        models.append(model)
+    results = [model.solve() for model in models]
+    states = [list(kl.integrate(model.transient(), dt=1e-3, steps=2))[-1] for model in models]
+    for fixed, sprung in (results, states):
+        assert np.abs(sprung.u - fixed.u).max() < 1e-5 * np.abs(fixed.u).max()
+    resultants = [kl.reaction_resultant(*pair) for pair in zip(models, results, strict=True)]
+    for fixed, sprung in zip(*resultants, strict=True):
+        assert np.abs(sprung - fixed).max() < 1e-5 * np.abs(fixed).max()
+    assert not any("nothing holds" in text for text in results[1].report.warnings)

@@ -1,5 +1,6 @@
 """Buckling under loads, and modes of a body under stress: columns, plates, strings."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -120,6 +121,7 @@ def test_random_models(seed, monkeypatch):
         np.subtract(*tangents), found[:, None, None] * np.eye(3), atol=1e-10 * abs(found).max()
     )
 
+    monkeypatch.setattr(modal, "MOST_STRAIN", np.inf)  # whatever the body is
     made, result = model.matrices(), model.solve()
     data = stress_stiffness(at, result.groups, pattern, result.stress_in)
     K_g = kron(csr_array((data, pattern.indices, pattern.indptr)), np.eye(3)).tocsr()
@@ -300,11 +302,18 @@ def test_beyond_buckling_by_iteration():
         model.modes(2, preload=beyond)
 
 
-def test_loads_that_pull_do_not_buckle():
+def test_loads_that_pull_do_not_buckle(caplog):
     with pytest.raises(ModelError, match="less than 4 factors > 0; ask for fewer, or reverse"):
         column(force=1.0).buckling(4)
     with pytest.raises(SolveError, match="loads that only pull do not buckle"):
         column(force=1.0, cells=(1, 1, 40)).buckling(2)
+    message = (
+        "strains the body by {}%: it does not buckle at small strains; reverse the loads if these only pull"
+    )
+    with pytest.raises(ModelError, match=message.format(r"\d{5}")):  # the clamp presses from the side
+        column(force=1.0, cells=(1, 1, 8)).buckling(2)
+    column(force=1.0, cells=(1, 1, 4)).buckling(2)
+    assert re.search(message.format("33"), caplog.text)
 
 
 def other_mesh():

@@ -160,7 +160,10 @@ def test_the_table_and_the_picture(tmp_path):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"meshes": 2}, "meshes of a model that is refined must be a whole number from 3 to 20; got 2"),
+        (
+            {"meshes": 2},
+            "meshes of a model, unlike sizes of a function of h, must be a whole number from 3 to 20; got 2",
+        ),
         ({"model": lambda h: beam(), "meshes": 3}, "must have shape"),
         ({"model": lambda h: beam(), "meshes": [1.0, 0.5]}, "three or more sizes > 0 that fall"),
         ({"model": lambda h: beam(), "meshes": [1.0, 0.5, 0.7]}, "three or more sizes > 0 that fall"),

@@ -100,7 +100,7 @@ def test_the_hub_carries_what_pushes_the_rim():
     missed = []
     for stiffening in (True, False):
         model = wheel(rate=10.0, stiffening=stiffening)
-        model.add(kl.PointLoad(lambda X: X[:, 1] < -0.99, (100.0, 300.0, 0.0)))
+        model.add(kl.PointLoad(lambda X: X[:, 1] < -0.99, (100.0, 300.0, 0.0), each=True))
         result = model.solve()
         nodes = result.mesh.nodes(lambda X: X[:, 1] < -0.99)
         pushed = np.zeros_like(result.mesh.points)

@@ -348,5 +348,5 @@ def test_nodes_without_elements_have_no_stress():
     mesh = kl.Mesh(np.vstack([box.points, [[9.0, 9, 9]]]), box.blocks)
     model = kl.Model(mesh, STEEL)
     model.fix(lambda X: X[:, 2] < 0.1)
-    model.add(kl.PointLoad(lambda X: (X[:, 2] > 0.9) & (X[:, 0] < 2), (0, 0, 1.0)))
+    model.add(kl.PointLoad(lambda X: (X[:, 2] > 0.9) & (X[:, 0] < 2), (0, 0, 1.0), each=True))
     assert (model.solve().stress("node")[-1] == 0).all()

@@ -97,7 +97,7 @@ def two_bodies(mesh):
     """Only one of two bodies is loaded."""
     model = kl.Model(mesh, STEEL)
     model.fix(lambda x: x[:, 2] < 1e-9)
-    model.add(kl.PointLoad(lambda x: (x[:, 2] > 0.99) & (x[:, 0] < 1.5), (1.0, 2.0, -3.0)))
+    model.add(kl.PointLoad(lambda x: (x[:, 2] > 0.99) & (x[:, 0] < 1.5), (1.0, 2.0, -3.0), each=True))
     return model
 
 

@@ -28,7 +28,7 @@ def by_cell():
         (kl.Traction(lambda X: X[:, 2] > side, UP), None),
         (kl.Pressure("x+", lambda X: 1e3 * X[:, 2]), None),
         (kl.PointLoad((1.0, 1.0, 1.0), UP), None),
-        (kl.PointLoad(np.array([26, 25]), UP), None),
+        (kl.PointLoad(np.array([26, 25]), UP, each=True), None),
         (kl.BodyForce(UP, [0, 1]), None),
         (kl.NodalForces(np.ones((27, 3))), None),
         (kl.Traction("y+", UP), 2.0),

@@ -57,12 +57,22 @@ def test_a_cantilever_bends_by_a_moment():
     np.testing.assert_allclose(end, [0, 0, 5.0 * 100 / (2 * 1e6 / 12)], rtol=0, atol=1e-7)
 
 
-def test_a_force_on_a_part_of_many_nodes_is_refused():
-    model = kl.Model(kl.box(cells=(2, 2, 2)), LAW)
-    with pytest.raises(kl.ModelError, match=r"on each of its 9 nodes: if so, give each=True.*kl.Resultant"):
-        model.add(kl.PointLoad("x+", (0, 0, -1.0)))
-    model.add(kl.PointLoad("x+", (0, 0, -1.0), each=True))
-    model.add(kl.PointLoad([3, 4], (0, 0, -1.0)))
+@pytest.mark.parametrize(
+    "where", ["x+", lambda X: X[:, 0] == 1, np.array([4, 5, 4, *range(7)]), np.arange(27) < 9]
+)
+def test_a_force_on_many_nodes_is_refused_unless_it_is_said_to_be_on_each(where):
+    mesh = kl.box(cells=(2, 2, 2))
+    model, load = kl.Model(mesh, LAW), kl.PointLoad(where, (0, 0, -1.0))
+    several = r"on each of its [79] nodes: if so, give each=True.*kl.Resultant"
+    with pytest.raises(kl.ModelError, match=several):
+        model.add(load)
+    moving = kl.TimeDependentLoad(lambda t: load)
+    with pytest.raises(kl.ModelError, match=several):
+        moving.forces(mesh, [])
+    each = kl.PointLoad(where, (0, 0, -1.0), each=True)
+    model.add(each)
+    assert each.forces(mesh, []).sum(axis=0)[2] == -len(mesh.nodes(where))
+    model.add(kl.PointLoad([3], (0, 0, -1.0)))
 
 
 @pytest.mark.parametrize(

@@ -92,6 +92,8 @@ WRONG = {
     "pressure list": (lambda: kl.Pressure("z+", [[1, 2]]), "a pressure must be one number"),
     "pressure nan": (lambda: kl.Pressure("z+", np.nan), "a pressure must be finite"),
     "pressure normal": (lambda: kl.Pressure("z+", 1.0, "inward"), "normal must be 'outward' or 'nodes'"),
+    "newmark": (lambda: kl.Newmark(0.5, 0.25), "β = 0.5, γ = 0.25: are they swapped"),
+    "newmark explicit": (lambda: kl.Newmark(0.0, 0.5), "for an explicit integrator"),
     "point rows": (lambda: kl.PointLoad([1, 2], np.ones((2, 3))), r"a point load must be \(3,\) in N"),
     "nodal shape": (
         lambda: solved_with(kl.NodalForces(np.ones((2, 3)))),

@@ -11,6 +11,7 @@ import kratos_lite as kl
 from kratos_lite.elements import ELEMENTS, KinematicLinear
 from kratos_lite.elements.b_bar_3d8n import BBar3D8N
 from kratos_lite.elements.enhanced_strain_3d8n import EnhancedStrain3D8N
+from kratos_lite.errors import InputError
 from kratos_lite.materials import MATERIALS, LinearMaterial
 from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.quadrature import Rule, hexahedron, pyramid, tetrahedron
@@ -441,7 +442,12 @@ ALONE = [
     (BRICK, rows_times(1, 1, 1, 2, 1, 1, B=BRICK.B), SHEAR),
     (BRICK, rows_times(*HALF_SHEAR, B=BRICK.B), SHEAR),
     (TET10, rows_times(*HALF_SHEAR, B=TET10.B), SHEAR),
-    (BRICK, {"B": lambda self, xi: BRICK.B(self, xi)[..., [0, 1, 2, 3, 5, 4], :]}, {"strain operator"}),
+    (
+        BRICK,
+        {"B": lambda self, xi: BRICK.B(self, xi)[..., [0, 1, 2, 3, 5, 4], :]},
+        {"strain operator"},
+        "it is that of ZX: rows of B are XX, YY, ZZ, XY, YZ, ZX",
+    ),
     (BRICK, NORMALS_ALONE | PLAIN_SYSTEM, {"strain operator", "stretched", "linear patch"}),
     (BRICK, changed_K(stiffer_if_flat), {"stretched"}),
     (BBar3D8N, {"_projected": projected_without_volumes}, {"linear patch"}),
@@ -468,6 +474,13 @@ AMONG_OTHERS = [
     (BRICK, {"B": lambda self, xi: BRICK.B(self, np.zeros(3))}, "rank"),
     (BRICK, {"B": center_dilatation}, "linear patch"),
     (BRICK, NORMALS_ALONE, "rank"),
+    (
+        BRICK,
+        {"B": lambda self, xi: 0 * BRICK.B(self, xi)},
+        "rank",
+        "24 zero-energy modes on the reference cell, 24",
+    ),
+    (BRICK, {"B": lambda self, xi: 0 * BRICK.B(self, xi)}, "linear patch", "K is singular"),
     (BRICK, rows_times(1, 1, 1, 1, 0, 1), "strain operator", "strain YZ at Gauss point"),
     (BRICK, rows_times(1, -1, 1, 1, 1, 1), "strain operator", "strain YY at Gauss point"),
     (BRICK, rows_times(-1, -1, -1, -1, -1, -1), "strain operator"),
@@ -717,6 +730,18 @@ def test_the_materials_that_are_broken_below_conform_before():
 )
 def test_broken_materials_are_found(methods, checks):
     assert set(failed(check_material(changed(**methods)))) == checks
+
+
+def test_twice_the_shear_modulus_in_C_is_named():
+    tensors = changed(elasticity=lambda self: Made().elasticity() * [1, 1, 1, 2, 2, 2])
+    assert failed(check_material(tensors))["isotropy"].detail.endswith("is 2 μ, of engineering shear it is μ")
+
+
+def test_a_class_for_an_instance_or_one_for_a_class_is_refused():
+    with pytest.raises(InputError, match="check_element takes the class of an element; got"):
+        check_element(BRICK(BRICK.nodes))
+    with pytest.raises(InputError, match=r"a law must be a Material, such as MyLaw\(E=1e6\)"):
+        check_material(Made)
 
 
 def test_a_C_of_the_wrong_size_is_a_finding():

@@ -9,6 +9,7 @@ import pytest
 import kratos_lite as kl
 from kratos_lite.materials import MATERIALS
 from kratos_lite.testing import check_material, failures
+from kratos_lite.testing.laws import BEYOND, _directions, limits
 
 
 @pytest.fixture(autouse=True)
@@ -45,6 +46,19 @@ def elastic_tangent(law, strain, state, s, D, new):
     return s, kl.Isotropic3D(law.E, law.nu).C, new
 
 
+def sign_of_normals(law, strain, state, s, D, new):
+    """The tangent has + n n in place of - n n where the law flows."""
+    C = kl.Isotropic3D(law.E, law.nu).C
+    return s, np.where(np.abs(D - C) > 1e-9 * C.max(), 2 * C - D, C), new
+
+
+def elasticity_of_shear(law, strain, state, s, D, new):
+    D = np.array(np.broadcast_to(D, (*s.shape, 6)))
+    flows = np.abs(new["plastic_strain"] - state["plastic_strain"]).max(axis=-1) > 0
+    D[..., 3, 3] *= np.where(flows, 1.0, 2.0)
+    return s, D, new
+
+
 def hardened_twice(law, strain, state, s, D, new):
     p = new["accumulated_plastic_strain"]
     return s, D, new | {"accumulated_plastic_strain": 2 * p - state["accumulated_plastic_strain"]}
@@ -79,13 +93,19 @@ def yield_forgotten_in_pressure(law, strain, state, s, D, new):
     [
         (shear_forgotten, "elastic strain", "engineering shear"),
         (pressure_scaled, "elastic strain", "as the stress does"),
-        (elastic_tangent, "tangent", "against differences"),
+        (elastic_tangent, "tangent", "it is the C of elasticity"),
+        (sign_of_normals, "tangent", ", where its state changes, "),
+        (
+            elasticity_of_shear,
+            "tangent",
+            "XY is 1.538e+11 Pa, against differences 7.692e+10, where it is elas",
+        ),
         (hardened_twice, "one step or two", "updated twice"),
         (state_overwritten, "contract", "in place"),
         (strain_changed, "contract", "work on copies"),
         (stress_at_rest, "rest", "stress at rest"),
         (last_state_kept, "elastic strain", "engineering shear"),
-        (yield_forgotten_in_pressure, "tangent", "against differences"),
+        (yield_forgotten_in_pressure, "tangent", "∂σ_XX/∂ε_YY is"),
     ],
     ids=lambda v: getattr(v, "__name__", ""),
 )
@@ -93,6 +113,15 @@ def test_the_kit_names_the_mistake(change, check, says):
     found = {finding.check: finding for finding in failures(check_material(steel(change)))}
     assert check in found
     assert says in found[check].detail
+
+
+def test_the_elastic_limit_is_that_of_von_mises_in_each_direction():
+    law, ways = kl.J2Plasticity3D(200e9, 0.3, 250e6), _directions()
+    trial = limits(law, ways) * ways @ kl.Isotropic3D(200e9, 0.3).C
+    trial[:, :3] -= trial[:, :3].mean(axis=1, keepdims=True)
+    yields = np.sqrt(1.5 * trial**2 @ [1, 1, 1, 2, 2, 2]) / 250e6
+    assert yields.min() > 1
+    assert yields.max() * max(factor for factor in BEYOND if factor < 1) < 1
 
 
 with MATERIALS.temporary():

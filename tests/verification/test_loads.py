@@ -155,7 +155,7 @@ def test_a_point_load_acts_on_each_node_once_and_loads_add_up():
     mesh = kl.box()
     model = kl.Model(mesh, STEEL)
     model.fix("z-")
-    model.add(kl.PointLoad(np.array([7, 7, 3]), (0, 0, 10)))
+    model.add(kl.PointLoad(np.array([7, 7, 3]), (0, 0, 10), each=True))
     model.add(kl.NodalForces(np.full((8, 3), 0.5)))
     result = model.solve()
     np.testing.assert_allclose(result.report.total_load, (4, 4, 24), rtol=1e-14)

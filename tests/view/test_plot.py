@@ -512,6 +512,19 @@ def test_panels_and_their_titles_are_apart(result):
         assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
 
 
+def test_titles_of_slender_modes_stand_below_the_modes_above_them():
+    model = kl.Model(kl.box((1, 0.03, 0.05), (6, 1, 1)), STEEL)
+    bends = np.sin(2 * np.pi * model.mesh.points[:, :1]) * [0, 0, 1]
+    figure = model.plot(modes=[bends, -bends, bends], titles=list("abc"), title="all of them")
+    figure.canvas.draw()
+    panels = figure.axes[:3]
+    for above, below in ((panels[0], panels[1]), (panels[1], panels[2])):
+        assert below.title.get_window_extent().y1 <= above.get_window_extent().y0
+    (head,) = figure.texts
+    assert head.get_text() == "all of them"
+    assert head.get_window_extent().y0 >= panels[0].title.get_window_extent().y1
+
+
 def test_modes_are_drawn_side_by_side_with_one_amplitude():
     model = kl.Model(kl.box((4, 1, 1), (4, 1, 1)), STEEL)
     model.fix("x-")

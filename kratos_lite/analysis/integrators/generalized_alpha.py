@@ -94,9 +94,10 @@ class Newmark(_Implicit):
     def __post_init__(self) -> None:
         beta, gamma = number(self.beta, "Newmark's β"), number(self.gamma, "Newmark's γ")
         if not (gamma >= 0.5 and beta > 0 and 2 * beta >= gamma):
+            swapped = beta >= 0.5 and beta <= 2 * gamma
+            cure = "are they swapped?" if swapped else "take CentralDifference() for an explicit integrator"
             raise InputError(
-                f"Newmark's method is stable for γ ≥ 1/2 and β ≥ γ/2; got β = {beta}, γ = {gamma}: "
-                "take CentralDifference() for an explicit integrator"
+                f"Newmark's method is stable for γ ≥ 1/2 and β ≥ γ/2; got β = {beta}, γ = {gamma}: {cure}"
             )
 
     def numbers(self) -> NewmarkNumbers:

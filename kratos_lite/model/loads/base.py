@@ -216,7 +216,7 @@ class TimeDependentLoad(Load):
     --------
     >>> import kratos_lite as kl
     >>> def wheel_load(t):
-    ...     return kl.PointLoad(lambda X: abs(X[:, 0] - 3.0 * t) < 0.01, (0.0, 0.0, -1e3))
+    ...     return kl.PointLoad((3.0 * t, 0.0, 1.0), (0.0, 0.0, -1e3))
     >>> wheel = TimeDependentLoad(wheel_load)
     >>> wheel.at(0.5).force
     array([    0.,     0., -1000.])

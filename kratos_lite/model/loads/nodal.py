@@ -29,7 +29,7 @@ class PointLoad(Load):
     where : a point (x, y, z) in m, or nodes.  A force on a point acts on the node there, or else on the nodes
         of the element around it, by its shape functions N.
     force : (3,) float, N: in all on a point, on each of several nodes.
-    each : a part of several nodes is refused otherwise: `Resultant` spreads a force over its faces.
+    each : several nodes are refused otherwise: `Resultant` spreads a force over the faces of a part.
     local : axes of the force, at the point or at each node; x y z if not given.
 
     Examples
@@ -57,17 +57,10 @@ class PointLoad(Load):
         MeshError
             They do not.
         ModelError
-            A part has several nodes, and the force was not said to be on each.
+            There are several nodes, and the force was not said to be on each.
         """
         if self._point is None:
-            super().check(mesh)
-            count = len(mesh.nodes(self.where)) if isinstance(self.where, str) else 1
-            if count > 1 and not self.each:
-                force = short(self.force.tolist())
-                raise ModelError(
-                    f"a point load on part {self.where!r} would put {force} N on each of its {count} nodes: "
-                    "if so, give each=True; a force in all is kl.Resultant(part, force), or --resultant"
-                )
+            self._nodes(mesh)
         else:
             around(mesh, self._point)
 
@@ -79,7 +72,7 @@ class PointLoad(Load):
         MeshError
             The point lies outside the mesh, or there is no such part or node.
         ModelError
-            No node is chosen.
+            No node is chosen, or several, and the force was not said to be on each.
         """
         return nodal(mesh, *self.on_nodes(mesh, groups))
 
@@ -91,15 +84,27 @@ class PointLoad(Load):
         MeshError
             The point lies outside the mesh, or there is no such part or node.
         ModelError
-            No node is chosen.
+            No node is chosen, or several, and the force was not said to be on each.
         """
         if self._point is not None:
             nodes, N = around(mesh, self._point)
             return nodes, N[:, None] * self._at(self._point)
-        nodes = without_repeats(mesh.nodes(self.where))
+        nodes = self._nodes(mesh)
         if mesh.whole and not len(nodes):
             raise ModelError(f"a point load finds no node in {self.where!r}")
         return nodes, np.broadcast_to(self._at(mesh.points[nodes]), (len(nodes), 3))
+
+    def _nodes(self, mesh: Mesh) -> Ints:
+        """Return the nodes chosen, each once."""
+        nodes = without_repeats(mesh.nodes(self.where))
+        if len(nodes) > 1 and not self.each:
+            where = f"part {self.where!r}" if isinstance(self.where, str) else "what is chosen"
+            force = short(self.force.tolist())
+            raise ModelError(
+                f"a point load on {where} would put {force} N on each of its {len(nodes)} nodes: if so, give "
+                "each=True; a force in all is kl.Resultant(part, force), or --resultant"
+            )
+        return nodes
 
     def drawn(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> list[Drawn]:
         """Return the force on its point, or those on its nodes."""
