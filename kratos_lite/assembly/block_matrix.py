@@ -15,8 +15,18 @@ def block_rows(indptr: Rows) -> Ints:
     return np.repeat(np.arange(len(indptr) - 1), np.diff(indptr))
 
 
+def dependent_rows(T: Any) -> tuple[Rows, Rows, Rows, Array]:
+    """Return the dependents of u = T u (3n, 3n), and their rows as indptr, indices and weights."""
+    dependents = np.flatnonzero((np.diff(T.indptr) > 0) & (T.diagonal() == 0)).astype(np.int32)
+    rows = T[dependents]
+    return dependents, rows.indptr.astype(np.int32), rows.indices.astype(np.int32), rows.data
+
+
 class BlockMatrix:
     """A square matrix (3n, 3n) of 3x3 blocks in rows (BSR), columns sorted within a row."""
+
+    ties: tuple[BlockMatrix, Any] | None = None
+    """K and T (3n, 3n), if this is T^T K T."""
 
     def __init__(self, data: Array, indices: Rows, indptr: Rows) -> None:
         self.data, self.indices, self.indptr = data, indices, indptr

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from kratos_lite.assembly.block_matrix import BlockMatrix
+from kratos_lite.assembly.block_matrix import BlockMatrix, dependent_rows
 from kratos_lite.assembly.element_groups import ElementGroup, as_double, compiled
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import assemble_stiffness
@@ -52,13 +52,11 @@ class MatrixFree:
         """Return what is pickled: what kernels hold is made anew."""
         return {name: value for name, value in vars(self).items() if name != "product"}
 
-    def tie(self, T: Any, assembled: Callable[[], BlockMatrix]) -> MatrixFree:
-        """Return T^T K T (3n, 3n), with T in the numbering of all components; `assembled` makes it."""
+    def tie(self, T: Any) -> MatrixFree:
+        """Return T^T K T (3n, 3n), with T in the numbering of all components; what it assembles is K."""
         tied = copy(self)
-        tied.product, tied.tied, tied.assembled = self.product, True, assembled
-        dependents = np.flatnonzero((np.diff(T.indptr) > 0) & (T.diagonal() == 0)).astype(np.int32)
-        rows = T[dependents]
-        self.product.tie(dependents, rows.indptr.astype(np.int32), rows.indices.astype(np.int32), rows.data)
+        tied.product, tied.tied = self.product, True
+        self.product.tie(*dependent_rows(T))
         return tied
 
     def with_mass(

@@ -58,6 +58,8 @@ class Cells:
         self.outlines = [(*range(c), c - 1)[:4]] if straight else OUTLINES[k]
         skew = np.abs(X[:, 0] + X[:, c // 2] - X[:, 1] - X[:, c - 1]).max(axis=1) if c == 4 else 0.0
         self.is_affine = straight and bool((skew <= SMALL * self.radius).all())
+        places = np.indices((3, 3)).reshape(2, 9).T / 2.0
+        self.polynomials = np.linalg.solve(_monomials(places), self.shape.N(places))
         self.degree = self.shape.degree * (1 if c == 3 else 2) + 4 * (straight and not self.is_affine)
 
     def on_planes(self, X: Array, i: Ints) -> Array:
@@ -211,7 +213,13 @@ def _functions(cells: Cells, X: Array, at: Array) -> Array:
         xi += step
         if np.abs(step).max(initial=0.0) < 1e-12:
             break
-    return shape.N(xi)
+    return _monomials(xi) @ cells.polynomials
+
+
+def _monomials(xi: Array) -> Array:
+    """Return x^a y^b (..., 9) with a, b = 0 … 2, of which the functions of all faces are sums."""
+    x, y = (np.stack([np.ones_like(t), t, t * t], axis=-1) for t in (xi[..., 0], xi[..., 1]))
+    return (x[..., :, None] * y[..., None, :]).reshape(*xi.shape[:-1], 9)
 
 
 def _transformations(every: Sequence[Cells], nodes: Ints) -> tuple[Csr, Csr]:

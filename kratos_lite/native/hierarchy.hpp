@@ -70,33 +70,40 @@ public:
         coarsen(coarse.graph, plate.data.data(), fixed, std::move(B));
     }
 
+    // Whether the last level is small enough to be the coarsest.
+    bool is_small() const { return levels.back().size() <= settings.full; }
+
     // Coarsen the last level, of blocks `data`, by smoothed aggregation until little is left.
-    // B (n, 3, 6 sets) are its rigid modes and others that take little energy, zero at fixed components.
-    void coarsen(Graph graph, const double* data, Bytes fixed, Doubles B) {
+    // B (n, 3, 6 sets) are its rigid modes and others that take little energy, zero at fixed components.  With
+    // `ties`, which the level has worked in, `data` are without them: aggregates stay small.
+    void coarsen(Graph graph, const double* data, Bytes fixed, Doubles B, const Ties* ties = nullptr) {
         sets = static_cast<int>(B.size() / (fixed.size() * MODES));
         CoarseMatrix matrix;
-        levels.back().graph = graph;
+        if (levels.back().elements) levels.back().graph = graph;
+        if (ties) ties->fill_rows(B, MODES * sets);
+        if (ties && !levels.back().elements)
+            levels.back().clusters.near = find_clusters(graph, data, 3, fixed, X.data(), settings.theta, FAR).near;
         while (true) {
             Level& fine = levels.back();
-            if (fine.size() <= settings.full || levels.size() > 20) break;
+            if (is_small() || levels.size() > 20) break;
             Doubles R;
             CoarseMatrix next;
             bool planes = !fine.clusters.near.empty();
             const Doubles kept = planes || sets > 1 ? B : Doubles();
             const auto is_large = [&](double share) { return next.data.size() > share * fine.numbers(); };
-            int64_t count = add_transfer(graph, data, fixed, B, R, next);
+            int64_t count = add_transfer(graph, data, fixed, ties, B, R, next);
             if (count && planes && is_large(LARGEST_PLANES)) {
                 transfers.pop_back();
                 fine.clusters.near = {};
                 planes = false;
                 B = kept;
-                count = add_transfer(graph, data, fixed, B, R, next);
+                count = add_transfer(graph, data, fixed, ties, B, R, next);
             }
             if (count && sets > 1 && is_large(LARGEST_SETS)) {
                 transfers.pop_back();
                 B = first_columns(kept, MODES * sets);
                 sets = 1;
-                count = add_transfer(graph, data, fixed, B, R, next);
+                count = add_transfer(graph, data, fixed, ties, B, R, next);
             }
             fine.clusters.forget();
             if (count == 0) break;
@@ -107,6 +114,7 @@ public:
             }
             matrix = std::move(next);
             data = matrix.data.data();
+            ties = nullptr;
             B.swap(R);
             X = centroids(X, aggregates, static_cast<int32_t>(count / sets), sets);
             fixed.assign(count * MODES, 0);
@@ -118,7 +126,7 @@ public:
                 coarse.cluster(data, fixed, X.data(), settings.theta, planes ? COARSE_FAR : FAR);
             coarse.largest = largest_eigenvalue(coarse);
         }
-        factorize(data, fixed);
+        if (!ties) factorize(data, fixed);
         inverse = {};
         levels.back().clusters.forget();
     }
@@ -290,8 +298,8 @@ private:
     }
 
     // Aggregate, smooth and multiply; returns the number of coarse nodes, or 0 if nothing is gained.
-    int64_t add_transfer(const Graph& g, const double* data, const Bytes& fixed, Doubles& B, Doubles& R,
-                         CoarseMatrix& next) {
+    int64_t add_transfer(const Graph& g, const double* data, const Bytes& fixed, const Ties* ties, Doubles& B,
+                         Doubles& R, CoarseMatrix& next) {
         const Level& fine = levels.back();
         const int b = fine.b;
         const Bytes excluded = fine.excluded(fixed);
@@ -304,12 +312,18 @@ private:
                                                : aggregate_clusters(b, g, data, clusters, excluded, strong, of);
         const int32_t nodes = count * sets;
         if (count == 0 || nodes * MODES > 0.9 * b * g.rows) return 0;
+        if (ties) join_dependents(*ties, of);
         R = tentative_prolongator(b, of, count, B, sets);
         const Smoothing smoothing{b, g, data, fixed, of, B, sets, 4.0 / 3.0 / fine.largest};
-        const Transfer& t = transfers.emplace_back(clusters.empty() ? smoothed_prolongator(smoothing, inverse.data())
-                                                                    : smoothed_prolongator(smoothing, clusters),
-                                                   nodes);
-        next = galerkin(b, g, data, t.P, t.columns, nodes);
+        Prolongator P = clusters.empty() ? smoothed_prolongator(smoothing, inverse.data())
+                                         : smoothed_prolongator(smoothing, clusters);
+        const Transfer& t = transfers.emplace_back(std::move(P), nodes);
+        if (!ties) {
+            next = galerkin(b, g, data, t.P, t.columns, nodes);
+            return nodes;
+        }
+        const Prolongator tied = with_dependents(t.P, *ties, nodes);
+        next = galerkin(b, g, data, tied, Transposed(nodes, tied.indptr, tied.indices), nodes);
         return nodes;
     }
 

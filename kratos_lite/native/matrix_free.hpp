@@ -65,6 +65,16 @@ struct Ties {
             for (int c = 0; c < width[t]; ++c) x[dependents[t] + c] = sum[c];
         }
     }
+
+    // The same of `count` vectors, B (3n, count).
+    void fill_rows(std::vector<double>& B, int64_t count) const {
+        for (int32_t t = 0; t < size(); ++t)
+            for (int64_t e = 0; e < width[t] * count; ++e) {
+                double sum = 0;
+                for (int32_t k = start[t]; k < start[t + 1]; ++k) sum += weights[k] * B[independents[k] * count + e];
+                B[dependents[t] * count + e] = sum;
+            }
+    }
 };
 
 class MatrixFree {

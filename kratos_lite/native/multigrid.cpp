@@ -14,7 +14,17 @@ struct Matrix : Blocks<double> {
         : Blocks(starts, std::move(columns), std::move(blocks), starts.size() - 1, starts.size() - 1) {
         require(data.size() == 9 * indices.size(), "data must be (nnz, 3, 3)");
     }
+    // Say that this is T'K T, with the rows of T of dependent components.
+    void tie(std::shared_ptr<Matrix> K, Array<int32_t> dependents, Array<int32_t> indptr, Array<int32_t> independents,
+             Array<double> weights) {
+        require(K->rows() == rows(), "both matrices must have as many rows");
+        ties = ties_of(dependents, indptr, independents, weights, rows());
+        untied = std::move(K);
+    }
     BlockMatrix blocks() const { return {graph(), data.data(), static_cast<uint32_t>(rows())}; }
+
+    std::shared_ptr<Matrix> untied;
+    Ties ties;
 };
 
 Doubles coordinates(Numbers points, size_t unknowns) {
@@ -68,7 +78,7 @@ public:
         const Matrix& finest = matrix ? **matrix : A;
         require(3 * finest.rows() == static_cast<int64_t>(fixed.size()), "the matrix must have a row for each unknown");
         Doubles B = free_modes(modes, fixed);
-        coarsen([&] { hierarchy.coarsen(finest.graph(), finest.data.data(), fixed, std::move(B)); });
+        coarsen([&] { coarsen_matrix(finest, fixed, std::move(B)); });
     }
 
     // A linear level below the finest one, and smoothed aggregation below that.
@@ -87,7 +97,7 @@ public:
         coarsen([&] {
             below = std::move(linear);
             hierarchy.add_linear(finest.graph(), finest.data.data(), coarse_fixed, std::move(transfer), std::move(X));
-            hierarchy.coarsen(finest.graph(), finest.data.data(), coarse_fixed, std::move(B));
+            coarsen_matrix(finest, coarse_fixed, std::move(B));
         });
     }
 
@@ -173,6 +183,14 @@ public:
     Hierarchy hierarchy;
 
 private:
+    // Aggregate the last level, of a matrix, where it can without ties, whose rows are wide.
+    void coarsen_matrix(const Matrix& finest, const Bytes& fixed, Doubles B) {
+        const bool apart = finest.untied && !hierarchy.is_small() && hierarchy.levels.back().clusters.empty();
+        const Matrix& K = apart ? *finest.untied : finest;
+        const Ties* ties = apart ? &finest.ties : hierarchy.levels.back().elements ? &elements->ties : nullptr;
+        hierarchy.coarsen(K.graph(), K.data.data(), fixed, std::move(B), ties && ties->size() ? ties : nullptr);
+    }
+
     // Make the coarser levels, once.
     template <class F>
     void coarsen(const F& make) {
@@ -255,7 +273,7 @@ std::shared_ptr<Multigrid> multigrid(const Object& A, Array<uint8_t> fixed, Numb
 }  // namespace
 
 KL_MODULE(_multigrid, m) {
-    add_class<Matrix>("kratos_lite.native.Matrix", {});
+    add_class<Matrix>("kratos_lite.native.Matrix", {method<&Matrix::tie>("tie")});
     add_class<Product>("kratos_lite.native.Product",
                        {method<&Product::times>("times", nullptr, {"x", {"tied", Py_False}}), method<&Product::tie>("tie"),
                         method<&Product::largest_row_sum>("norm")});

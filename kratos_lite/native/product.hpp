@@ -36,6 +36,16 @@ inline TensorTables<double> tensor_tables(const Factors& factors, const Elements
     return t;
 }
 
+// Components of n nodes that depend on others: rows of weights.
+inline Ties ties_of(const Array<int32_t>& dependents, const Array<int32_t>& indptr, const Array<int32_t>& independents,
+                    const Array<double>& weights, int64_t n) {
+    require(indptr.size() == dependents.size() + 1, "indptr must have a row for each dependent component");
+    require(weights.size() == independents.size(), "one weight for each index is needed");
+    check_rows(indptr, independents.size());
+    require(are_rows(dependents, 3 * n) && are_rows(independents, 3 * n), "indices must be components of nodes");
+    return Ties(dependents.copy(), indptr.copy(), independents.copy(), weights.copy(), n);
+}
+
 // Elements of a kind (nodes, dN, weights, C, factors), whose arrays are kept.
 using ElementTables = std::tuple<Array<int32_t>, Array<double>, Array<double>, Array<double>, Factors>;
 
@@ -54,11 +64,7 @@ public:
 
     // Components that depend on others from now on, with their weights.
     void tie(Array<int32_t> dependents, Array<int32_t> indptr, Array<int32_t> independents, Array<double> weights) {
-        require(indptr.size() == dependents.size() + 1, "indptr must have a row for each dependent component");
-        require(weights.size() == independents.size(), "one weight for each index is needed");
-        check_rows(indptr, independents.size());
-        require(are_rows(dependents, 3 * n) && are_rows(independents, 3 * n), "indices must be components of nodes");
-        ties = Ties(dependents.copy(), indptr.copy(), independents.copy(), weights.copy(), n);
+        ties = ties_of(dependents, indptr, independents, weights, n);
     }
 
     Array<double> times(Array<double> x, bool tied) const {

@@ -42,6 +42,57 @@ KL_INLINE void prolong_rows(const Prolongator& P, const float* from, float* to, 
     }
 }
 
+// Let nodes that depend on others join the aggregate of the one that they depend on most.
+inline void join_dependents(const Ties& ties, Ints& of) {
+    for (int32_t t = 0; t < ties.size(); ++t) {
+        int32_t& own = of[ties.dependents[t] / 3];
+        double most = 0;
+        for (int32_t k = ties.start[t]; k < ties.start[t + 1] && (own < 0 || most > 0); ++k)
+            if (const double w = std::fabs(ties.weights[k]); w > most && of[ties.independents[k] / 3] >= 0) {
+                own = of[ties.independents[k] / 3];
+                most = w;
+            }
+    }
+}
+
+// P with the rows of components that depend on others in place of their own.
+inline Prolongator with_dependents(const Prolongator& P, const Ties& ties, int64_t coarse_nodes) {
+    constexpr int size = 3 * MODES;
+    const int64_t n = static_cast<int64_t>(P.indptr.size()) - 1;
+    Ints first(n + 1, 0), tied(n, 0);
+    for (int32_t t = 0; t < ties.size(); ++t) {
+        ++first[ties.dependents[t] / 3 + 1];
+        tied[ties.dependents[t] / 3] += ties.width[t];
+    }
+    std::partial_sum(first.begin(), first.end(), first.begin());
+    Prolongator Q;
+    UnionRows(n, coarse_nodes, [&](int64_t i, const auto& add) {
+        const auto row = [&](int64_t j) { std::for_each(&P.indices[P.indptr[j]], &P.indices[P.indptr[j + 1]], add); };
+        if (tied[i] < 3) row(i);
+        for (int32_t k = ties.start[first[i]]; k < ties.start[first[i + 1]]; ++k) row(ties.independents[k] / 3);
+    }).copy_to(Q.indptr, Q.indices);
+    Q.data.assign(Q.indices.size() * size + 8, 0.0f);
+    parallel_ranges(n, ROW_GRAIN, [&](int64_t begin, int64_t end) {
+        for (int64_t i = begin; i < end; ++i) {
+            // count numbers from `to` += w times those from `from`, in all columns of row j of P
+            const auto add = [&](int64_t j, float w, int to, int from, int count) {
+                const int32_t* at = &Q.indices[Q.indptr[i]];
+                for (int32_t q = P.indptr[j]; q < P.indptr[j + 1]; ++q) {
+                    while (*at < P.indices[q]) ++at;
+                    float* row = &Q.data[(at - Q.indices.data()) * size];
+                    for (int e = 0; e < count; ++e) row[to + e] += w * P.data[int64_t{q} * size + from + e];
+                }
+            };
+            if (tied[i] < 3) add(i, 1, 0, 0, size);
+            for (int32_t t = first[i]; t < first[i + 1]; ++t)
+                for (int32_t k = ties.start[t]; k < ties.start[t + 1]; ++k)
+                    add(ties.independents[k] / 3, static_cast<float>(ties.weights[k]),
+                        ties.dependents[t] % 3 * MODES, ties.independents[k] % 3 * MODES, ties.width[t] * MODES);
+        }
+    });
+    return Q;
+}
+
 // From a level to the next coarser one: blocks b x 6 of smoothed aggregation, or one weight or 3 x 3 of them for
 // each pair of nodes (linear elements within quadratic ones).
 struct Transfer {

@@ -187,8 +187,7 @@ class LinearSolver:
         if isinstance(self.K, BlockMatrix):
             return constrained(self.K, T, free)
         if isinstance(self.K, MatrixFree):
-            assembled = self.K.assembled
-            return self.K.tie(on_all(T, free), lambda: constrained(assembled(), T, free))
+            return self.K.tie(on_all(T, free))
         D = (self.K.D.tocsr() @ on_all(T, free)).tobsr(self.K.D.blocksize)
         return replace(self.K, A=constrained(self.K.A, T, free), D=D)
 
@@ -301,7 +300,9 @@ def constrained(K: BlockMatrix, T: Any, free: Ints) -> BlockMatrix:
     half.sort_indices()
     change = half + half.T
     change.sort_indices()  # sums of sorted rows are made three times as fast
-    return BlockMatrix.of(A + change)
+    tied = BlockMatrix.of(A + change)
+    tied.ties = K, full
+    return tied
 
 
 def on_all(T: Any, free: Ints) -> Any:

@@ -17,7 +17,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from kratos_lite.assembly.block_matrix import BlockMatrix
+from kratos_lite.assembly.block_matrix import BlockMatrix, dependent_rows
 from kratos_lite.assembly.matrix_free import MatrixFree
 from kratos_lite.native import kernels
 from kratos_lite.solvers.coarse_level import PCoarseLevel
@@ -101,7 +101,10 @@ class Compiled:
         self.complexity: float = self._kernel.complexity()
 
     def _matrix(self, A: BlockMatrix) -> Any:
-        return self._module.Matrix(A.indptr, A.indices, A.data)
+        matrix = self._module.Matrix(A.indptr, A.indices, A.data)
+        if A.ties is not None:
+            matrix.tie(self._matrix(A.ties[0]), *dependent_rows(A.ties[1]))
+        return matrix
 
     def _aggregate(
         self,

@@ -131,7 +131,7 @@ def test_products_of_ties_are_those_of_the_matrix(kind):
     expected = T.T @ (K.scipy() @ (T @ q))
     x = np.zeros(T.shape[0])
     x[free] = q
-    tied = K.tie(on_all(T, free), K.assembled)
+    tied = K.tie(on_all(T, free))
     scale = 1e-12 * np.abs(expected).max()
     np.testing.assert_allclose((tied @ x)[free], expected, rtol=0, atol=scale)
     u = T @ q
@@ -157,3 +157,47 @@ def test_wrong_ties_are_refused():
         }
         with pytest.raises(ValueError, match=r"must|is needed"):
             product.tie(*(given | changed).values())
+
+
+@compiled
+def test_a_tie_of_unlike_meshes_takes_the_iterations_and_memory_of_joined_cells():
+    found = []
+    for mesh in (
+        kl.box((1, 1, 0.8), (10, 10, 8)),
+        kl.join(
+            {"a": kl.box((1, 1, 0.4), (10, 10, 4)), "b": kl.box((1, 1, 0.4), (11, 11, 4), origin=(0, 0, 0.4))}
+        ),
+    ):
+        model = kl.Model(mesh, LAW)
+        if mesh.n_nodes > 11**2 * 9:
+            model.tie("a.z+", "b.z-")
+        model.fix("x-")
+        system = ConstrainedSystem(
+            mesh.points, model.element_groups(), model.supports.constraint_map, solver="amg"
+        )
+        iterations = system.solve(mesh.points * mesh.points[:, :1])[1].iterations
+        found.append((iterations, system.equations._multigrid.memory / mesh.points.size))
+    (joined, most), (tied, memory) = found
+    assert tied <= joined + 1
+    assert memory < 1.5 * most
+
+
+@compiled
+def test_few_tied_elements_without_a_matrix_are_solved_on_one_level():
+    lower, upper = (
+        kl.box((1, 1, 0.5), (m, m, 1), "KinematicLinear3D8N", (0, 0, z)) for m, z in ((2, 0.0), (3, 0.5))
+    )
+    mesh = kl.join({"a": lower, "b": upper})
+    model = kl.Model(mesh, LAW)
+    model.tie("a.z+", "b.z-")
+    model.fix("x-")
+    found = [
+        ConstrainedSystem(
+            mesh.points, model.element_groups(), model.supports.constraint_map, solver=solver
+        ).solve(mesh.points)
+        for solver in ("amg", "direct")
+    ]
+    (u, solution), (exact, _) = found
+    assert solution.method == "amg"
+    assert solution.iterations < 25
+    np.testing.assert_allclose(u, exact, rtol=0, atol=1e-9 * np.abs(exact).max())
