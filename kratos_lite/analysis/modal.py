@@ -43,6 +43,7 @@ def natural_modes(
     with phase("check"):
         options: Any = {"solver": solver, "use": "modes", "progress": progress}
         e = EquationsOfMotion(model, lumped=lumped, free=preload is None, **options)
+        e.log_warnings()
     constraints, n = e.system.constraint_map, len(e.system.constraint_map.free)
     if near is not None and n > FALLBACK_LIMIT:
         raise InputError(
@@ -171,6 +172,7 @@ def complex_modes(
     phase = Phases(progress)
     with phase("check"):
         e = EquationsOfMotion(model, steady=True, progress=progress)
+        e.log_warnings()
     with phase("assemble"):
         M, C, K = (reduced(e, e.matrix(0.0, *factors)) for factors in ((1, 0, 0), (0, 1, 0), (0, 0, 1)))
     with phase("modes"):
@@ -251,6 +253,7 @@ def buckling(
     count, phase = whole_number(count, "count"), Phases(progress)
     with phase("check"):
         e = EquationsOfMotion(model, free=False, massless=True, solver="auto", progress=progress)
+        e.log_warnings()
     with phase("assemble"):
         K_g = preload_stiffness(e, preload, "buckling")
         K_g.data *= -1
