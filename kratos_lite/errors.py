@@ -79,6 +79,11 @@ class Problems:
 RENAMED = {
     **{"scheme": "integrator", "ends": "boundaries", "march": "time"},
     **{"pvd": "output", "csv": "output", "npz": "output", "generalised_alpha": "generalized_alpha"},
+    **{f"{C}3D{n}": f"KinematicLinear3D{n}N" for C in ("C", "") for n in (4, 6, 8, 10, 15, 20, 27)},
+    **{"C3D8I": "EnhancedStrain3D8N", "C3D20R": "Reduced3D20N", "MISES": "von_mises"},
+    **{"U1": "ux", "U2": "uy", "U3": "uz", "S11": "sxx", "S22": "syy", "S33": "szz", "S12": "sxy"},
+    **{"S23": "syz", "S13": "szx", "E11": "exx", "E22": "eyy", "E33": "ezz", "E12": "exy", "E23": "eyz"},
+    "E13": "ezx",
 }
 """Words that other programs, or earlier versions, have for what is known here by another word."""
 

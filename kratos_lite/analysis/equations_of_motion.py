@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cached_property, partial
@@ -28,7 +29,7 @@ from kratos_lite.validation import finite
 Solve: TypeAlias = Callable[[Array, Array, "Array | None"], Array]
 """Takes nodal forces, prescribed displacements and a start (3a,) or None, returns displacements (3a,)."""
 
-
+_log = logging.getLogger("kratos_lite")
 STEP_TOLERANCE, OF_START = 1e-10, 1e-5
 """Relative residual of a step: without a start, and of a start (4e-6 of the error of the step itself)."""
 
@@ -104,6 +105,11 @@ class EquationsOfMotion:
         self._kept: tuple[Any, Solve] | None = None
         self._product: tuple[Array, Array] | None = None  # the last u and K u
         self._scalar_kept: tuple[tuple[float, float], tuple[Any, Any]] | None = None
+
+    def log_warnings(self) -> None:
+        """Log what the checks of the model found, where no report of a result says it."""
+        for text in self.warnings:
+            _log.warning("%s", text)
 
     # ---- loads and supports ------------------------------------------------------------------------------
 

@@ -208,6 +208,7 @@ def harmonic_response(
     _check(model)
     solver = "auto" if by_modes else "direct"
     e = EquationsOfMotion(model, rayleigh=rayleigh, solver=solver, progress=progress)
+    e.log_warnings()
     if by_modes and e.free_motions.any:
         raise ModelError("the supports leave rigid-body modes free, which method='direct' takes alone")
     if e.free_motions.any and not omega.all():

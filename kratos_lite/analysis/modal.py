@@ -47,6 +47,7 @@ def natural_modes(
     with phase("check"):
         options: Any = {"solver": solver, "use": "modes", "progress": progress}
         e = EquationsOfMotion(model, lumped=lumped, free=preload is None, **options)
+        e.log_warnings()
     constraints, n = e.system.constraint_map, len(e.system.constraint_map.free)
     if near is not None and n > FALLBACK_LIMIT:
         raise InputError(
@@ -182,6 +183,7 @@ def complex_modes(
     count = whole_number(count, "count")
     with phase("check"):
         e = EquationsOfMotion(model, steady=True, solver="auto", use="modes", progress=progress)
+        e.log_warnings()
     with phase("assemble"):
         solver = e.system.equations
         pencil = _pencil(e, solver, progress)
@@ -261,6 +263,7 @@ def buckling(
     count, phase = whole_number(count, "count"), Phases(progress)
     with phase("check"):
         e = EquationsOfMotion(model, free=False, massless=True, solver="auto", progress=progress)
+        e.log_warnings()
     with phase("assemble"):
         K_g, strain = preload_stiffness(e, preload, "buckling")
         K_g.data *= -1

@@ -116,7 +116,8 @@ class Report(Tabular):
             rows.append(("steps", f"{len(self.steps)}, the last {SHOWN} of which are"))
         rows += [("step", str(step)) for step in self.steps[-SHOWN:]]
         if self.work is not None:
-            rows.append(("work of loads", f"{self.work:.6e} J"))
+            rule = f", by the trapezoidal rule over {len(self.steps)} steps" if self.steps else ""
+            rows.append(("work of loads", f"{self.work:.6e} J{rule}"))
         if self.backward_error is not None:
             rows.append(("backward error", f"{self.backward_error:.1e}"))
         if self.force_error is not None:

@@ -279,40 +279,55 @@ class ElementRange:
 
     def add_enhanced(self, forces: Array, state: PointStates, dt: float) -> PointStates:
         """Do the same with enhanced strains G α, whose amplitudes α satisfy ∫ G^T σ dV = 0."""
-        parts = []
+        parts, initial = [], initial_strain(self.group)
         for chunk in self.group.chunks():
             element, q = self.group.at(self.points, chunk), self.u[self.group.nodes[chunk]]
             B, G = tables.strain_rows(element._gauss[1]), element._modes(element.rule.points)  # type: ignore[attr-defined]
-            initial = initial_strain(self.group)
-            compatible = (B @ q.reshape(len(q), 1, -1, 1))[..., 0]
-            compatible += initial[chunk] if isinstance(initial, np.ndarray) else initial
-            alpha, dV = state.modes[chunk], element.dV  # type: ignore[index]
-            weighted = G * dV[..., None, None]
-            for _ in range(MODES_MAX):
-                strain = compatible + (G @ alpha[:, None, :, None])[..., 0]
-                stress, D, variables = self._evaluate(chunk, strain, state, dt)
-                h = np.einsum("mgci,mgc->mi", weighted, stress)
-                A = tables.summed(G, D @ G, dV)
-                size = np.einsum("mgci,mgc->mi", np.abs(weighted), np.abs(stress))
-                if (np.abs(h) <= MODES_CONVERGED * size.max(axis=1, keepdims=True)).all():
-                    break
-                try:
-                    alpha = alpha - np.linalg.solve(A, h[..., None])[..., 0]
-                except np.linalg.LinAlgError:
-                    raise SolveError("the law does not resist enhanced strains; take b_bar") from None
-            else:
-                raise SolveError(
-                    f"enhanced strains do not converge in {MODES_MAX} iterations; take smaller steps"
-                )
-            parts.append(PointStates(stress, variables, alpha))
-            found = np.einsum("mgci,mgc->mi", B * dV[..., None, None], stress)
-            add_nodal(forces, self.group.nodes[chunk], found.reshape(len(q), -1, 3))
+            strain = (B @ q.reshape(len(q), 1, -1, 1))[..., 0]
+            strain += initial[chunk] if isinstance(initial, np.ndarray) else initial
+            part, D = self._relaxed(chunk, strain, G, element.dV, state, dt)
+            parts.append(part)
+            nodal = tables.summed(B, part.stress[..., None], element.dV)
+            add_nodal(forces, self.group.nodes[chunk], nodal.reshape(len(q), -1, 3))
             if self.data is not None:
-                DB, flat = D @ B, weighted.reshape(len(q), -1, 21)
-                L = np.swapaxes(flat, -1, -2) @ DB.reshape(len(q), -1, DB.shape[-1])
-                K = tables.summed(B, DB, dV) - np.swapaxes(L, -1, -2) @ np.linalg.solve(A, L)
+                n, both = B.shape[-1], np.concatenate([B, G], axis=-1)
+                K = tables.summed(both, D @ both, element.dV)
+                K = K[:, :n, :n] - K[:, :n, n:] @ _of_modes(K[:, n:, n:], K[:, n:, :n])
                 self._scatter(chunk, tables.by_axis(K))
         return _joined(parts)
+
+    def _relaxed(
+        self, chunk: slice, strain: Array, G: Array, dV: Array, state: PointStates, dt: float
+    ) -> tuple[PointStates, Array]:
+        """Return states and tangents of a chunk at strains (m, g, 6) and the α that Newton's method finds."""
+        before, left = state.take(chunk), np.arange(len(strain))
+        variables = {name: np.empty_like(values) for name, values in before.variables.items()}
+        alpha, D = before.modes.copy(), np.empty((*strain.shape, 6))  # type: ignore[union-attr]
+        found = PointStates(np.empty_like(strain), variables, alpha)
+        for _ in range(MODES_MAX):
+            stress, tangent, new = self._evaluate(
+                chunk.start + left, strain + (G @ alpha[left][:, None, :, None])[..., 0], state, dt
+            )
+            found.stress[left], D[left] = stress, tangent
+            for name, values in new.items():
+                variables[name][left] = values
+            h, size = (
+                tables.summed(g, s[..., None], dV) for g, s in ((G, stress), (np.abs(G), np.abs(stress)))
+            )
+            off = (np.abs(h) > MODES_CONVERGED * size.max(axis=1, keepdims=True)).any(axis=(1, 2))
+            if not off.any():
+                return found, D
+            left, strain, G, dV = left[off], strain[off], G[off], dV[off]
+            alpha[left] -= _of_modes(tables.summed(G, tangent[off] @ G, dV), h[off])[..., 0]
+        raise SolveError(f"enhanced strains do not converge in {MODES_MAX} iterations; take smaller steps")
+
+
+def _of_modes(A: Array, b: Array) -> Array:
+    """Return A⁻¹ b of the stiffness A of enhanced modes; SolveError if it is singular."""
+    try:
+        return np.asarray(np.linalg.solve(A, b), dtype=float)
+    except np.linalg.LinAlgError:
+        raise SolveError("the law does not resist enhanced strains; take b_bar") from None
 
 
 def element_system(

@@ -110,6 +110,11 @@ class PlacedCell(Tabular):
         J = self._jacobian(dN)
         inverse = cofactors(J)
         det = (J[..., :, 0] * inverse[..., 0, :]).sum(axis=-1)
+        if self.rule is type(self).rule and not (det > 0).all():  # others may see more of a curved cell
+            raise InputError(
+                f"{type(self).__name__}: det J must be > 0 at all Gauss points; got {det.min():.3g} m³: the "
+                "nodes X are not in the order of the reference cell, mirrored, or in one plane"
+            )
         inverse /= det[..., None, None]
         D = dN[:, None, :, 0] * inverse[..., 0, :, None]
         for j in (1, 2):

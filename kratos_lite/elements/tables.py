@@ -89,10 +89,10 @@ def by_dof(K: Array) -> Array:
 
 
 def summed(B: Array, S: Array, dV: Array) -> Array:
-    """Return Σ B^T S dV (..., k, k) of B and S (..., g, 6, k)."""
-    rows, k = B.shape[-3] * 6, B.shape[-1]
-    weighted = (S * dV[..., None, None]).reshape(*S.shape[:-3], rows, k)
-    return np.swapaxes(B.reshape(*B.shape[:-3], rows, k), -1, -2) @ weighted
+    """Return Σ B^T S dV (..., k, l) of B (..., g, 6, k) and S (..., g, 6, l)."""
+    rows = B.shape[-3] * 6
+    weighted = (S * dV[..., None, None]).reshape(*S.shape[:-3], rows, S.shape[-1])
+    return np.swapaxes(B.reshape(*B.shape[:-3], rows, B.shape[-1]), -1, -2) @ weighted
 
 
 def isotropic(D: Array, dV: Array, lame: tuple[float, float]) -> Array:

@@ -38,7 +38,7 @@ class LinearMaterial(Material, family=True):
     is_linear: ClassVar[bool] = True
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
-        for name in ("stress", "response"):
+        for name in ("stress", "response", "C"):
             if getattr(cls, name) is not getattr(LinearMaterial, name):
                 raise MaterialError(
                     f"{cls.__name__} overrides {name}, but a LinearMaterial has stress = C strain; override "

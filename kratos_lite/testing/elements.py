@@ -158,8 +158,10 @@ def rank(element: Element) -> Measured:
     text = (
         f"{counts[0]} zero-energy modes on the reference cell, {counts[1]} on a distorted one; expected are "
     )
-    text += f"the 6 rigid ones{f' and {spurious} spurious ones' if spurious else ''}; more are spurious modes"
-    text += " of too few Gauss points"
+    text += (
+        f"the 6 rigid ones{f' and {spurious} spurious ones' if spurious else ''}; more come of a wrong row "
+    )
+    text += "of B or of too few Gauss points, fewer of a B in which rigid motions strain"
     wrong = max(abs(count - 6 - spurious) for count in counts)
     if spurious and not wrong and not patches.unbuildable(element.shape):
         wrong = _zeros(patches.assemble(element, *patches.patch(element.shape, (2, 2, 2), move=0.1))) - 6

@@ -149,3 +149,16 @@ def test_a_beam_that_mid_edge_nodes_alone_guide_has_the_modes_of_one_that_is_fre
     model.fix(lambda X: X[:, 2] == 0.05, "z")
     held, _ = model.modes(1)
     assert abs(held[0] / free[0] - 1) < 1e-6
+
+
+def test_a_density_in_other_units_is_warned_of_in_modes_and_in_harmonic_response(caplog):
+    model = kl.Model(kl.box((10, 1, 1), (4, 1, 1)), kl.Isotropic3D(E=210e9, nu=0.3, density=7.85))
+    model.fix("x-")
+    model.add(kl.Traction("x+", (0, 0, 1.0)))
+    for solve in (
+        lambda: model.modes(2),
+        lambda: model.harmonic(frequencies=[1.0], damping=0.01, method="modes"),
+    ):
+        caplog.clear()
+        solve()
+        assert "speed of waves" in caplog.records[0].getMessage()

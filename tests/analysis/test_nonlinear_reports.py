@@ -43,7 +43,8 @@ def test_the_summary_has_steps_work_and_plastic_strain_and_no_error(tmp_path, st
     assert "t = 0.25 s: 2 iterations" in rows["step"]
     stress = Y + (H + K) * plastic(1)
     assert abs(float(rows["plastic strain"].split()[2]) / plastic(1) - 1) < 1e-6
-    assert rows["work of loads"] == f"{result.report.work:.6e} J"
+    rule = f"by the trapezoidal rule over {len(analysis.reports)} steps"
+    assert rows["work of loads"] == f"{result.report.work:.6e} J, {rule}"
     kl.write(tmp_path / "a.json", result)
     data = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))
     assert "estimated_error" not in data

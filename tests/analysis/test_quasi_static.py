@@ -58,6 +58,7 @@ def test_a_bar_of_steel_yields_in_every_element(element):
         (HARD, "standard", 2e7),
         (HARD, "enhanced", 2e7),
         (HARD, "b_bar", 2e7),
+        (kl.DruckerPrager3D(20e9, 0.3, 50e6, 20.0, 10.0, 1e9), "enhanced", 1.5e7),
         (kl.DruckerPrager3D(20e9, 0.3, 50e6, 20.0, 10.0, 1e9), "b_bar", 1.5e7),
         (kl.NeoHookean3D(1e6, 0.3), "total_lagrangian", 2e3),
         (kl.MooneyRivlin3D(1e5, 0.5e5, 1e6), "total_lagrangian", 2e3),

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+import kratos_lite as kl
+
 GUST = Path(__file__).parents[2] / "examples" / "tower" / "gust.py"
 
 
@@ -48,3 +50,27 @@ def test_converting_what_changes_in_time_speaks_of_no_format_that_nobody_named(r
     done = run("convert", GUST, tmp_path / "a.vtu")
     assert done.refuses("gust.py: a load that changes in time cannot be written")
     assert ".mdpa" not in done.err
+
+
+@pytest.mark.parametrize(
+    ("call", "meant"),
+    [
+        (lambda: kl.box(element="C3D8"), "KinematicLinear3D8N"),
+        (lambda: kl.box(element="C3D20R"), "Reduced3D20N"),
+        (lambda: kl.box(element="3D8"), "KinematicLinear3D8N"),
+        (lambda: pulled().plot("no.png", "S11"), "sxx"),
+        (lambda: pulled().plot("no.png", "S13"), "szx"),
+        (lambda: pulled().plot("no.png", "U3"), "uz"),
+    ],
+)
+def test_names_of_abaqus_are_answered_with_ours(call, meant):
+    with pytest.raises(kl.InputError, match=f"It is called {meant} here"):
+        call()
+
+
+def pulled():
+    """Return the result of a cube under tension."""
+    model = kl.Model(kl.box(), kl.Isotropic3D(E=1e9, nu=0.3))
+    model.fix("x-")
+    model.add(kl.Traction("x+", (1e3, 0, 0)))
+    return model.solve()

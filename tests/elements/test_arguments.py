@@ -74,3 +74,10 @@ def test_nodes_that_are_not_places_are_refused(X):
 def test_a_family_without_shape_is_no_element():
     with pytest.raises(kl.InputError, match="KinematicLinear states no shape and rule"):
         kl.KinematicLinear(np.zeros((8, 3)))
+
+
+@pytest.mark.parametrize("order", [[1, 0, 2, 3, 4, 5, 6, 7], [4, 5, 6, 7, 0, 1, 2, 3]])
+def test_an_element_whose_nodes_are_crossed_or_mirrored_is_refused(order):
+    for X in (kl.KinematicLinear3D8N.nodes[order], kl.KinematicLinear3D8N.nodes * [1, 1, 0]):
+        with pytest.raises(kl.InputError, match="KinematicLinear3D8N: det J must be > 0 at all Gauss points"):
+            kl.KinematicLinear3D8N(X).stiffness(kl.Isotropic3D(E=1e9, nu=0.3).C)

@@ -14,10 +14,12 @@ class Cracked:
         return np.minimum(np.asarray(strain) @ self.C, 0)
 
 
-@pytest.mark.parametrize("own", [{"stress": Cracked.stress}, {}], ids=["own", "mixin"])
-def test_a_material_that_overrides_stress_is_refused(own):
-    bases = (kl.Isotropic3D,) if own else (Cracked, kl.Isotropic3D)
-    with pytest.raises(kl.MaterialError, match=r"^Own overrides stress, .* compliance\(\) or elasticity"):
+@pytest.mark.parametrize(
+    "own", [{"stress": Cracked.stress}, {"C": lambda self: np.eye(6)}, {}], ids=["own", "method C", "mixin"]
+)
+def test_a_material_that_overrides_stress_or_C_is_refused(own):
+    bases, name = (kl.Isotropic3D,) if own else (Cracked, kl.Isotropic3D), min(own, default="stress")
+    with pytest.raises(kl.MaterialError, match=rf"^Own overrides {name}, .* compliance\(\) or elasticity"):
         type("Own", bases, own)
     assert "Own" not in MATERIALS
 

@@ -25,6 +25,8 @@ SLENDER = (10, 1, 0.1)
         (SLENDER, (10, 10, 4), PLAIN, "too stiff in bending", "EnhancedStrain3D8N"),
         (SLENDER, (40, 4, 1), PLAIN, "too stiff in bending", "EnhancedStrain3D8N"),
         (SLENDER, (10, 1, 1), "SmallDisplacementElement3D8N", "too stiff", "EnhancedStrain3D8N"),
+        ((1, 0.1, 0.1), (5, 1, 1), PLAIN, "up to 2.5 times too stiff in bending", "EnhancedStrain3D8N"),
+        ((16, 1, 1), (8, 1, 1), PLAIN, "up to 2.5 times too stiff in bending", "EnhancedStrain3D8N"),
         (SLENDER, (10, 1, 1), "KinematicLinear3D6N", "too stiff in bending", "KinematicLinear3D15N"),
         ((1, 1, 1), (3, 3, 3), "KinematicLinear3D4N", "3D4N locks in bending", "KinematicLinear3D10N"),
         ((1, 1, 0.01), (4, 4, 1), "KinematicLinear3D5N", "3D5N locks in bending", "KinematicLinear3D13N"),
@@ -50,6 +52,35 @@ def test_the_forecast_has_the_size_of_the_error(cells, measured):
     assert 0.7 < factor * fraction < 1.1
 
 
+@pytest.mark.parametrize("cells", [8, 40])
+def test_one_layer_of_b_bar_bricks_is_within_what_the_forecast_says(cells):
+    """Long cells are too stiff in bending, short ones too soft: between both bounds, and beyond 1."""
+    model = kl.Model(kl.box((16, 1, 1), (cells, 1, 1), "BBar3D8N"), STEEL)
+    model.fix("x-")
+    model.add(kl.Resultant("x+", (0, 0, 1e3)))
+    fraction = model.solve().displacement("x+")[:, 2].mean() / (1e3 * 16**3 / (3 * 210e9 / 12))
+    (text,) = model.check()
+    stiff, soft = (float(text.split(f" times too {word}")[0].split()[-1]) for word in ("stiff", "soft"))
+    assert (1.5 < fraction < soft) if cells == 40 else (1 / stiff < fraction < 1.15 / stiff)
+    assert text.endswith("take EnhancedStrain3D8N")
+
+
+def test_near_half_ten_nodes_lock_as_forecast_and_b_bar_does_not():
+    """A flat block between rigid plates, over the force on finer meshes of any element."""
+    forces = []
+    for cells, element in (
+        ((2, 2, 1), "KinematicLinear3D10N"),
+        ((2, 2, 1), "BBar3D10N"),
+        ((4, 4, 2), "BBar3D20N"),
+    ):
+        model = kl.Model(kl.box((1, 1, 0.5), cells, element), RUBBER)
+        model.fix("z-")
+        model.fix("z+", "xyz", (0, 0, -0.01))
+        forces.append(model.solve().reaction("z-")[:, 2].sum())
+    assert forces[0] > 10 * forces[2]
+    assert forces[1] < 1.5 * forces[2]
+
+
 RUBBER = kl.Isotropic3D(E=1e6, nu=0.4999)
 
 
@@ -63,7 +94,7 @@ RUBBER = kl.Isotropic3D(E=1e6, nu=0.4999)
         (SLENDER, (10, 2, 1), ["EnhancedStrain3D8N", "Element3D8N"], STEEL),
         (SLENDER, (10, 2, 1), ["KinematicLinear3D20N", "KinematicLinear3D10N"], STEEL),
         ((1, 1, 1), (2, 2, 2), ["EnhancedStrain3D8N", "BBar3D20N"], RUBBER),
-        ((1, 1, 1), (2, 2, 2), ["KinematicLinear3D10N", "Element3D27N"], RUBBER),
+        ((1, 1, 1), (2, 2, 2), ["BBar3D10N", "Element3D10N", "Element3D27N"], RUBBER),
     ],
 )
 def test_elements_that_are_good_enough_are_not_warned_of(size, cells, elements, material):
@@ -75,6 +106,8 @@ def test_elements_that_are_good_enough_are_not_warned_of(size, cells, elements, 
     ("element", "better"),
     [
         ("KinematicLinear3D8N", "EnhancedStrain3D8N"),
+        ("KinematicLinear3D4N", "BBar3D10N"),
+        ("KinematicLinear3D10N", "BBar3D10N"),
         ("KinematicLinear3D6N", "BBar3D15N"),
         ("KinematicLinear3D5N", "BBar3D13N"),
         ("KinematicLinear3D20N", "BBar3D20N"),

@@ -223,8 +223,8 @@ def test_what_is_odd_is_solved_with_a_warning(made, text):
     assert any(text in warning for warning in made().solve().report.warnings)
 
 
-def test_quadratic_tetrahedra_do_not_lock():
-    assert model_of(kl.box(element=named(10)), SOFT).solve().report.warnings == []
+def test_quadratic_tetrahedra_without_a_named_formulation_do_not_lock():
+    assert model_of(kl.box(element="Element3D10N"), SOFT).solve().report.warnings == []
 
 
 NODES = kl.box().blocks[0].nodes
