@@ -185,8 +185,8 @@ class Variables:
 
     def note_means(self, notes: list[str]) -> None:
         """Note linear elements in which the temperature varies."""
-        T, ids = self.nodal.get(TEMPERATURE), [properties.id for properties in self.expanding]
-        for block in self.mesh.blocks if T is not None else ():
+        T, ids = self.nodal.scalar(TEMPERATURE), [properties.id for properties in self.expanding]
+        for block in self.mesh.blocks:
             nodes = block.nodes[np.isin(block.properties, ids)]
             if block.shape is not None and block.shape.degree == 1 and np.ptp(T[nodes], axis=1).any():
                 text = f"TEMPERATURE varies in {block.name}: its mean strains an element"

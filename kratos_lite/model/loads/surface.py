@@ -370,7 +370,7 @@ class ConditionLoads(Load):
         """Return the mean traction of each condition."""
         return _means(mesh, self._on_conditions(mesh))
 
-    def _carriers(self, mesh: Mesh) -> list[tuple[Block, Rows]]:
+    def _carriers(self, mesh: Mesh) -> list[tuple[Block, slice]]:
         return [(b, at) for b, at in with_rows(mesh.conditions) if b.name not in self.idle]
 
     def _on_conditions(self, mesh: Mesh) -> Iterator[tuple[Block, Array]]:
