@@ -194,8 +194,8 @@ def find_file(
 ) -> tuple[Path, str]:
     """Return the path of the file that a key names, and a note if it stands somewhere else."""
     # The path counts from the folder of the run file.  Kratos counts from where it is started, such as a
-    # folder above, through which the path leads, or the present one; so the file is looked for there, and beside
-    # the run file.
+    # folder above, through which the path leads, or the present one; so the file is looked for there, and
+    # beside the run file.
     name = settings.text(key) + ending
     if isdir(name) or isdir(folder / name):  # where the methods of Path refuse names that are too long
         raise settings.error(key, f"{name} is a folder; name a file in it")

@@ -54,9 +54,9 @@ def model_from(
     model = Model(document.mesh)
     model.notes += [str(note) for note in document.notes]
     model.notes += _renamed(document.mesh)
-    sources = (block.source for block in document.properties.values() if block.source)
-    problems = Problems(next(sources, document.mesh.source))
+    problems = Problems()
     for properties in document.used_properties():
+        problems.source = properties.source or document.mesh.source
         apply_properties(model, properties, materials, problems)
     problems.raise_if_any()
     values = Variables(document.mesh, expanding(document, materials), follows or model.is_nonlinear)

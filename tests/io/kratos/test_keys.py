@@ -247,6 +247,12 @@ def test_what_kratos_computes_otherwise_is_a_note_that_strict_counts(
     assert not any("UpdatedLagrangian" in note and "small displacements" in note for note in notes)
 
 
+def test_a_misspelt_variable_is_named_in_the_materials_file(folder):
+    write(folder, materials("Structure.Body", 7850.0, 2e9, 0.3, YOUNGS_MODULUS=1.0), "materials.json")
+    with pytest.raises(InputError, match=r"materials\.json: unknown variable YOUNGS_MODULUS\. Did you mean"):
+        read_case(write(folder, run_file([CLAMP], [push(1e5)])))
+
+
 def test_conditions_that_kratos_computes_nothing_of_carry_no_load(folder):
     """Measured against Kratos 10.4.4; values of nodes act on the faces beside, 0.75 m high and 1 m wide."""
     text = (folder / "box.mdpa").read_text().replace(FACE, "SurfaceCondition3D4N")
