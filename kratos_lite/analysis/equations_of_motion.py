@@ -73,7 +73,7 @@ class EquationsOfMotion:
             if not (massless or group.material.density > 0):
                 raise ModelError(
                     f"{type(group.material).__name__} has density {group.material.density:g}, but what moves "
-                    "needs mass; give each material a density > 0 kg/m³"
+                    "needs mass; give each material a density > 0"
                 )
         self.system = ConstrainedSystem(
             model.mesh.points,

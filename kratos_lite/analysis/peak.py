@@ -22,7 +22,7 @@ class Peak:
     elsewhere: float | None = None  # in Pa; None where all elements are near
 
     def __str__(self) -> str:
-        away = "" if self.elsewhere is None else f"; at most {self.elsewhere:.6e} Pa two elements away"
+        away = "" if self.elsewhere is None else f"; at most {self.elsewhere:.6e} Pa two of its elements away"
         return f" {self.place}, where it may grow with each refinement{away}"
 
 

@@ -107,7 +107,9 @@ class TimeIntegration:
     def __str__(self) -> str:
         by = f" by {self.integrator}" if self.integrator else ""
         by = by if self.quasi_static is None else ", quasi-static"
-        return f"{self.steps} steps of {self.step:g} s{by}"
+        own = sorted({*self.sizes[: self.steps]} or {self.step})
+        size = " … ".join(dict.fromkeys([f"{own[0]:g}", f"{own[-1]:g}"]))
+        return f"{self.steps} steps of {size} s{by}"
 
 
 @dataclass

@@ -17,8 +17,15 @@ SOLIDS = {
 """Names of solid shapes by their number of nodes."""
 POINT_ELEMENT = "NodalConcentratedElement3D1N"
 LINES: dict[int, type[Shape]] = {2: Line2, 3: Line3}
-CARRIERS = ("Load", "Face3D", "FacePressure", "SurfaceCondition", "PointCondition", "LineCondition")
-"""Words in the names of conditions that carry loads."""
+IDLE = ("SurfaceCondition", "PointCondition", "LineCondition")
+"""Names, up to their 3D, of conditions that are there for others to find: Kratos loads nothing by them."""
+FACES = ("Load", "Face3D", "FacePressure", *IDLE)
+"""Words in the names of conditions that can carry loads."""
+LOADED = (
+    "SurfaceLoadCondition", "LineLoadCondition", "PointLoadCondition", "Face", "FacePressure",
+    "FaceLoadPressure", "SmallDisplacementSurfaceLoadCondition", "SmallDisplacementLineLoadCondition",
+)  # fmt: skip
+"""Names, up to their 3D, of those that carry the loads of a file."""
 PRESTRESS = ("PRESTRESS", "INSITU_STRESS")
 """Names of the initial stress in files, which Kratos subtracts: σ = C ε - PRESTRESS_FACTOR · PRESTRESS."""
 LIKELY, SURE = 0.8, 0.9
@@ -92,7 +99,7 @@ def condition_shape(name: str) -> type[Shape] | None:
     'Quadrilateral4'
     """
     nodes = count(name)
-    if nodes is None or "Contact" in name or not any(word in name for word in CARRIERS):
+    if nodes is None or "Contact" in name or not any(word in name for word in FACES):
         return None
     if nodes == 1:
         return Point1

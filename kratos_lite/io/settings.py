@@ -194,7 +194,8 @@ def find_file(
 ) -> tuple[Path, str]:
     """Return the path of the file that a key names, and a note if it stands somewhere else."""
     # The path counts from the folder of the run file.  Kratos counts from where it is started, such as a
-    # folder above, through which the path leads; so the file is looked for there, and beside the run file.
+    # folder above, through which the path leads, or the present one; so the file is looked for there, and
+    # beside the run file.
     name = settings.text(key) + ending
     if isdir(name) or isdir(folder / name):  # where the methods of Path refuse names that are too long
         raise settings.error(key, f"{name} is a folder; name a file in it")
@@ -203,7 +204,7 @@ def find_file(
         settings.files.append(path)
         return path, ""
     whole, first = folder.resolve(), Path(name).parts[0]
-    above = (up / name for up in whole.parents if whole.is_relative_to(up / first))
+    above = (up / name for up in whole.parents if whole.is_relative_to(up / first) or up == Path.cwd())
     for other in (folder / path.name, *above):
         if other.is_file():
             settings.files.append(other)

@@ -217,6 +217,8 @@ def unusual_constants(materials: Iterable[Material], units: str = "SI") -> Itera
                 f"{material} is as heavy as concrete, rock or metal, whose E is {1e10 / pascal:g} Pa and "
                 f"more, but soft as rubber: is E in {E_unit} (steel: {210e9 / pascal:g})?"
             )
+        if getattr(material, "yield_stress", 0.0) * pascal > high:
+            yield f"the yield stress of {material} is larger than E: are both in {E_unit}?"
         if density > 0 and not LIGHTEST <= density <= HEAVIEST:
             yield (
                 f"the density of {material} is far from that of any engineering material, {1 / dense:g} "
@@ -320,7 +322,8 @@ def check_loads(
         return [f"gravity is 9.81 in m/s²; this model is in {supports.mesh.units}: give {9.81 / size:g}"]
     massless = all(g.material.density == 0 for g in groups) and not forces.any()
     if massless and any(isinstance(load, Gravity) for load in loads):
-        return ["gravity acts on no mass: every material has density 0; give density in kg/m³"]
+        unit = unit_name("kg/m³", supports.mesh.units)
+        return [f"gravity acts on no mass: every material has density 0; give density in {unit}"]
     if forces[~supports.fixed].any() or supports.displaced:
         return []
     if forces.any():

@@ -23,6 +23,7 @@ from kratos_lite.mesh import Mesh, mask_of
 from kratos_lite.model.rigid_body_modes import RigidBlocks, free_modes
 from kratos_lite.model.supports import Supports
 from kratos_lite.solvers.constraints import rigid_modes
+from kratos_lite.tabular import in_units
 from kratos_lite.typing import Array, Ints, Mask
 
 ROUND_OFF, OF_PLACES = 1e4, 10.0
@@ -164,9 +165,10 @@ class FreeMotions:
         center, arm = (values[self.of_block == p][0] for values in self.blocks.frames)
         moment = self._by_component(np.cross(points - center, total))[p]
         force, turn = _text(self._by_component(total)[p], roundoff[p]), _text(moment, roundoff[p] * arm)
+        sums = in_units(f"{force} N and {turn} N m", self.blocks.mesh.units)
         raise ModelError(
-            f"{text}, and its loads do not balance: together they are {force} N and {turn} N m about "
-            f"{_text(center)}. {fix}, or {cure}"
+            f"{text}, and its loads do not balance: together they are {sums} about {_text(center)}. {fix}, "
+            f"or {cure}"
         )
 
     @cached_property

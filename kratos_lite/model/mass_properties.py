@@ -244,7 +244,7 @@ class MassProperties:
             if not group.material.density > 0:
                 raise ModelError(
                     f"{type(group.material).__name__} has density {group.material.density:g}, but what "
-                    "moves needs mass; give each material a density > 0 kg/m³"
+                    "moves needs mass; give each material a density > 0"
                 )
         center, mass, volume = X[groups[0].nodes[0, 0]], 0.0, 0.0
         second = np.zeros((3, 3))

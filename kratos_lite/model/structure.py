@@ -669,8 +669,11 @@ class Structure(Solid):
         return free_motions(self.mesh, self.supports, groups)
 
     def remarks(self) -> list[str]:
-        """Return what readers of files noted, and constants of materials that no engineering material has."""
-        return [*self.notes, *dict.fromkeys(checks.unusual_constants(self._used_materials(), self.units))]
+        """Return what readers of files noted, and constants that no material has in SI, as in no units."""
+        return [*self.notes, *(self._unusual_constants() if self.units == "SI" else [])]
+
+    def _unusual_constants(self) -> list[str]:
+        return list(dict.fromkeys(checks.unusual_constants(self._used_materials(), self.units)))
 
     # ---- summary ------------------------------------------------------------------------------
 
@@ -710,6 +713,7 @@ CHECKS: tuple[Callable[[Structure, Sequence[ElementGroup]], Iterable[str]], ...]
     lambda model, groups: check_joints(model.mesh),
     lambda model, groups: check_coincident(model.mesh, model.supports),
     lambda model, groups: checks.check_scales(model.mesh, groups),
+    lambda model, groups: [] if model.units == "SI" else model._unusual_constants(),
     lambda model, groups: check_locking(model.mesh, groups),
     lambda model, groups: check_spurious_modes(model.mesh, groups, model.supports),
     lambda model, groups: checks.check_nodes(model.mesh, model.supports.added),

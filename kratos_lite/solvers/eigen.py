@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -104,8 +105,14 @@ def modes_near(K: Csr, M: Csr, count: int, near: float) -> tuple[Array, Array]:
         far = np.abs(omega[chosen] - near).max()
         low, high = max(near - far, 0.0) ** 2, (near + far) ** 2
         complete = not first and shift - radius <= low and high <= shift + radius
-    Y = factors.solve(M @ X[:, chosen])  # once more: high modes, in which rounding tells most, leave
-    squares, C = _ritz(Y.T @ (K @ Y), Y.T @ (M @ Y), count)
+    return _once_more(factors.solve, K, M, X[:, chosen])
+
+
+def _once_more(solve: Operator, K: Any, M: Any, X: Array) -> tuple[Array, Array]:
+    """Return ω and shapes (n, count) one inverse iteration after X: high modes, of most rounding, leave."""
+    Y = solve(M @ X)
+    Y /= np.linalg.norm(Y, axis=0)
+    squares, C = _ritz(Y.T @ (K @ Y), Y.T @ (M @ Y), X.shape[1])
     _check_dense(K, M, squares, Y @ C)
     return np.sqrt(np.maximum(squares, 0.0)), Y @ C
 
@@ -137,8 +144,8 @@ def dense_modes(K: Array, M: Array, count: int) -> tuple[Array, Array]:
             f"{count} modes cannot be found: stiffness or mass is not positive within rounding; look for "
             "lengths or constants in wrong units, and for very thin elements"
         )
-    _check_dense(K, M, squares, shapes)
-    return np.sqrt(np.maximum(squares, 0.0)), shapes
+    A = K + 1e-2 * first_shift(K, M) * M  # motions that nothing holds have λ = 0
+    return _once_more(partial(np.linalg.solve, A), K, M, shapes)
 
 
 @dataclass(frozen=True)

@@ -155,8 +155,12 @@ def test_warnings_and_places_in_errors_are_in_mm():
     assert re.search(r"differ by \S+ mm, ", text)
     model.assign(kl.Isotropic3D(E=210e9, nu=0.3, density=7850.0))
     report = model.solve().report
-    assert "to 1.2e+06 MPa (diamond)" in " ".join(report.notes)
-    assert "2.26e-08 t/mm³ (osmium)" in " ".join(report.notes)
+    assert "to 1.2e+06 MPa (diamond)" in " ".join(report.warnings)
+    assert "2.26e-08 t/mm³ (osmium)" in " ".join(report.warnings)
+    model.assign(kl.J2Plasticity3D(210e3, 0.3, 355e6))
+    assert "J2Plasticity3D" in " ".join(model.checked()[1])
+    model.assign(kl.J2Plasticity3D(210e3, 0.3, 355.0))
+    assert not [text for text in model.checked()[1] if "J2Plasticity3D" in text]
     model.assign(kl.Isotropic3D(E=210e9, nu=0.3, density=7.85e-9))
     assert "2.5e+07 mm/s" in " ".join(model.solve().report.warnings)
     result = bracket(MM).solve()
@@ -171,6 +175,14 @@ def test_warnings_and_places_in_errors_are_in_mm():
         with pytest.raises(kl.MeshError, match=words):
             act()
     assert result.section(("x", 50.0)).where == "x = 50 mm"
+    model = bracket(MM, gravity=9810.0)
+    model.loads[:] = model.loads[1:]
+    model.assign(kl.Isotropic3D(E=210e3, nu=0.3))
+    assert "give density in t/mm³" in " ".join(model.solve().report.warnings)
+    model = kl.Model(result.mesh, kl.Isotropic3D(E=210e3, nu=0.3))
+    model.add(kl.Resultant("x+", (0, 0, 1e3)))
+    with pytest.raises(kl.ModelError, match=r"\(0 0 1000\) N and \(0 -50000 0\) N mm about \(50 10 5\)"):
+        model.solve()
     finer = bracket(MM).solve(error=0.5).report.warnings
     assert not [text for text in finer if " Pa" in text]
 
@@ -242,7 +254,8 @@ def test_magnitudes_of_each_set_of_units(units):
     )
     wrong.fix("x-")
     wrong.add(kl.Traction("x+", (1e6 * Pa, 0, 0)))
-    notes = " ".join(wrong.solve().report.notes)
+    report = wrong.solve().report
+    notes = " ".join(report.notes if units == "SI" else report.warnings)
     assert f"(diamond): is it in {unit_name('Pa', units)}?" in notes
     assert f"is it in {unit_name('kg/m³', units)} (steel: {7850 * dense:g})" in notes
     assert f"to {1.2e12 * Pa:g}" in notes

@@ -352,3 +352,19 @@ def far(model):
 def test_bad_input_is_refused_in_words(act, words, tmp_path):
     with pytest.raises(KratosLiteError, match=words):
         act(block(), tmp_path)
+
+
+@pytest.mark.parametrize("mass", [0.05, 5.0, 500.0])
+def test_a_mass_far_heavier_than_its_beam_leaves_the_frequency_of_a_spring(mass):
+    """ω² = k/m with the k of statics, though the mass of the beam is up to 1e-7 of it, and at most 2e-3."""
+    model = kl.Model(
+        kl.box((100.0, 10, 10), (10, 1, 1), "KinematicLinear3D20N"), kl.Isotropic3D(210e3, 0.3, 7.85e-9)
+    )
+    model.fix("x-")
+    load = kl.Resultant("x+", (0, 0, 1.0))
+    model.add(load)
+    tip = model.mesh.nodes("x+")
+    k = 1 / model.solve().u[tip, 2].mean()
+    model.add_mass("x+", mass)
+    omega = model.modes(1)[0][0]
+    assert abs(omega * np.sqrt(mass / k) - 1) < 2e-3

@@ -129,7 +129,12 @@ def times_of(problem: Settings, solver: Settings, alike: bool = False) -> list[f
         if not step > 0:
             raise stepping.error(key, f"must be > 0 s; got {step:g} at t = {times[-1]:g} s")
         if (end - times[-1]) / step + len(times) - 1 > MAX_STEPS:
-            raise stepping.error(key, f"{key} {step:g} s makes more than {MAX_STEPS} steps; enlarge it")
+            more = (
+                f" at t = {times[-1]:g} s, to which its last rows are extended, as in Kratos,"
+                if step_at
+                else ""
+            )
+            raise stepping.error(key, f"{key} {step:g} s{more} makes more than {MAX_STEPS} steps; enlarge it")
         times.append(times[-1] + step)
     return times
 

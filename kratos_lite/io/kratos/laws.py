@@ -22,24 +22,25 @@ ITERATIONS = 25
 """Corrections of a step that are allowed at least, as residuals are smaller than those of files."""
 
 
-def notes_on_laws(document: Document) -> list[str]:
+def notes_on_laws(document: Document, steps: int) -> list[str]:
     """Return notes on what laws of Kratos mean there, and not here."""
     laws = {type(law).__name__ for _, law in _materials(document) if getattr(law, "has_corners", False)}
     text = "Kratos exchanges the shears yz and zx in its flow; where both are 0 it does the same"
-    return [*_notes_on_stress(document), *(Omission(f"{name}: {text}") for name in sorted(laws))]
+    return [*_notes_on_stress(document, steps), *(Omission(f"{name}: {text}") for name in sorted(laws))]
 
 
-def _notes_on_stress(document: Document) -> list[str]:
-    """Return a note on small-strain laws of updated Lagrangian elements: Kratos means another stress."""
+def _notes_on_stress(document: Document, steps: int) -> list[str]:
+    """Return a note on updated Lagrangian elements: of which laws, and steps, Kratos has another stress."""
     names = {b.name for b in document.mesh.blocks if len(b) and b.name.startswith("UpdatedLagrangian")}
     laws = {type(law).__name__ for _, law in _materials(document) if law.strain_measure == "small"}
-    if not (names and laws):
-        return []
     text = (
         f"{', '.join(sorted(names))} with {', '.join(sorted(laws))}: C times Green's strain is the second "
         "stress of Piola and Kirchhoff here, Cauchy's in Kratos; KirchhoffSaintVenant3DLaw is one in both"
+        if laws
+        else f"{', '.join(sorted(names))}: from the second step on Kratos writes other stresses and strains "
+        "than of TotalLagrangianElement, whose are written here; displacements are the same"
     )
-    return [Omission(text)]
+    return [Omission(text)] if names and (laws or steps > 1) else []
 
 
 def make_linear(document: Document) -> list[str]:

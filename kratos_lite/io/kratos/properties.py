@@ -256,6 +256,7 @@ def _use_material(entry: Settings, properties: Properties, notes: list[str]) -> 
         text = f"part {part}: {key!r} in a material is not supported; leave it out"
         body.expect(not body.values[key], key, text)
     properties.values |= values | {"CONSTITUTIVE_LAW": name}
+    properties.source, properties.line, properties.lines = variables.source, 0, {}
     try:
         material_from(properties.values)
     except KratosLiteError as error:

@@ -72,6 +72,8 @@ class ProcessesInTime:
             if any(action.mentions("t") or not self._acts_always(action) for action in actions):
                 if group is SURFACE:
                     values.note_idle(self.notes)
+                if group is HEAT:
+                    values.note_means(self.notes)
                 values.drop(group)
                 function = _load_in_time(actions, self.context, base, load_of)
                 self._later.append(TimeDependentLoad(function, group is SURFACE and values.follows))

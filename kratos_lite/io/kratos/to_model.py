@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from difflib import get_close_matches
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from kratos_lite.io.kratos.context import Omission
 from kratos_lite.io.kratos.point_elements import set_apart
 from kratos_lite.io.kratos.properties import NO_EXPANSION, USED, apply_properties, expanding
 from kratos_lite.io.kratos.variables import LOADING, SPLIT, TEMPERATURE, VECTORS, Variables, components
-from kratos_lite.io.names import misspelt
+from kratos_lite.io.names import LOADED, SURE, misspelt
 from kratos_lite.mesh import Mesh, ids_of, rows_of_ids
 from kratos_lite.solvers.constraints import Constraints
 from kratos_lite.typing import Array, Ints
@@ -53,9 +54,9 @@ def model_from(
     model = Model(document.mesh)
     model.notes += [str(note) for note in document.notes]
     model.notes += _renamed(document.mesh)
-    sources = (block.source for block in document.properties.values() if block.source)
-    problems = Problems(next(sources, document.mesh.source))
+    problems = Problems()
     for properties in document.used_properties():
+        problems.source = properties.source or document.mesh.source
         apply_properties(model, properties, materials, problems)
     problems.raise_if_any()
     values = Variables(document.mesh, expanding(document, materials), follows or model.is_nonlinear)
@@ -75,7 +76,7 @@ def model_from(
 
 
 def _check_elements(document: Document) -> None:
-    """Raise InputError for every element block of unknown kind that is not empty."""
+    """Raise InputError for every block of unknown elements, or of misspelt conditions, that is not empty."""
     mesh, problems = document.mesh, Problems(document.mesh.source)
     for block in mesh.blocks:
         if len(block) and block.name not in ELEMENTS:
@@ -85,6 +86,12 @@ def _check_elements(document: Document) -> None:
             have = ", ".join(sorted(ELEMENTS, key=lambda name: (len(name), name)))
             text = f"unknown element {block.name!r} ({len(block)} of them);{hint} Known are {have}"
             problems.add(f"{text} and their Kratos names", line)
+    for block in mesh.conditions:
+        kind = block.name.split("3D")[0]
+        if len(block) and kind not in LOADED and (meant := get_close_matches(kind, LOADED, 1, SURE)):
+            line = None if block.lines is None else int(block.lines.min())
+            text = f"unknown condition {block.name!r} ({len(block)} of them)"
+            problems.add(f"{text}. Did you mean {block.name.replace(kind, meant[0])}?", line)
     problems.raise_if_any()
 
 
@@ -112,7 +119,9 @@ def _renamed(mesh: Mesh) -> list[str]:
     for block in mesh.blocks:
         name = ELEMENTS[block.name].__name__ if block.name in ELEMENTS else block.name
         if len(block) and name != block.name and not is_unnamed(block.name):
-            large = " with small displacements" if "Lagrangian" in block.name else ""
+            large = (
+                " with small displacements" if "Lagrangian" in block.name and "Lagrangian" not in name else ""
+            )
             notes[block.name] = f"{block.name} is solved as {name}{large}"
     return list(notes.values())
 

@@ -16,7 +16,8 @@ from kratos_lite.analysis.model import Model
 from kratos_lite.io.formats.document import Properties
 from kratos_lite.io.kratos.context import Omission
 from kratos_lite.io.kratos.properties import reference_temperature
-from kratos_lite.mesh import Mesh, ids_of, with_rows
+from kratos_lite.io.names import IDLE, LOADED
+from kratos_lite.mesh import Block, Mesh, ids_of, with_rows
 from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.loads.surface import SURFACES, ConditionLoads
 from kratos_lite.model.loads.temperature import Temperature
@@ -49,6 +50,11 @@ def components(variable: str, values: ArrayLike) -> dict[str, Array]:
     if variable in SPLIT and array.shape[-1:] == (3,):
         return {f"{variable}_{axis}": array[..., i] for i, axis in enumerate("XYZ")}
     return {variable: array}
+
+
+def carries(block: Block) -> bool:
+    """Whether conditions carry the loads of a file."""
+    return block.shape is not None and len(block) > 0 and block.name.split("3D")[0] in LOADED
 
 
 class Fields(dict[str, Array]):
@@ -131,6 +137,7 @@ class Variables:
             if load is not None:
                 model.add(load)
         self.note_idle(model.notes)
+        self.note_means(model.notes)
         idle = {*self.nodal, *self.conditional} - LOADING | {TEMPERATURE} & self.conditional.keys()
         for name in sorted(idle):
             if self.nodal.scalar(name).any() or self.conditional.scalar(name).any():
@@ -150,18 +157,18 @@ class Variables:
         """Return the loads that conditions carry, or None."""
         force = np.zeros((self.mesh.n_conditions, 3))
         nodal_force = {cell: self.nodal.vector(name) for cell, name in LOADS.items()}
-        conditions = [(block, at) for block, at in with_rows(self.mesh.conditions) if len(block)]
-        carriers = [(block.shape.cell, at) for block, at in conditions if block.shape is not None]
-        for cell, indices in carriers:
-            force[indices] = self.conditional.vector(LOADS[cell])[indices]
+        carriers = [(block, at) for block, at in with_rows(self.mesh.conditions) if carries(block)]
+        for block, at in carriers:
+            force[at] = self.conditional.vector(LOADS[block.known_shape.cell])[at]
         positive, negative = PRESSURES
         pressure, nodal_pressure = (
             fields.scalar(positive) - fields.scalar(negative) for fields in (self.conditional, self.nodal)
         )
         values = (force, *nodal_force.values(), pressure, nodal_pressure)
         is_loaded = len(carriers) > 0 and any(value.any() for value in values)
-        given = force, nodal_force, pressure, nodal_pressure
-        return ConditionLoads(*given, self.follows) if is_loaded else None
+        idle = [b.name for b in self.mesh.conditions if b.shape is not None and not carries(b)]
+        given = force, nodal_force, pressure, nodal_pressure, self.follows, idle
+        return ConditionLoads(*given) if is_loaded else None
 
     def note_idle(self, notes: list[str]) -> None:
         """Note loads where nothing carries them, and pressures that follow deformed faces in Kratos only."""
@@ -176,6 +183,15 @@ class Variables:
                 text = f"{name}: the pressure {how}; {name} adds a pressure stiffness there"
                 notes.append(Omission(text))
 
+    def note_means(self, notes: list[str]) -> None:
+        """Note linear elements in which the temperature varies."""
+        T, ids = self.nodal.scalar(TEMPERATURE), [properties.id for properties in self.expanding]
+        for block in self.mesh.blocks:
+            nodes = block.nodes[np.isin(block.properties, ids)]
+            if block.shape is not None and block.shape.degree == 1 and np.ptp(T[nodes], axis=1).any():
+                text = f"TEMPERATURE varies in {block.name}: its mean strains an element"
+                notes.append(Omission(f"{text}; Kratos takes that of each Gauss point"))
+
     def _note_uncarried(self, notes: list[str]) -> None:
         """Note load values on conditions of another kind, and on nodes without conditions that carry them."""
         mesh = self.mesh
@@ -183,13 +199,18 @@ class Variables:
             cells = [c for c, load in LOADS.items() if load == variable] or SURFACES
             kinds = "faces" if cells[0] in SURFACES else f"{cells[0]} conditions"
             on_conditions, on_nodes = self.conditional.loaded(variable), self.nodal.loaded(variable)
+            kind, other = str, ""
             for block, indices in with_rows(mesh.conditions):
-                if block.shape is not None and block.shape.cell in cells:
-                    on_conditions[indices] = on_nodes[block.nodes] = False
+                if carries(block):
+                    if block.known_shape.cell in cells:
+                        on_conditions[indices] = on_nodes[block.nodes] = False
+                elif on_conditions[indices].any():
+                    kind = kind if block.name.startswith(IDLE) else Omission  # Kratos may know more of it
+                    other = f"; {block.name} carries no load"
             for word, idle, ids, more in (
-                ("conditions", on_conditions, ids_of(mesh.conditions), ""),
+                ("conditions", on_conditions, ids_of(mesh.conditions), other),
                 ("nodes", on_nodes, mesh.node_ids, ", and none has these nodes"),
             ):
                 if idle.any():
                     where = f"{idle.sum()} {word} (first {ids[idle].min()})"
-                    notes.append(f"{variable} on {where} has no effect: only {kinds} carry it{more}")
+                    notes.append(kind(f"{variable} on {where} has no effect: only {kinds} carry it{more}"))

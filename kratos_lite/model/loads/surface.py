@@ -316,12 +316,14 @@ class ConditionLoads(Load):
         pressure: Array,
         nodal_pressure: Array,
         follower: bool = True,
+        idle: Sequence[str] = (),
     ) -> None:
         self.force = force  # (c, 3) of conditions; Pa on faces, N/m on lines, N on points
         self.nodal_force = nodal_force  # (n, 3) by the cell of the conditions that carry it
         self.pressure = pressure  # (c,) Pa, against the normal by the right hand about the nodes
         self.nodal_pressure = nodal_pressure  # (n,) Pa
         self.follower = follower  # whether they act on deformed faces
+        self.idle = idle  # names of conditions that carry nothing
 
     def __repr__(self) -> str:
         loaded = self.force.any(axis=1) | (self.pressure != 0)
@@ -344,7 +346,7 @@ class ConditionLoads(Load):
         self, mesh: Mesh, x: Array, names: str | tuple[str, ...]
     ) -> Iterator[tuple[Rows, Array, Array]]:
         """Yield what `follow` does, of conditions whose names begin so."""
-        for block, at in with_rows(mesh.conditions):
+        for block, at in self._carriers(mesh):
             shape = block.shape
             if not len(block) or not block.name.startswith(names) or shape is None or shape.cell == "point":
                 continue
@@ -368,9 +370,12 @@ class ConditionLoads(Load):
         """Return the mean traction of each condition."""
         return _means(mesh, self._on_conditions(mesh))
 
+    def _carriers(self, mesh: Mesh) -> list[tuple[Block, slice]]:
+        return [(b, at) for b, at in with_rows(mesh.conditions) if b.name not in self.idle]
+
     def _on_conditions(self, mesh: Mesh) -> Iterator[tuple[Block, Array]]:
         """Yield conditions and the forces (m, k, 3) in N on their nodes."""
-        for block, at in with_rows(mesh.conditions):
+        for block, at in self._carriers(mesh):
             on_face = block.shape is not None and block.shape.cell in SURFACES
             if block.shape is None and (self.force[at].any() or self.pressure[at].any()):
                 raise ModelError(f"a load is given on conditions of the unknown type {block.name}")
@@ -394,6 +399,7 @@ class ConditionLoads(Load):
             self.pressure[finer.conditions],
             finer.interpolate(self.nodal_pressure),
             self.follower,
+            self.idle,
         )
 
 

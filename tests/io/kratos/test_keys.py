@@ -4,12 +4,14 @@ import json
 import sys
 from importlib.util import find_spec
 
+import numpy as np
 import pytest
 from children import output_of
-from run_files import CLAMP, process, push, run_file, write
+from run_files import CLAMP, materials, output, process, push, run_file, write
 
 from kratos_lite.errors import InputError
 from kratos_lite.io.files import read_case
+from kratos_lite.io.kratos.context import Omission
 
 SOLVER, PROBLEM = "solver_settings", "problem_data"
 LOAD = ("processes", "loads_process_list", 0)
@@ -195,6 +197,77 @@ def test_strict_refuses_a_check_that_is_not_made(folder, run):
     path = write(folder, run_file([CLAMP], [push(1e5)], checks=[check]))
     codes = {options: run("solve", "-q", *options, path).code for options in ((), ("--strict",))}
     assert codes == {(): 0, ("--strict",): 2}
+
+
+FACE, ELEMENT = "SmallDisplacementSurfaceLoadCondition3D4N", "SmallDisplacementElement3D8N"
+STEPS = {"step": 0.5, "analysis_type": "linear"}
+EXPANDING = materials(
+    "Structure.Body", 7850.0, 2e9, 0.3, "ThermalElasticIsotropic3D",
+    THERMAL_EXPANSION_COEFFICIENT=1e-5, REFERENCE_TEMPERATURE=20.0,
+)  # fmt: skip
+RUBBER = materials("Structure.Body", 7850.0, 2e9, 0.3, "HyperElastic3DLaw")
+HEAT = process("assign_scalar_variable_process", "Structure", "TEMPERATURE", value="120.0*X*t")
+WARM = process("assign_scalar_variable_process", "Structure", "TEMPERATURE", value="120.0*t")
+BOSSAK = {"solver_type": "dynamic", "time_integration_method": "implicit", "step": 0.01, "end": 0.02}
+REACTIONS = {"files": [output("json", output_variables=["REACTION"], output_file_name="a.json")]}
+UNLIKE = [
+    # what is exchanged in the mesh, more loads, materials, settings, and the words of a note, or None
+    ((FACE, "SurfaceLoadCondition3D4N"), [], None, STEPS, "SurfaceLoadCondition3D4N: Kratos puts the load"),
+    ((FACE, "SurfaceLoadCondition3D4N"), [], None, {}, None),
+    ((FACE, "SurfaceLoadCondition3D4N"), [], None, {**STEPS, "move_mesh_flag": False}, None),
+    ((FACE, FACE), [], None, STEPS, None),
+    ((FACE, "OddCondition3D4N"), [], None, {}, "only faces carry it; OddCondition3D4N carries no load"),
+    ((FACE, "SurfaceCondition3D4N"), [], None, {}, None),
+    ((FACE, FACE), [HEAT], EXPANDING, {}, f"TEMPERATURE varies in {ELEMENT}: its mean strains"),
+    ((FACE, FACE), [HEAT], EXPANDING, STEPS, f"TEMPERATURE varies in {ELEMENT}: its mean strains"),
+    ((FACE, FACE), [WARM], EXPANDING, STEPS, None),
+    (
+        (ELEMENT, "UpdatedLagrangianElement3D8N"),
+        [],
+        RUBBER,
+        {"step": 0.5, "analysis_type": "non_linear"},
+        "UpdatedLagrangianElement3D8N: from the second step on Kratos writes other stresses",
+    ),
+    ((ELEMENT, "UpdatedLagrangianElement3D8N"), [], RUBBER, {"analysis_type": "non_linear"}, None),
+    ((FACE, FACE), [], None, {**BOSSAK, "outputs": REACTIONS}, "REACTION of bossak has the inertia"),
+    ((FACE, FACE), [], None, {**BOSSAK, "outputs": REACTIONS, "scheme_type": "newmark"}, None),
+    ((FACE, FACE), [], None, BOSSAK, None),
+]
+
+
+@pytest.mark.parametrize(("names", "loads", "law", "settings", "words"), UNLIKE)
+def test_what_kratos_computes_otherwise_is_a_note_that_strict_counts(
+    folder, names, loads, law, settings, words
+):
+    (folder / "box.mdpa").write_text((folder / "box.mdpa").read_text().replace(*names))
+    if law:
+        write(folder, law, "materials.json")
+    notes = read_case(write(folder, run_file([CLAMP], [push(1e5), *loads], **settings))).model.notes
+    assert [words in note for note in notes if isinstance(note, Omission)] == [True] * (words is not None)
+    assert not any("UpdatedLagrangian" in note and "small displacements" in note for note in notes)
+
+
+def test_a_misspelt_variable_is_named_in_the_materials_file(folder):
+    write(folder, materials("Structure.Body", 7850.0, 2e9, 0.3, YOUNGS_MODULUS=1.0), "materials.json")
+    with pytest.raises(InputError, match=r"materials\.json: unknown variable YOUNGS_MODULUS\. Did you mean"):
+        read_case(write(folder, run_file([CLAMP], [push(1e5)])))
+
+
+def test_conditions_that_kratos_computes_nothing_of_carry_no_load(folder):
+    """Measured against Kratos 10.4.4; values of nodes act on the faces beside, 0.75 m high and 1 m wide."""
+    text = (folder / "box.mdpa").read_text().replace(FACE, "SurfaceCondition3D4N")
+    before, head, rows = text.partition("Begin Conditions")
+    text = before + head + rows.replace("\n5 0", f"\nEnd Conditions\nBegin Conditions {FACE}\n5 0", 1)
+    (folder / "box.mdpa").write_text(text)
+    nodal = process("assign_vector_variable_process", "Structure.Top", "SURFACE_LOAD", value=[0.0, 0.0, 8.0])
+    nodal["Parameters"]["constrained"] = False
+    model = read_case(write(folder, run_file([CLAMP], [push(1e5), nodal]))).model
+    assert "SURFACE_LOAD on 4 conditions (first 1) has no effect" in "".join(model.notes)
+    assert np.abs(model.solve().reactions.sum(axis=0) - [0, 0, -8 * 0.75 / 2]).max() < 1e-12
+    (folder / "box.mdpa").write_text(text.replace("SurfaceCondition", "SurfaceLoadConditions"))
+    words = r"box\.mdpa:\d+: unknown condition 'SurfaceLoadConditions3D4N' \(4 of them\)\. Did you mean Surf"
+    with pytest.raises(InputError, match=words):
+        read_case(folder / "ProjectParameters.json")
 
 
 IN_KRATOS = """

@@ -282,7 +282,10 @@ def test_steps_of_a_table_are_those_of_kratos(tmp_path):
     series = [[0, 0, s, 0, 0, 0] for s in stress]
     results = {"CAUCHY_STRESS_VECTOR": {str(point): series for point in range(8)}}
     write(tmp_path, {"TIME": times, "ELEMENT_1": results}, "results.json")
-    outcome = kl.run(read_case(cube(tmp_path, [("0.01*t", [0.0, "End"])], [check], time_stepping=table)))
+    case = read_case(cube(tmp_path, [("0.01*t", [0.0, "End"])], [check], time_stepping=table))
+    sizes = np.diff(times)
+    assert str(case.time) == f"{len(sizes)} steps of {sizes.min():g} … {sizes.max():g} s, quasi-static"
+    outcome = kl.run(case)
     assert outcome.compare()[0].endswith(f"after {len(times) - 1} steps")
     assert " passed (" in outcome.compare()[0]
     assert f"{len(times) - 1} steps in" in dict(outcome.rows)["time"]
@@ -296,6 +299,7 @@ def test_steps_of_a_table_are_those_of_kratos(tmp_path):
         ([[0.0, 0.1, 0.2]], "must have shape (n, 2)"),
         ([], "time_step_table"),
         ([[0.0, 1e-9]], "makes more than 1000000 steps"),
+        ([[0.0, 0.5], [0.5, 0.1]], "to which its last rows are extended, as in Kratos, makes more"),
     ],
 )
 def test_tables_of_steps_that_cannot_be_taken_are_refused(tmp_path, table, words):

@@ -133,7 +133,7 @@ def test_2019_folder_runs_and_its_own_check_passes(name, part, component, expect
     assert any("beside the run file is read" in note for note in project.model.notes)
 
 
-def test_files_are_found_from_a_folder_above_where_kratos_is_started(folder):
+def test_files_are_found_from_a_folder_above_where_kratos_is_started(folder, monkeypatch):
     (folder / "small").mkdir()
     text = json.dumps(ONE_STEP).replace('"box"}', f'"{folder.name}/box"}}')
     text = text.replace("materials.json", f"{folder.name}/materials.json")
@@ -142,6 +142,14 @@ def test_files_are_found_from_a_folder_above_where_kratos_is_started(folder):
     for name in ("box.mdpa", "materials.json"):
         assert f"{folder.name}/{name} is not there; {folder / name} is read" in notes
     path.write_text(text.replace(folder.name, "elsewhere"))
+    (folder / "elsewhere").mkdir()
+    for name in ("box.mdpa", "materials.json"):
+        (folder / name).rename(folder / "elsewhere" / name)
+    with pytest.raises(InputError, match="there is no such file"):
+        read_case(path)
+    monkeypatch.chdir(folder)  # the path does not lead through the folder of the run file
+    assert read_case(path).model.mesh.n_elements == 8
+    monkeypatch.chdir(folder / "elsewhere")  # which is not above
     with pytest.raises(InputError, match="there is no such file"):
         read_case(path)
 

@@ -131,7 +131,8 @@ def test_a_used_vector_of_wrong_size_is_refused_at_its_line(load, kind):
     [
         (
             "ConditionalData SURFACE_LOAD\n3 [3] (0,0,1)\n7 [3] (0,0,1)\n9 [3] (0,0,1)",
-            "SURFACE_LOAD on 2 conditions (first 7) has no effect: only faces carry it",
+            "SURFACE_LOAD on 2 conditions (first 7) has no effect: only faces carry it; StrangeCondition3D4N "
+            "carries no load",
         ),
         (
             "ConditionalData POINT_LOAD\n3 [3] (0,0,1)",
