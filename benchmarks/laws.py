@@ -114,10 +114,7 @@ def made(law: str, n: int) -> Any:
     import kratos_lite as kl
 
     (traction, E), mesh = LAWS[law], kl.box((1, 1, 2), (n, n, 2 * n), "Element3D8N")
-    if law == "J2":
-        model = kl.Model(mesh, kl.J2Plasticity3D(E, 0.3, 250e6, 2e9), formulation="b_bar")
-    else:
-        model = kl.Model(mesh, kl.NeoHookean3D(E, 0.3))
+    model = kl.Model(mesh, kl.J2Plasticity3D(E, 0.3, 250e6, 2e9) if law == "J2" else kl.NeoHookean3D(E, 0.3))
     model.fix("z-")
     model.add(kl.Traction("z+", (traction, 0, 0)), amplitude=lambda t: t)
     return model

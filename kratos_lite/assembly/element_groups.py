@@ -290,7 +290,7 @@ def _element_for(
             incompressible = not material.is_linear and is_nearly_incompressible(material.C)
             words = ["f_bar"] * incompressible + ["total_lagrangian"]
         else:
-            words = ["enhanced"] * takes_enhanced(material) + ["b_bar", "standard"]
+            words = ["b_bar", "standard"]
         word = next(word for word in words if word in known)
         formulation = word if formulation == NON_LOCKING else formulation
         unnamed = word if unnamed == NON_LOCKING else unnamed

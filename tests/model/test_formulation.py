@@ -32,25 +32,22 @@ def test_a_word_chooses_the_element_class(word, name):
 @pytest.mark.parametrize(
     ("law", "nodes", "name"),
     [
-        (kl.J2Plasticity3D(2e11, 0.3, 2e8), 8, "EnhancedStrain3D8N"),
+        (kl.J2Plasticity3D(2e11, 0.3, 2e8), 8, "BBar3D8N"),
         (kl.J2Plasticity3D(2e11, 0.3, 2e8), 20, "BBar3D20N"),
         (kl.J2Plasticity3D(2e11, 0.3, 2e8), 6, "KinematicLinear3D6N"),
-        (kl.DruckerPrager3D(2e10, 0.3, 5e7, 20.0, 20.0), 8, "EnhancedStrain3D8N"),
-        (kl.DruckerPrager3D(2e10, 0.3, 5e7, 20.0, 10.0), 8, "BBar3D8N"),  # off the normal
-        (kl.RankineDamage3D(3e10, 0.2, 3e6, 100.0), 8, "BBar3D8N"),  # softens
         (kl.NeoHookean3D(1e6, 0.3), 8, "TotalLagrangianElement3D8N"),
         (kl.NeoHookean3D(1e6, 0.499), 8, "FBar3D8N"),
     ],
 )
-def test_a_nonlinear_law_chooses_the_element_that_does_not_lock_and_finds_equilibrium(law, nodes, name):
+def test_a_nonlinear_law_chooses_the_element_that_does_not_lock_in_flow(law, nodes, name):
     assert kinds(kl.Model(kl.box(element=f"Element3D{nodes}N"), law)) == [name]
 
 
 @pytest.mark.parametrize("cells", [(4, 1, 1), (40, 1, 1)])
-def test_bricks_whose_law_may_flow_bend_as_those_of_its_elasticity(cells):
+def test_enhanced_bricks_whose_law_may_flow_bend_as_those_of_its_elasticity(cells):
     tips = []
     for law in (STEEL, kl.J2Plasticity3D(210e9, 0.3, 250e9)):
-        model = kl.Model(kl.box((1, 0.1, 0.1), cells), law)
+        model = kl.Model(kl.box((1, 0.1, 0.1), cells), law, formulation="enhanced")
         model.fix("x-")
         model.add(kl.Resultant("x+", (0, 0, -1e3)))
         tips.append(model.solve().displacement("x+")[:, 2].mean())
