@@ -188,9 +188,9 @@ public:
         int64_t stiffest = 0;
         double most = 0, largest = 0;
         for (int64_t i = 0; i < n; ++i) {
-            const double trace = D[9 * i] + D[9 * i + 4] + D[9 * i + 8];
-            if (trace > most) {
-                most = trace;
+            const double entry = std::fmax(D[9 * i], std::fmax(D[9 * i + 4], D[9 * i + 8]));
+            if (entry > most) {
+                most = entry;
                 stiffest = i;
             }
         }

@@ -317,8 +317,8 @@ def each(owner, call, **samples):
     }
 
 
-def loads(kind, **samples):
-    return each(kind.__name__, lambda **given: loaded(kind(**given)), **samples)
+def loads(kind, options=None, **samples):
+    return each(kind.__name__, lambda **given: loaded(kind(**given, **(options or {}))), **samples)
 
 
 def on(body, kind, *more, **samples):
@@ -335,7 +335,7 @@ CASES |= {
     **loads(kl.Resultant, where=TOP, force=VECTOR, moment=VECTOR, about=POINT),
     **loads(kl.Traction, where=TOP, traction=VECTOR),
     **loads(kl.Pressure, where=TOP, pressure=1.0),
-    **loads(kl.PointLoad, where=NODES, force=VECTOR),
+    **loads(kl.PointLoad, {"each": True}, where=NODES, force=VECTOR),
     **each(
         "TimeSeries", lambda **v: [kl.TimeSeries(**v)(t) for t in (0.5, 2)], times=[0, 1.0], values=[0, 1]
     ),
