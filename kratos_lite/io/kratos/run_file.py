@@ -97,6 +97,8 @@ def read_kratos_project(
     unlike = ("REACTION", REACTIONS, bossak), ("GREEN_LAGRANGE_STRAIN", STRAINS, TEMPERATURE in given)
     model.notes += [note for word, note, is_other in unlike if is_other and word in written]
     outputs, files = Outputs(in_steps=list(processes.written)), settings.files
+    if model.is_nonlinear and not (eigen or in_time) and times[-1] != 1:
+        model.notes.append(f"the one step, to t = {times[-1]:g} s, is counted as one to t = 1 s")
     time = time if in_time else None
     return Case(model, time, modes, above, outputs=outputs, expected=processes.checks, files=files)
 

@@ -187,6 +187,12 @@ def test_strict_refuses_a_file_of_which_kratos_would_do_more(folder, run, comman
     assert run(command, "--strict", path).refuses("'output_proceses' (Did you mean output_processes?)")
 
 
+def test_a_misspelt_section_is_named_where_the_run_ends_in_an_error(folder, run):
+    path = write(folder, changed(("processes",), renamed("process")))
+    said = run("solve", path)
+    assert said.refuses("rigid-body modes free", "note: key 'process' (Did you mean processes?) is not used")
+
+
 def test_strict_refuses_a_check_that_is_not_made(folder, run):
     wanted = {
         "check_variables": ["DISPLACEMENT"],
