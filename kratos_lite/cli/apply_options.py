@@ -51,12 +51,16 @@ def case_of(options: Namespace, part: int | None = None) -> Case:
         refuse(options, MODAL, "does not go with a file of several steps")
     for number, each in enumerate((case, *case.then), 1):
         _apply(each, options, f"-{number}" if case.then else "")
-        omitted = [n for n in each.model.notes if isinstance(n, Omission)] if each.is_of_model else []
-        if options.strict and omitted:
+        if options.strict and (omitted := omitted_of(each)):
             raise InputError(
                 "\n".join([f"{options.input}: --strict: not everything requested is done:", *omitted])
             )
     return case
+
+
+def omitted_of(case: Case) -> list[str]:
+    """Return the notes on what a run file requests, and is not done."""
+    return [n for n in case.model.notes if isinstance(n, Omission)] if case.is_of_model else []
 
 
 def _apply(case: Case, options: Namespace, mark: str) -> None:

@@ -51,7 +51,7 @@ def solve(options: Namespace) -> int:
     clock = perf_counter()
     _read_options(options)
     with _within_numbers(options):
-        from kratos_lite.cli.apply_options import case_of
+        from kratos_lite.cli.apply_options import case_of, omitted_of
         from kratos_lite.cli.ranks import part_files_of, solve_parts
         from kratos_lite.io.outputs import check_outputs
         from kratos_lite.io.run import run
@@ -73,8 +73,13 @@ def solve(options: Namespace) -> int:
             check_outputs(each)
         for number, each in enumerate(cases, 1):
             _print([f"{'step':<22}{number} of {len(cases)}"] if case.then and not options.quiet else [])
-            with in_terminal("check", options.progress) as progress:
-                outcome = run(each, progress)
+            try:
+                with in_terminal("check", options.progress) as progress:
+                    outcome = run(each, progress)
+            except ModelError as error:  # a key that is not used may be why
+                raise ModelError(
+                    "\n".join([str(error), *(f"note: {n}" for n in omitted_of(each))])
+                ) from error
             if outcome.result is not None:
                 outcome.result.report.seconds = {**seconds, **outcome.result.report.seconds}
             codes.append(_show(outcome, options))

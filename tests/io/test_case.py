@@ -88,6 +88,13 @@ def test_expected_values_are_compared_with_the_end(folder):
     assert kl.run(kl.Case(held(), modes=1)).compare() == []
 
 
+@pytest.mark.parametrize("analysis", [{"modes": 1}, {"harmonic": {"frequencies": [1.0]}}])
+def test_modes_and_harmonic_responses_say_odd_constants_as_statics_does(analysis):
+    body = held()
+    body.assign(kl.Isotropic3D(E=210.0, nu=0.3, density=7850.0))
+    assert any("is E in Pa" in text for _, text in kl.run(kl.Case(body, **analysis)).rows)
+
+
 def test_states_of_a_case_come_without_files(folder):
     body, states = prepare(kl.read_case(written(BODY + "output = {'csv': 'a.csv'}\n")))
     assert [state.step for state in states] == [2, 4]

@@ -49,6 +49,8 @@ def test_a_function_of_three_coordinates_is_refused_where_it_is_given(make):
     where = ("z+",) if make in ON_FACES else ()
     with pytest.raises(kl.InputError, match=r"takes places X \(m, 3\) alone: lambda X: …"):
         make(*where, lambda x, y, z: 0.0)
+    with pytest.raises(kl.InputError, match=r"time goes by model.add\(load, amplitude=lambda t: …\)"):
+        make(*where, lambda X, t: 0.0)
     make(*where, lambda X: X)
 
 

@@ -203,7 +203,7 @@ def run(actions: Sequence[Action], context: RunContext, notes: list[str], values
 
 
 def notes_of(actions: Sequence[Action], context: RunContext) -> list[str]:
-    """Return notes on actions that never act, and on those that Kratos evaluates on a moved mesh."""
+    """Return notes on actions that never act, and on those that Kratos refuses or evaluates elsewhere."""
     notes = []
     for action in actions:
         where = action.settings.path.removesuffix(".Parameters")
@@ -219,6 +219,9 @@ def notes_of(actions: Sequence[Action], context: RunContext) -> list[str]:
                 f"it, kratos_lite on the undeformed one; {cure} to mean the same"
             )
             notes.append(Omission(text))
+        if len(action.factors) > 1 and any(" if " in str(factor) for factor in action.factors):
+            cure = "Kratos refuses 'if' in a modulus or a direction; give 'value' of a vector process"
+            notes.append(Omission(f"{where}: {cure}"))
         if action.on_conditions and action.mentions("XYZ"):
             notes.append(f"{where}: X, Y, Z are 0 on conditions, as in Kratos; write x, y, z")
     return list(dict.fromkeys(notes))

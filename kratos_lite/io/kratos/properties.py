@@ -13,7 +13,7 @@ from kratos_lite.analysis.model import Model
 from kratos_lite.errors import InputError, KratosLiteError, MaterialError, ModelError, Problems, nearest
 from kratos_lite.io.formats.document import Document, Note, Properties
 from kratos_lite.io.kratos.context import Omission, RunContext
-from kratos_lite.io.names import PRESTRESS
+from kratos_lite.io.names import PRESTRESS, nearest_variable
 from kratos_lite.io.settings import Settings, is_number, shown
 from kratos_lite.materials import MATERIALS, Material
 from kratos_lite.mesh import mask_of, with_rows
@@ -208,7 +208,8 @@ def _volume_vector(properties: Properties, name: str) -> Array:
 def use_materials(settings: Settings, context: RunContext, document: Document, notes: list[str]) -> None:
     """Give a document the materials of the file, and its elements their properties ids."""
     entries = settings.sections("properties")
-    settings.expect(entries, "properties", "the materials file needs a list of 'properties'")
+    text = "the materials file needs a list of 'properties', which is empty or missing"
+    settings.expect(entries, "properties", text)
     for entry in entries:
         entry.check_keys(("model_part_name", "properties_id", "Material", "sub_properties"))
         number = entry.integer("properties_id")
@@ -260,8 +261,11 @@ def _use_material(entry: Settings, properties: Properties, notes: list[str]) -> 
     try:
         material_from(properties.values)
     except KratosLiteError as error:
-        named = [key for key in variables.values if key in str(error)]
-        raise variables.error(named[0] if named else "", f"part {part}: {error}") from None
+        words = re.findall(r"[A-Z_]{2,}", str(error))
+        slips = {key: nearest_variable(key, words) for key in variables.unknown(USED)}
+        named = [key for key in variables.values if key in str(error) or slips.get(key)]
+        hint = "".join(f".{slips[key]}" for key in named[:1] if slips.get(key))
+        raise variables.error(named[0] if named else "", f"part {part}: {error}{hint}") from None
 
 
 def _variable(variables: Settings, key: str) -> Any:

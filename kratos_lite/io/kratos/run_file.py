@@ -37,12 +37,12 @@ from kratos_lite.io.kratos.time_dependent import DYNAMIC, ProcessesInTime, time_
 from kratos_lite.io.kratos.to_model import model_from
 from kratos_lite.io.kratos.variables import TEMPERATURE
 from kratos_lite.io.settings import Settings, find_file, read_settings
-from kratos_lite.model.loads.surface import ConditionLoads
 
 CHECK = "check_eigenvalues_process"
 NOT_RUN = ("save_restart_process", "timer_process", "print_info_in_file_process")
 DAMPING = Omission("rayleigh_beta damps by the stiffness at rest; Kratos takes that of each iteration")
 REACTIONS = Omission("REACTION of bossak has the inertia at the end of a step; Kratos takes its mean over it")
+STRAINS = Omission("GREEN_LAGRANGE_STRAIN is the whole strain; Kratos's is without that of TEMPERATURE")
 LINEAR = "analysis_type is non_linear: the linear solution is computed, on the undeformed body"
 PARTS = "results over part files are written by -o OUT.pvtu"
 
@@ -85,21 +85,20 @@ def read_kratos_project(
     for initial_state in processes.states:
         initial_state(model)
     add_motion(model, settings, None if in_time else times[-1])
-    model.notes += notes + (
-        _notes_on_moved(document, processes.actions) if small and moved and in_time else []
-    )
+    model.notes += notes
     if in_time:
         in_time.finish(model)
         if dynamic:
             time = time_integration_of(settings, in_time)
             model.notes += [DAMPING] if model.is_nonlinear and time.rayleigh[1] else []
-            written = repr([settings.values.get(key) for key in ("processes", "output_processes")])
-            model.notes += (
-                [REACTIONS]
-                if "REACTION" in written and solver.text("scheme_type", "bossak") == "bossak"
-                else []
-            )
+    given = [*(data.variable for data in document.nodal_data), *(a.component for a in processes.actions)]
+    bossak = dynamic and solver.text("scheme_type", "bossak") == "bossak"
+    written = repr([settings.values.get(key) for key in ("processes", "output_processes")])
+    unlike = ("REACTION", REACTIONS, bossak), ("GREEN_LAGRANGE_STRAIN", STRAINS, TEMPERATURE in given)
+    model.notes += [note for word, note, is_other in unlike if is_other and word in written]
     outputs, files = Outputs(in_steps=list(processes.written)), settings.files
+    if model.is_nonlinear and not (eigen or in_time) and times[-1] != 1:
+        model.notes.append(f"the one step, to t = {times[-1]:g} s, is counted as one to t = 1 s")
     time = time if in_time else None
     return Case(model, time, modes, above, outputs=outputs, expected=processes.checks, files=files)
 
@@ -122,23 +121,6 @@ def _notes_on_keys(settings: Settings, dynamic: bool, eigen: bool, small: bool) 
     note = f"{are.format(', '.join(unused))} not used"
     misspelt = any("Did you mean" in key for key in unused if "." not in key)  # a whole section is left out
     return [Omission(note) if misspelt else note] if unused else []
-
-
-def _notes_on_moved(document: Document, actions: list[Action]) -> list[str]:
-    """Return a note on each kind of conditions whose loads the steps before have moved in Kratos."""
-    given = {data.variable for data in (*document.nodal_data, *document.condition_data)}
-    given |= {action.component for action in actions}
-    kinds = {
-        b.name for b in document.mesh.conditions if len(b) and b.name.startswith(ConditionLoads.following)
-    }
-    return [
-        Omission(
-            f"{kind}: Kratos puts the load of a step on the mesh as those before moved it, kratos_lite on "
-            f'the undeformed one; SmallDisplacement{kind}, or "move_mesh_flag": false, means the same'
-        )
-        for kind in sorted(kinds)
-        if any(name.startswith(kind[:4].upper()) and "_LOAD" in name for name in given)
-    ]
 
 
 def _dofs(solver: Settings, dynamic: bool) -> tuple[str, ...]:

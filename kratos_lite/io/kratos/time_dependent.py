@@ -52,6 +52,7 @@ class ProcessesInTime:
     def prepare(self, values: Variables) -> None:
         """Bring values and supports to what stays in time, and keep what changes for `finish`."""
         self._check(values)
+        values.moves = self.context.moved
         if self.dynamic:
             self._begin(values)
         base = values.copy()

@@ -95,7 +95,7 @@ class Variables:
     def __init__(self, mesh: Mesh, expanding: Sequence[Properties] = (), follows: bool = False) -> None:
         kinds = (block.name for block in mesh.conditions if len(block))
         self.follows = follows and any(kind.startswith(ConditionLoads.following) for kind in kinds)
-        self.mesh = mesh
+        self.mesh, self.moves = mesh, False  # Kratos puts the loads of a step on the mesh as moved before
         self.expanding = expanding  # the properties of elements that a temperature strains
         self.nodal, self.conditional = Fields(mesh.n_nodes), Fields(mesh.n_conditions)
         self.fixed: dict[str, Mask] = {}
@@ -171,17 +171,22 @@ class Variables:
         return ConditionLoads(*given) if is_loaded else None
 
     def note_idle(self, notes: list[str]) -> None:
-        """Note loads where nothing carries them, and pressures that follow deformed faces in Kratos only."""
+        """Note loads where nothing carries them, and those that Kratos alone puts on a deformed body."""
         # Kratos adds the stiffness of such a pressure to K even in a linear analysis; its small-displacement
         # conditions do not.
         self._note_uncarried(notes)
-        loads = self.condition_loads()
-        if not self.follows and loads is not None and (loads.pressure.any() or loads.nodal_pressure.any()):
-            kinds = {block.name for block in self.mesh.conditions if len(block)}
-            for name in sorted(kind for kind in kinds if kind.startswith("SurfaceLoadCondition")):
+        kinds, given = {b.name for b in self.mesh.conditions if len(b)}, {*self.nodal, *self.conditional}
+        for name in () if self.follows else sorted(kinds):
+            presses = name.startswith("SurfaceLoadCondition") and not given.isdisjoint(PRESSURES)
+            if presses:
                 how = f"acts on the undeformed body, as that of SmallDisplacement{name} in Kratos"
                 text = f"{name}: the pressure {how}; {name} adds a pressure stiffness there"
                 notes.append(Omission(text))
+            loads = name.startswith(ConditionLoads.following) and name[:4].upper() in {v[:4] for v in given}
+            if self.moves and (presses or loads):
+                text = f"{name}: Kratos puts the load of a step on the mesh as those before moved it"
+                cure = f'SmallDisplacement{name}, or "move_mesh_flag": false, means the same'
+                notes.append(Omission(f"{text}, kratos_lite on the undeformed one; {cure}"))
 
     def note_means(self, notes: list[str]) -> None:
         """Note linear elements in which the temperature varies."""

@@ -59,7 +59,7 @@ def run(case: Case, progress: Progress | None = None) -> Outcome:
             for i, z in enumerate(values.tolist(), 1)
         ]
     _write(case, values, shapes)
-    notes = [("note", text) for text in model.notes]
+    notes = [("note", text) for text in model.remarks()]
     return Outcome(case, notes, lines=[head, *rows], modes=(values, shapes))
 
 
@@ -103,7 +103,7 @@ def _harmonic(case: Case, progress: Progress | None) -> Outcome:
         rows.append(f"{omega / (2 * pi):>14.8g}  {omega:>14.8g}  {size[at]:>14.6e}  {node:>9}")
     for path in case.outputs.results:
         write_table(path, _columns(response))
-    notes = [("note", text) for text in case.model.notes]
+    notes = [("note", text) for text in case.model.remarks()]
     return Outcome(case, notes, lines=rows, response=response)
 
 

@@ -363,7 +363,8 @@ def vectors(values: Any, what: str, shapes: str, dimensions: tuple[int, ...] = (
 def is_of_places(value: Any, what: str) -> bool:
     """Return whether a value is a function; InputError for one that takes more than places (m, 3)."""
     if callable(value) and not takes(value, 1):
-        raise InputError(f"{what} as a function takes places X (m, 3) alone: lambda X: …; got {value!r}")
+        cure = "lambda X: …; time goes by model.add(load, amplitude=lambda t: …) or kl.TimeDependentLoad"
+        raise InputError(f"{what} as a function takes places X (m, 3) alone: {cure}; got {value!r}")
     return callable(value)
 
 

@@ -142,6 +142,10 @@ def test_twenty_problems_are_shown_and_the_rest_counted(tmp_path):
         ("Begin nodes\nEnd nodes", r":1:1: unknown block 'nodes'; capitals matter: write 'Begin Nodes'"),
         ("Begin SubModelPartNodes\n1\nEnd SubModelPartNodes", r"stands outside the block that it belongs to"),
         ("End Nodes", r":1:1: 'End Nodes' closes nothing"),
+        (
+            "\nBegin SubModelparts A\nEnd SubModelPart",
+            r":2:1: unknown block 'SubModelparts'\. Did you",
+        ),
         ("Begin Nodes\n1 0 0 0\nEnd Nodes 5", r":3:11: '5' stands outside any block"),
         ("Begin Nodes\n1 0 0 0\nEnd Nodes /* open", r":3:11: comment '/\*' is never closed"),
         ("Begin Properties x\nEnd Properties", r":1:1: Properties: 'x' is not an id"),

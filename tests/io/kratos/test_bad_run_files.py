@@ -171,6 +171,11 @@ def bad_material(variables=None, material=None, **changes):
 
 BAD_MATERIALS = [
     ({"materials": []}, "needs a list of 'properties'"),
+    ({"properties": []}, "properties: the materials file needs a list of 'properties', which is empty"),
+    (
+        bad_material({"YOUNG_MODULES": 1e9, "POISSON_RATIO": 0.3}),
+        "Variables.YOUNG_MODULES: part Structure.Body: Isotropic3D needs E (YOUNG_MODULUS). Did you",
+    ),
     (
         bad_material(model_part_name="Structure.Bottom"),
         "has no elements to carry a material; parts with elements are Structure (all), Body",

@@ -187,6 +187,12 @@ def test_strict_refuses_a_file_of_which_kratos_would_do_more(folder, run, comman
     assert run(command, "--strict", path).refuses("'output_proceses' (Did you mean output_processes?)")
 
 
+def test_a_misspelt_section_is_named_where_the_run_ends_in_an_error(folder, run):
+    path = write(folder, changed(("processes",), renamed("process")))
+    said = run("solve", path)
+    assert said.refuses("rigid-body modes free", "note: key 'process' (Did you mean processes?) is not used")
+
+
 def test_strict_refuses_a_check_that_is_not_made(folder, run):
     wanted = {
         "check_variables": ["DISPLACEMENT"],
@@ -209,6 +215,13 @@ RUBBER = materials("Structure.Body", 7850.0, 2e9, 0.3, "HyperElastic3DLaw")
 HEAT = process("assign_scalar_variable_process", "Structure", "TEMPERATURE", value="120.0*X*t")
 WARM = process("assign_scalar_variable_process", "Structure", "TEMPERATURE", value="120.0*t")
 BOSSAK = {"solver_type": "dynamic", "time_integration_method": "implicit", "step": 0.01, "end": 0.02}
+PRESS = process(
+    "assign_scalar_variable_to_conditions_process", "Structure.Top", "POSITIVE_FACE_PRESSURE", value="t"
+)
+CHOICE = push("1e5 if t<0.5 else 2e5")
+STRAINS = {
+    "files": [output("json", output_variables=["GREEN_LAGRANGE_STRAIN_VECTOR"], output_file_name="a.json")]
+}
 REACTIONS = {"files": [output("json", output_variables=["REACTION"], output_file_name="a.json")]}
 UNLIKE = [
     # what is exchanged in the mesh, more loads, materials, settings, and the words of a note, or None
@@ -216,6 +229,9 @@ UNLIKE = [
     ((FACE, "SurfaceLoadCondition3D4N"), [], None, {}, None),
     ((FACE, "SurfaceLoadCondition3D4N"), [], None, {**STEPS, "move_mesh_flag": False}, None),
     ((FACE, FACE), [], None, STEPS, None),
+    ((FACE, FACE), [CHOICE], None, {}, "loads_process_list[1]: Kratos refuses 'if' in a modulus"),
+    ((FACE, FACE), [WARM], EXPANDING, {"outputs": STRAINS}, "GREEN_LAGRANGE_STRAIN is the whole strain"),
+    ((FACE, FACE), [], EXPANDING, {"outputs": STRAINS}, None),
     ((FACE, "OddCondition3D4N"), [], None, {}, "only faces carry it; OddCondition3D4N carries no load"),
     ((FACE, "SurfaceCondition3D4N"), [], None, {}, None),
     ((FACE, FACE), [HEAT], EXPANDING, {}, f"TEMPERATURE varies in {ELEMENT}: its mean strains"),
@@ -245,6 +261,15 @@ def test_what_kratos_computes_otherwise_is_a_note_that_strict_counts(
     notes = read_case(write(folder, run_file([CLAMP], [push(1e5), *loads], **settings))).model.notes
     assert [words in note for note in notes if isinstance(note, Omission)] == [True] * (words is not None)
     assert not any("UpdatedLagrangian" in note and "small displacements" in note for note in notes)
+
+
+@pytest.mark.parametrize(("settings", "moves"), [(STEPS, True), ({**STEPS, "move_mesh_flag": False}, False)])
+def test_a_pressure_is_noted_where_kratos_moves_the_faces_in_a_linear_run(folder, settings, moves):
+    text = (folder / "box.mdpa").read_text().replace(FACE, "SurfaceLoadCondition3D4N")
+    (folder / "box.mdpa").write_text(text)
+    model = read_case(write(folder, run_file([CLAMP], [PRESS], **settings))).model
+    notes = " ".join(note for note in model.notes if isinstance(note, Omission))
+    assert ("adds a pressure stiffness" in notes, "puts the load of a step on" in notes) == (True, moves)
 
 
 def test_a_misspelt_variable_is_named_in_the_materials_file(folder):

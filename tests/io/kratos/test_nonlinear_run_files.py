@@ -82,6 +82,7 @@ def test_conditions_of_small_displacements_keep_their_pressure(tmp_path):
     (tmp_path / "box.mdpa").write_text(text.replace("SurfaceLoadC", "SmallDisplacementSurfaceLoadC"))
     case = read_case(path)
     assert case.analysis == "static"
+    assert "the one step, to t = 1.1 s, is counted as one to t = 1 s" in case.model.notes
     dead = by_hand(kl.SaintVenantKirchhoff3D(2e9, 0.3), 1e8 * 2.1, follower=False).solve()
     assert np.abs(in_order(kl.run(case).result) - in_order(dead)).max() < 1e-8
 

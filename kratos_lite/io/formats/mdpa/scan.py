@@ -9,6 +9,7 @@ from typing import NoReturn, TypeVar
 
 from kratos_lite.errors import Problems
 from kratos_lite.io.formats.document import already, repeated
+from kratos_lite.io.names import nearest_variable
 from kratos_lite.io.text import Source as TextSource
 from kratos_lite.io.text import shown
 from kratos_lite.native import kernels
@@ -178,6 +179,8 @@ def _close(source: Source, offset: int, stack: list[Frame]) -> int:
         source.fail(f"'End {name}' closes nothing; is 'Begin {name}' missing?", offset)
     frame = stack.pop()
     if frame.name != name:
+        if frame.name not in READ and (hint := nearest_variable(frame.name, READ)):
+            source.fail(f"unknown block {frame.name!r}.{hint}", frame.offset)
         where = f"'End {name}' closes {frame.title!r} of line {source.line(frame.offset)}"
         source.fail(f"{where}; expected 'End {frame.name}'", offset)
     return cursor
