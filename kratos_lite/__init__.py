@@ -18,12 +18,14 @@ def _homes() -> dict[str, str]:
 
 
 _HOMES = _homes()
+_METHODS = {"RBE2": "model.rigid", "RBE3": "model.distribute", "MPC": "model.constrain"}
 __all__ = ["__version__", *sorted(_HOMES)]  # noqa: PLE0604
 
 
 def __getattr__(name: str) -> object:
     if name not in _HOMES:
         said = f"module 'kratos_lite' has no attribute {name!r}"
+        said += f"; it is {_METHODS[name]} here" if name in _METHODS else ""
         raise AttributeError(said, name=name, obj=sys.modules[__name__])  # Python names what is near
     from importlib import import_module
 

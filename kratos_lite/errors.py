@@ -130,6 +130,7 @@ def nearest(name: str, known: Iterable[str], count: int = 3) -> str:
     plain = {_plain(word): word for word in known}
     close = get_close_matches(name, known, n=count, cutoff=0.6)
     close = close or [plain[word] for word in get_close_matches(_plain(name), list(plain), count, 0.6)]
+    close = close or [word for word in known if name and word.startswith(f"{name} ")][:count]
     return f" Did you mean {' or '.join(close)}?" if close else ""
 
 

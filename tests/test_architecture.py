@@ -147,6 +147,8 @@ def test_dir_shows_the_public_names_and_nothing_else():
 def test_unknown_public_name_is_an_attribute_error():
     with pytest.raises(AttributeError, match="no attribute 'Modell'"):
         kratos_lite.Modell  # noqa: B018
+    with pytest.raises(AttributeError, match=r"no attribute 'RBE3'; it is model\.distribute here"):
+        kratos_lite.RBE3  # noqa: B018
 
 
 @pytest.mark.parametrize("name", ["elements", "materials"])

@@ -39,6 +39,8 @@ FIRST = 20
 """Modes that are looked for first."""
 SINGULAR = 1e-8
 """Of ω² - Ω² beside ω², as frequencies of modes are known to 1e-9."""
+LOW = 0.25
+"""Of the first mode, up to which a largest frequency may be one in Hz that was meant in rad/s."""
 UNDAMPED = "the frequency {:g} rad/s is that of an undamped mode; give damping, or leave it out"
 TOLERANCE = 1e-12
 """Relative residual of the static solutions."""
@@ -134,10 +136,13 @@ class HarmonicResponse(Tabular):
         largest = np.linalg.norm(self.displacement(top), axis=1).max()
         method = f"{len(self.natural)} modes with static correction" if len(self.natural) else "direct"
         low, high = self.frequencies.min(), self.frequencies.max()
+        first = self.natural.min() if len(self.natural) else 0.0
+        note = f"all far below the first mode, {first:g} rad/s; give those in Hz times 2π"
         return [
             ("frequencies", f"{len(size)}, {low:g} … {high:g} rad/s"),
             ("method", method),
             ("largest amplitude", f"{largest:.6e} m at {self.frequencies[top]:g} rad/s"),
+            *[("note", note)] * bool(high < LOW * first),
         ]
 
     def columns(self, point: ArrayLike) -> dict[str, Array]:
@@ -171,7 +176,7 @@ class HarmonicResponse(Tabular):
         from kratos_lite.view.curves import response_figure
 
         component = "xyz".index(choice(axis, "axis", tuple("xyz")))
-        amplitude = np.abs(self.at(finite(point, "a point", (3,)))[:, component])
+        amplitude = np.abs(self.at(finite(point, "in plot(point, axis, path), a point", (3,)))[:, component])
         unit = unit_name("m", self.units)
         return saved(response_figure(self.frequencies, amplitude, unit, f"amplitude of u{axis}"), path)
 

@@ -367,7 +367,7 @@ class Model(Structure):
 
         Parameters
         ----------
-        frequencies : Ω (f,) in rad/s.
+        frequencies : Ω (f,) in rad/s, 2π times those in Hz.
         damping : ratio ζ < 1 of all modes, or of each, (modes,), 0.02 for 2 per cent; by modes alone.
         rayleigh : α in 1/s and β in s of the damping α M + β K.
         hysteretic : loss factor η of the stiffness (1 + iη) K.

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.assembly.gauss_point_fields import volumes
 from kratos_lite.mesh import Mesh
 from kratos_lite.native import described
 from kratos_lite.tabular import Tabular
@@ -161,6 +162,13 @@ def element_counts(mesh: Mesh, groups: Sequence[ElementGroup], formulation: str)
     for name, count in named if formulation else [(block.name, len(block)) for block in mesh.blocks]:
         counts[name] = counts.get(name, 0) + count
     return {name: count for name, count in counts.items() if count}
+
+
+def sizes(points: Array, groups: Sequence[ElementGroup]) -> list[tuple[str, str]]:
+    """Return the rows of a summary about volume and mass."""
+    parts = [float(volumes(points, group).sum()) for group in groups]
+    mass = sum(group.material.density * part for group, part in zip(groups, parts, strict=True))
+    return [("volume", f"{sum(parts):.6g} m³"), ("mass", f"{mass:.6g} kg")]
 
 
 def vector(v: Array | Sequence[float], size: float = 0.0) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from kratos_lite.analysis.element_fields import ElementFields
 from kratos_lite.analysis.fields import data_frame, fields, known, nodal_columns
 from kratos_lite.analysis.peak import peak
-from kratos_lite.analysis.report import Report, element_counts, vector
+from kratos_lite.analysis.report import Report, element_counts, sizes, vector
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh, Where, WhereElements
@@ -525,6 +525,7 @@ class Result(ElementFields, Tabular):
             place = f"in element {element} around {vector(center)} m"
             error.append((MEASURES[name], f"up to {value:.6e} (at a Gauss point) {place}"))
         rows = self._summary(counts, extremes, error, size, str(peak(self) or ""))
+        rows[2:2] = sizes(mesh.points, self.groups)
         if not self.is_linear:
             return rows
         return rows + [("warning", text) for text in self._error.warnings if text not in report.warnings]

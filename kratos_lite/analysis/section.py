@@ -32,6 +32,8 @@ ON_PLANE = 1e-9
 """Distance of nodes on a plane, as fraction of the size of the mesh."""
 DEGREE = 4
 """Of the rule on triangles of a cut: stresses of quadratic elements times arms."""
+FAR = 0.05
+"""Part of a force up to which that of the stress is near it."""
 Pieces: TypeAlias = "Iterator[tuple[int, Ints, Array, Array, Array]]"
 """Block, cells (p,), places (p, g, 3), reference coordinates (p, g, 3) and normal × area (p, g, 3)."""
 
@@ -122,7 +124,11 @@ class Section(Tabular):
                 n, t = np.where(np.abs(parts) < 1e-12 * max(size, *np.abs(values)), 0.0, parts)
                 text += f" ({along} {n:.6g}, {across} {t:.6g})"
             stress = vector(getattr(self, f"stress_{name}"), size)
-            rows += [(f"section {name}", text), (f"{name} of stress", f"{stress} {unit}")]
+            off = np.linalg.norm(getattr(self, f"stress_{name}") - values)
+            least = 0.02 * arm * self.weights @ np.linalg.norm(self.traction, axis=1)  # where none passes
+            far = off > FAR * max(size, np.linalg.norm(values), least)
+            mark = f", more than {FAR:.0%} off: a finer mesh there resolves it" * bool(far)
+            rows += [(f"section {name}", text), (f"{name} of stress", f"{stress} {unit}{mark}")]
         return rows
 
 

@@ -18,7 +18,7 @@ from kratos_lite.model.mass_properties import MassProperties
 from kratos_lite.model.spurious_modes import check_rules, check_spurious_modes
 from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array
-from kratos_lite.validation import finite
+from kratos_lite.validation import finite, reals
 
 Material: TypeAlias = "LinearMaterial | Mapping[Any, LinearMaterial]"
 
@@ -53,7 +53,7 @@ def points_of(X: ArrayLike) -> Array:
 
 def one_point(X: ArrayLike) -> Array:
     """Return one point (3,) as floats."""
-    return finite(X, "a point", (3,))
+    return finite(reals(X, "a point", cure="a force on a part of a model is kl.Resultant"), "a point", (3,))
 
 
 def vector_of(value: ArrayLike, lead: tuple[int, ...], what: str) -> Array:

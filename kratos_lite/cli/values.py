@@ -193,7 +193,8 @@ def material(text: str) -> tuple[str | None, Material]:
         key, equals, value = (word.strip() for word in pair.partition("="))
         variable = variables.get(key, key)
         if not equals or variable not in variables.values():
-            raise InputError(f"constants of {laws[-1]} are {', '.join(variables)}; got {pair!r}")
+            form = "" if equals else ", where a constant and its value are needed, as E=210e9,nu=0.3 of steel"
+            raise InputError(f"constants of {laws[-1]} are {', '.join(variables)}; got {pair!r}{form}")
         if variable in values:
             raise InputError(f"{key} is given twice")
         values[variable] = number(value)

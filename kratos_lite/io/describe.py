@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.analysis.nodal_loads import external_loads
-from kratos_lite.assembly.gauss_point_fields import volumes
+from kratos_lite.analysis.report import sizes
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.elements.formulations import element_of, is_unnamed
 from kratos_lite.errors import KratosLiteError
@@ -67,10 +67,7 @@ def amounts(model: Structure, time: float = 0.0) -> list[tuple[str, str]]:
     ]
     with suppress(KratosLiteError):
         groups = model.element_groups()
-        parts = [float(volumes(model.mesh.points, group).sum()) for group in groups]
-        rows.append(("volume", f"{sum(parts):.6g} m³"))
-        mass = sum(group.material.density * part for group, part in zip(groups, parts, strict=True))
-        rows.append(("mass", f"{mass:.6g} kg"))
+        rows += sizes(model.mesh.points, groups)
         force = sum(size * external_loads(model, groups, [load]).sum(axis=0) for _, size, load in acting)
         total = (force + np.zeros(3)).tolist()
         rows.append(("total load", f"({', '.join(map(_short, total))}) N{when}"))

@@ -13,9 +13,10 @@ import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup, by_mass_rule
 from kratos_lite.errors import InputError, MeshError, ModelError
+from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constraints import rigid_modes
 from kratos_lite.typing import Array, ArrayLike, Csr, Mask
-from kratos_lite.validation import finite, reals
+from kratos_lite.validation import finite, instance, reals
 
 SYMMETRIC = 1e-10
 """How far, relative to its largest entry, a tensor may be from symmetric, or two values from each other."""
@@ -204,16 +205,16 @@ class MassProperties:
 
     @classmethod
     def of(
-        cls, points: ArrayLike, groups: Sequence[ElementGroup], added: Csr | None = None
+        cls, points: Any, groups: Sequence[ElementGroup] | None = None, added: Csr | None = None
     ) -> MassProperties:
-        """Return the mass properties of a mesh.
+        """Return the mass properties of a model with its added masses, or of a mesh.
 
         They are exact for every shape, also for warped faces and curved quadratic cells, and lose no
         digits far from the origin beyond those that the coordinates have lost.
 
         Parameters
         ----------
-        points : (n, 3) nodes in m.
+        points : a model, alone; or (n, 3) nodes in m.
         groups : the elements with their materials.
         added : (3n, 3n) kg, of added masses: ``model.attached.M``.
 
@@ -232,10 +233,14 @@ class MassProperties:
         --------
         >>> from kratos_lite import Isotropic3D, Model, box
         >>> model = Model(box((0.4, 0.6, 1.0)), Isotropic3D(E=1e6, nu=0.3, density=1000.0))
-        >>> body = MassProperties.of(model.mesh.points, model.element_groups())
+        >>> body = MassProperties.of(model)
         >>> round(float(body.mass), 9), body.center.round(9).tolist()
         (240.0, [0.2, 0.3, 0.5])
         """
+        if groups is None:
+            model = instance(points, "what has mass", Structure, "kl.Model(mesh, material)")
+            points, groups = model.mesh.points, model.element_groups()
+            added = model.attached.M if model.attached else None
         X = finite(points, "the points of a mesh", ("...", 3))
         groups = [group for group in groups if len(group)]
         if not groups:

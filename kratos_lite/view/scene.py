@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -20,8 +21,8 @@ from kratos_lite.view.rulers import rounded
 DECADES = 4
 """Powers of ten that a logarithmic scale of colors shows."""
 FEW, OWNED, SAME = 0.5, 0.1, 1e-6
-"""Percent of the values, at each end, that colors leave out if they take more than a part of the range of
-all others; and that range, beside the whole, up to which these are one value."""
+"""Percent of the body, at each end of the values, that colors leave out if it takes more than a part of the
+range of all others; and that range, beside the whole, up to which these are one value."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +156,7 @@ def colors_of(subjects: Sequence[Subject], clim: tuple[float, float] | None) -> 
     log = all(v.log for v, _ in values)
     if clim is None:
         numbers = np.concatenate([v.numbers[rows] for v, rows in values])
-        low, high = (float(numbers.min()), float(numbers.max())) if log else _range(numbers)
+        low, high = (float(numbers.min()), float(numbers.max())) if log else _range(numbers, subjects)
         if log:
             low = max(low, high * 10.0**-DECADES)
             log = high > 0
@@ -165,14 +166,35 @@ def colors_of(subjects: Sequence[Subject], clim: tuple[float, float] | None) -> 
     return canvas.color_scale(low, high, log=log)
 
 
-def _range(numbers: Array) -> tuple[float, float]:
+def _range(numbers: Array, subjects: Sequence[Subject]) -> tuple[float, float]:
     """Return the least and the largest number, but for a few at an end where these take much of the range."""
-    low, first = np.percentile(numbers, (0, FEW), method="lower").tolist()
-    last, high = np.percentile(numbers, (100 - FEW, 100), method="higher").tolist()
+    sizes = cache(_sizes)  # frames have one mesh
+    order = np.argsort(numbers)
+    shares = np.concatenate([sizes(s.mesh, s.is_nodal)[s.rows()] for s in subjects if s.values])[
+        order
+    ].cumsum()
+    ends = np.searchsorted(shares, shares[-1] * np.array([0, FEW, 100 - FEW, 100]) / 100)
+    low, first, last, high = numbers[order[ends]].tolist()
     if last - first <= SAME * (high - low):  # only few differ from all others
         return low, high
     owned = OWNED * (last - first)
     return first if first - low > owned else low, last if high - last > owned else high
+
+
+def _sizes(mesh: Mesh, is_nodal: bool) -> Array:
+    """Return about the volume of each element (m,), or the mean one around each node (n,)."""
+    # The spread of the nodes is, for each shape, in proportion to it; refinement gathers nodes at peaks.
+    sizes, sums, counts = list[Array](), np.zeros(mesh.n_nodes), np.zeros(mesh.n_nodes)
+    for block in mesh.blocks:
+        X = mesh.points[block.nodes]
+        X = X - X.mean(axis=1, keepdims=True)
+        sizes.append(np.sqrt(np.abs(np.linalg.det(X.swapaxes(1, 2) @ X / X.shape[1]))))
+        nodes, each = block.nodes.ravel(), np.repeat(sizes[-1], X.shape[1])
+        sums, counts = (
+            sums + np.bincount(nodes, each, len(sums)),
+            counts + np.bincount(nodes, None, len(sums)),
+        )
+    return sums / np.maximum(counts, 1) if is_nodal else np.concatenate(sizes)
 
 
 def place_text(point: Array) -> str:

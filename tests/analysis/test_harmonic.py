@@ -99,6 +99,12 @@ def test_curves_tables_and_stresses(tmp_path):
     assert abs(response.fields(0, np.pi).stress("element")[:, 0] + 2.0).max() < 1e-9
     assert "3, 0 … 40 rad/s" in str(response)
     assert "modes with static correction" in str(response)
+    assert "note" not in str(response)
+    first = float(model.modes(1)[0][0])
+    in_hertz = model.harmonic([0.0, 1.2 * first / (2 * np.pi)], damping=0.02)
+    assert f"far below the first mode, {first:g} rad/s; give those in Hz times 2π" in str(in_hertz)
+    with pytest.raises(InputError, match=r"in plot\(point, axis, path\), a point must be made of"):
+        response.plot("curve.png")
     figure = response.plot((1, 0, 0), "x", tmp_path / "curve.png")
     assert figure.axes[0].lines[0].get_ydata()[-1] == columns["amplitude x [m]"][-1]
     assert (tmp_path / "curve.png").stat().st_size > 1000

@@ -373,6 +373,12 @@ def test_the_table_and_the_file_of_a_section(tmp_path):
     assert table["section"] == "x = 1.5 m, area 1 m², centroid (1.5, 0.5, 0.5) m"
     assert table["section force"] == "(7, 2, 5) N (normal 7, shear 5.38516)"
     assert table["section moment"] == "(0, -12.5, 5) N m (torsion 0, bending 13.4629)"
+    fine = cantilever("KinematicLinear3D20N", (8, 2, 2)).solve().section(("x", 1.9))
+    for each in (cut, fine):
+        off = np.linalg.norm(each.stress_moment - each.moment) / np.linalg.norm(each.moment)
+        assert (
+            ("off: a finer mesh" in dict(each.table())["moment of stress"]) == (off > 0.05) == (each is cut)
+        )
     kl.write(tmp_path / "cut.csv", cut)
     head, *rows = (tmp_path / "cut.csv").read_text().splitlines()
     assert head.startswith("x [m],y [m],z [m],area [m2],stress xx [Pa]")

@@ -298,6 +298,7 @@ def _body(model, folder):
             lambda model, _: kl.Model(kl.box(), units="mm"),
             "units must be one of SI, mm N MPa t, m kN kPa t, mm kN GPa kg ms, in lbf psi slinch; got 'mm'",
         ),
+        (lambda model, _: kl.Model(kl.box(), units="mm"), "got 'mm'. Did you mean mm N MPa t?"),
         (lambda model, _: kl.Model(kl.box(), units=3), "units must be one of"),
         (lambda model, _: kl.Mesh([[0, 0, 0]], units="inch"), "units must be one of"),
     ],

@@ -118,6 +118,7 @@ AS_MANY, ASCEND = "as many values as times", "times of a series must ascend"
     (lambda: kl.TimeSeries([0, NAN], [1, 2]), "times must be finite"),
     (lambda: kl.TimeSeries([0, 1], [1, NAN]), "values must be finite"),
     (lambda: kl.Force((NAN, 5, 5), (1, 0, 0)), "a point must be finite"),
+    (lambda: kl.Force("x+", (1, 0, 0)), "got 'x\\+'; a force on a part of a model is kl.Resultant"),
     (lambda: kl.Force(X, (1, NAN, 0)), "a force must be finite"),
     (lambda: kl.Force(X, (1, 0)), r"a force must have shape \(..., 3\)"),
     (lambda: kl.Force(X, (1, 0, 0), frame="body"), FRAME),

@@ -80,6 +80,7 @@ def test_gravity_cube_from_the_shell(tmp_path):
     assert table["nodes"] == "125"
     assert table["elements"] == "64 KinematicLinear3D8N"
     assert table["unknowns"] == "250"
+    assert (table["volume"], table["mass"]) == ("1 m³", "7620 kg")
     assert table["total load"] == "(0, 0, -74752.2) N"
     assert table["total reaction"] == "(0, 0, 74752.2) N"
     assert table["largest displacement"].startswith("1.322148e-04 m at node")
@@ -468,6 +469,7 @@ def test_a_terminal_that_knows_ascii_only_shows_codes(box):
 WRONG_OPTIONS = {
     "material without a constant": (["--material", "E=1e9"], "Isotropic3D needs nu (POISSON_RATIO)"),
     "unknown constant": (["--material", "E=1e9,nu=0.3,rho=1"], "constants of Isotropic3D are E, nu, density"),
+    "name of a material": (["--material", "steel"], "got 'steel', where a constant and its value are needed"),
     "constant twice": (["--material", "E=1e9,E=1e9,nu=0.3"], "E is given twice"),
     "unknown law": (["--material", "x:Wood:E=1e9,nu=0.3"], "'Wood' is no material; have Anisotropic3D"),
     "constant out of bounds": (["--material", "E=1e9,nu=0.5"], "nu (POISSON_RATIO) 0.5 must be < 0.5"),

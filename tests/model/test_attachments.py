@@ -154,7 +154,7 @@ def test_modes_of_a_rigid_body_with_mass_on_springs():
     J = 7800 / 6 + np.array([100.0, 200.0, 300.0])
     omega, shapes = model.modes(6)
     assert np.abs(omega**2 / np.sort(k / [1e4, 1e4, 1e4, *J]) - 1).max() < 1e-9
-    body = kl.MassProperties.of(model.mesh.points, model.element_groups(), model.attached.M)
+    body = kl.MassProperties.of(model)
     assert abs(body.mass - 1e4) < 1e-8
     assert np.abs(body.inertia - np.diag(J)).max() < 1e-8
     assert np.abs(body.center - CENTER).max() < 1e-12
@@ -199,7 +199,7 @@ def test_weight_scales_with_amplitudes_and_stands_in_load_cases():
     assert abs(cases["uneven"].loads[:, 2].sum() + 10 * (500 + 500)) < 1e-8
     model.add(kl.Gravity((0, 0, -10.0)), amplitude=lambda t: 1 + t)
     assert abs(model.solve().reactions[:, 2].sum() - 15000.0) < 1e-6
-    body = kl.MassProperties.of(model.mesh.points, model.element_groups(), model.attached.M)
+    body = kl.MassProperties.of(model)
     center = (1000 * CENTER + 200 * np.array([0.3, 0.4, 1]) + 300 * np.array([0.5, 0.5, 1])) / 1500
     assert np.abs(body.center - center).max() < 1e-12
 

@@ -239,6 +239,11 @@ def test_a_few_singular_nodes_do_not_own_the_colors():
     assert bar(figure)[0][1] < 100
     assert any("▲ 5000 at node 1000, " in text for text in words(figure))
     assert np.abs(bar(kl.plot(mesh, values=peaked, clim=(0, 5000)))[0] - [0, 5000]).max() == 0
+    x, tiny = mesh.points.copy(), 1e-3
+    x[:, 0] = np.where(x[:, 0] > 4, 9 + tiny * (x[:, 0] - 9), x[:, 0])  # half of the nodes lie at one end
+    graded = kl.Mesh(x, mesh.blocks)
+    at_end = np.where(mesh.points[:, 0] > 5.5, 1000.0, x[:, 0])
+    assert np.abs(bar(kl.plot(graded, values=at_end))[0] - [0, 9 - 4 * tiny]).max() < 1e-12
     rare = np.where(numbers > 99.9, 1.0, 0.0)  # all others are one value: nothing would be seen
     assert np.abs(bar(kl.plot(mesh, values=rare))[0] - [0, 1]).max() == 0
 
