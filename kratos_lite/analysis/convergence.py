@@ -178,6 +178,7 @@ def converge(
         values[i] = number(measure(solve(last) if solve else last.solve()), "the value of the quantity")
         unknowns[i] = (~last.supports.fixed[last.mesh.used_nodes()]).sum() - len(last.supports.dependents())
     of, unit = getattr(quantity, "__name__", str(quantity)), getattr(quantity, "unit", "")
+    of = "value" if of == "<lambda>" else of
     unit = unit_name(unit, last.units)
     return ConvergenceStudy(of, unit, h, unknowns, values, *limit_of(h, values))
 

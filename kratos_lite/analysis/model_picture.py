@@ -53,7 +53,7 @@ def legend_of(structure: Structure) -> list[Entry]:
     rows = [("^", SUPPORT, str(condition)) for condition in structure.supports.conditions]
     rows += [(TIE if tie.nodes_of else "x", DARK, f"{tie.title} {tie}") for tie in structure.supports.ties]
     rows += [("o" if one.is_mass else "s", DARK, repr(one)) for one in structure.attachments]
-    rows += [(_marker(load), LOAD, structure._said(load)) for load in structure.loads]
+    rows += [(_marker(load), LOAD, structure._said(load, str)) for load in structure.loads]
     entries = [(marker, color, _cut(in_units(text, structure.units))) for marker, color, text in rows]
     more = len(entries) - LINES
     return entries if more <= 0 else [*entries[:LINES], ("", DARK, f"and {more} more: print(model)")]

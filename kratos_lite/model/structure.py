@@ -583,9 +583,9 @@ class Structure(Solid):
         """Return what stands before a load: its name and a colon, or nothing."""
         return next((f"{name}: " for name, named in self._named.items() if named is load), "")
 
-    def _said(self, load: Load) -> str:
+    def _said(self, load: Load, words: Callable[[Load], str] = repr) -> str:
         """Return a load with its name and unit."""
-        return f"{self._label(load)}{load!r}{getattr(load, 'load', load).unit}"
+        return f"{self._label(load)}{words(load)}{getattr(load, 'load', load).unit}"
 
     def remove(self, load: str | Load) -> None:
         """Take a load away.

@@ -69,6 +69,7 @@ def test_the_hole_of_a_cylinder_on_its_true_surface():
     assert abs(study.extrapolated / exact - 1) < 6e-3
     assert abs(study.orders[-1] - 2) < 0.5
     straight = kl.converge(model, lambda result: result.u[inner, 0])
+    assert straight.of == "value"  # not <lambda>
     assert abs(straight.values[-1] / exact - 1) > 0.05  # a polygon with 8 sides stays one
 
 

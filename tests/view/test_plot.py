@@ -172,11 +172,17 @@ def test_materials_have_colors_and_a_legend():
     values = model_picture.materials_of(model)
     assert [values.names[int(i)] for i in values.numbers] == [str(STEEL)] * 2 + [str(soft), "no material"]
     model.fix("x-")
-    model.add(kl.Temperature(20.0), name="oven")
+    model.add(kl.Temperature(20.0, reference=5.0), name="oven")
+    model.add(kl.Resultant("x+", (0, 0, -9.0)))
+    model.add(kl.Resultant("x+", (0, 0, 0), moment=(0, 8.0, 0)), amplitude=lambda t: t)
     figure = model.plot()
     said = [t.get_text() for t in figure.axes[-1].get_legend().get_texts()]
     assert said[:4] == [str(STEEL), str(soft), "no material", "x-, xyz = 0 m"]
-    assert said[4].startswith("oven: Temperature(values=20")
+    assert said[4:] == [
+        "oven: temperature 20, reference 5.0 [°C or K]",
+        "resultant force (0, 0, -9) on 'x+' [N]",
+        "resultant moment (0, 8, 0) on 'x+', times an amplitude [N] [N m]",
+    ]
 
 
 @pytest.mark.parametrize("element", ["8N", "10N"])

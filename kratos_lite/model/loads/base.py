@@ -60,7 +60,10 @@ class Load(ABC):
         kind = re.sub("(?<=[a-z])(?=[A-Z])", " ", type(self).__name__).lower()
         values = {k: v for k, v in vars(self).items() if not k.startswith("_") and v is not None}
         where = values.pop("where", None)
-        said = [_shown(v) if k == kind else f"{k} {_shown(v)}" for k, v in values.items() if v is not False]
+        own = (kind, "values")
+        said = [
+            _shown(v) if k in own else f"{k} {_shown(v)}" for k, v in values.items() if k in own or np.any(v)
+        ]
         return f"{kind} {', '.join(said)}" + ("" if where is None else f" on {_shown(where)}")
 
     @abstractmethod
@@ -286,6 +289,9 @@ class ScaledLoad(TimeDependentLoad):
                 f"an amplitude multiplies a constant load such as Gravity or Traction; got {name}"
             )
         self.load, self.amplitude = load, function_of(amplitude, "the amplitude of a load")
+
+    def __str__(self) -> str:
+        return f"{self.load}, times an amplitude"
 
     def check(self, mesh: Mesh) -> None:
         """Check that what the load acts on exists."""

@@ -226,8 +226,12 @@ class Resultant(FaceLoad):
     -100.0
     """
 
-    unit = " [N] [N m]"
     what = "a resultant"
+
+    @property
+    def unit(self) -> str:  # type: ignore[override]
+        """Of the force, and of a moment that is there."""
+        return " [N] [N m]" if self.moment.any() else " [N]"
 
     def __init__(
         self,

@@ -54,6 +54,8 @@ class Temperature(Load):
     -240.0 MPa
     """
 
+    unit = " [°C or K]"
+
     def __init__(
         self, values: ArrayLike | OfPlace, reference: float = 0.0, where: WhereElements = None
     ) -> None:
