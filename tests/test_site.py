@@ -6,7 +6,7 @@ from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from threading import Thread
-from urllib.parse import urlsplit
+from urllib.parse import quote, urlsplit
 
 import pytest
 from chromium import started, wait
@@ -92,7 +92,7 @@ def test_pages_load_without_errors_and_from_the_site_alone(browser, site, page):
     ("words", "page"),
     [
         *(("hourglass", "tutorials/"), ("formulation", "choose-an-element")),
-        *(("reaction_resultant", "results"), ("bolt+preload", "words"), ("RBE3", "words")),
+        *(("reaction_resultant", "results"), ("bolt+preload", "words"), ("RBE3", "supports-and-ties")),
     ],
 )
 def test_the_search_finds_pages(browser, site, words, page):
@@ -104,6 +104,27 @@ def test_the_search_finds_pages(browser, site, words, page):
     ]
     assert any(page in link for link in links), links
     sound(browser)
+
+
+@pytest.mark.parametrize(
+    ("words", "page", "said"),
+    [
+        ("B-bar", "topics/locking", "B-bar"),
+        ("Newton-Raphson", "howto/nonlinear-steps", "Newton–Raphson"),
+        ("Gaussian quadrature", "topics/quadrature", "Gaussian quadrature"),
+        ("Voigt notation", "topics/symbols", "Voigt notation"),
+        ("plane stress", "about/limits", "plane stress"),
+        ("resultant", "howto/loads", "Resultant"),
+        ("MPC", "howto/supports-and-ties", "(MPC)"),
+    ],
+)
+def test_the_page_of_words_says_what_is_found_first(browser, site, words, page, said):
+    browser.get(f"{site}search.html?q={quote(words)}")
+    first = "document.querySelector('#search-results li')"
+    text = wait(browser, f"{first}?.querySelector('p.context')?.innerText")
+    assert browser.execute_script(f"return {first}.querySelector('a').href").endswith(f"/{page}.html")
+    assert said in text
+    assert "\\" not in text
 
 
 def test_hits_have_their_text_without_a_server(browser, site):
