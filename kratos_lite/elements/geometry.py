@@ -7,7 +7,7 @@ leading axes of X first, then those of the points, then its own.
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -26,12 +26,23 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 
+class _OfClass(property):
+    """A property of the class, which ``help`` shows by its own text."""
+
+    def __get__(self, cell: Any, kind: type | None = None) -> Any:
+        return self.fget(kind or type(cell))  # type: ignore[misc]
+
+
 class PlacedCell(Tabular):
     """Geometry of a cell: shape × rule at the places X of its nodes; see `KinematicLinear`."""
 
     shape: ClassVar[type[Shape]]
-    nodes: ClassVar[Array]
     rule: Rule
+
+    @_OfClass
+    def nodes(cls) -> Array:
+        """Return the reference coordinates (n, 3) of the nodes."""
+        return cls.shape.nodes
 
     def __init__(self, X: ArrayLike, rule: Rule | None = None) -> None:
         name = type(self).__name__

@@ -90,7 +90,6 @@ class KinematicLinear(CellMass):
         if not isinstance(cls.rule, Rule):
             expected = f"kratos_lite.quadrature.{cls.shape.cell}(degree=3)"
             raise InputError(f"{cls.__name__}.rule must be a Rule, such as {expected}; got {short(cls.rule)}")
-        cls.nodes = cls.shape.nodes
         ELEMENTS.add(cls.__name__, cls, [*cls.__dict__.get("aliases", ()), *same_names(cls.__name__)])
 
     @classmethod

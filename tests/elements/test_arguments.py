@@ -1,5 +1,7 @@
 """Methods of elements take one point or many, and refuse what does not fit with one error of ours."""
 
+import pydoc
+
 import numpy as np
 import pytest
 
@@ -81,3 +83,9 @@ def test_an_element_whose_nodes_are_crossed_or_mirrored_is_refused(order):
     for X in (kl.KinematicLinear3D8N.nodes[order], kl.KinematicLinear3D8N.nodes * [1, 1, 0]):
         with pytest.raises(kl.InputError, match="KinematicLinear3D8N: det J must be > 0 at all Gauss points"):
             kl.KinematicLinear3D8N(X).stiffness(kl.Isotropic3D(E=1e9, nu=0.3).C)
+
+
+def test_help_of_an_element_explains_its_nodes_and_not_arrays():
+    text = pydoc.plain(pydoc.render_doc(kl.KinematicLinear3D8N))
+    assert "coordinates (n, 3) of the nodes" in text
+    assert "ndarray(" not in text
