@@ -168,13 +168,11 @@ def colors_of(subjects: Sequence[Subject], clim: tuple[float, float] | None) -> 
 
 def _range(numbers: Array, subjects: Sequence[Subject]) -> tuple[float, float]:
     """Return the least and the largest number, but for a few at an end where these take much of the range."""
-    sizes = cache(_sizes)  # frames have one mesh
-    order = np.argsort(numbers)
-    shares = np.concatenate([sizes(s.mesh, s.is_nodal)[s.rows()] for s in subjects if s.values])[
-        order
-    ].cumsum()
-    ends = np.searchsorted(shares, shares[-1] * np.array([0, FEW, 100 - FEW, 100]) / 100)
-    low, first, last, high = numbers[order[ends]].tolist()
+    sizes, order = cache(_sizes), np.argsort(numbers)  # frames have one mesh
+    each = [sizes(s.mesh, s.is_nodal)[s.rows()] for s in subjects if s.values is not None]
+    shares = np.concatenate(each)[order].cumsum()
+    ends = np.searchsorted(shares, shares[-1] * np.array([FEW, 100 - FEW]) / 100)
+    low, first, last, high = numbers[order[[0, *ends, -1]]].tolist()
     if last - first <= SAME * (high - low):  # only few differ from all others
         return low, high
     owned = OWNED * (last - first)
@@ -190,10 +188,8 @@ def _sizes(mesh: Mesh, is_nodal: bool) -> Array:
         X = X - X.mean(axis=1, keepdims=True)
         sizes.append(np.sqrt(np.abs(np.linalg.det(X.swapaxes(1, 2) @ X / X.shape[1]))))
         nodes, each = block.nodes.ravel(), np.repeat(sizes[-1], X.shape[1])
-        sums, counts = (
-            sums + np.bincount(nodes, each, len(sums)),
-            counts + np.bincount(nodes, None, len(sums)),
-        )
+        sums += np.bincount(nodes, each, len(sums))
+        counts += np.bincount(nodes, None, len(sums))
     return sums / np.maximum(counts, 1) if is_nodal else np.concatenate(sizes)
 
 
