@@ -285,13 +285,9 @@ def _element_for(
     """Return the element class of a block with a material; plastic flow and large strains choose theirs."""
     finite = material.strain_measure == "finite"
     if finite or not material.is_linear:
-        known = formulations_of(element_class(mesh, block).shape)
-        if finite:
-            incompressible = not material.is_linear and is_nearly_incompressible(material.C)
-            words = ["f_bar"] * incompressible + ["total_lagrangian"]
-        else:
-            words = ["b_bar", "standard"]
-        word = next(word for word in words if word in known)
+        words = ("f_bar", "total_lagrangian") if finite else ("b_bar", "standard")
+        locks = not material.is_linear and (not finite or is_nearly_incompressible(material.C))
+        word = words[not locks or words[0] not in formulations_of(element_class(mesh, block).shape)]
         formulation = word if formulation == NON_LOCKING else formulation
         unnamed = word if unnamed == NON_LOCKING else unnamed
     element = element_of(block.name, formulation, material.C, unnamed)
@@ -311,12 +307,6 @@ def _element_for(
             f"{type(material).__name__} needs an element with a B"
         )
     return element
-
-
-def takes_enhanced(material: Material) -> bool:
-    """Return whether enhanced strains find equilibrium: not where a law softens, or flows off the normal."""
-    softens = {"element_length", "element_radius"} & material.internal_variables.keys()
-    return material.symmetric_tangent and not softens
 
 
 def group_of_element(mesh: Mesh, groups: Sequence[ElementGroup], id: int) -> ElementGroup:

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kratos_lite.assembly.element_groups import ElementGroup, takes_enhanced
+from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.custom import is_builtin
 from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear, formulations_of
@@ -76,6 +76,12 @@ def _with_apex(groups: Sequence[ElementGroup]) -> list[str]:
     ]
 
 
+def _takes_enhanced(material: Material) -> bool:
+    """Return whether enhanced strains find equilibrium: not where a law softens, or flows off the normal."""
+    softens = {"element_length", "element_radius"} & material.internal_variables.keys()
+    return material.symmetric_tangent and not softens
+
+
 def better_element(
     element: type[KinematicLinear], family: str = "KinematicLinear", law: Material | None = None
 ) -> str:
@@ -84,7 +90,7 @@ def better_element(
     if element.finite:
         quadratic = f"TotalLagrangianElement{QUADRATIC[element.shape.cell]}"
         return known["f_bar"].__name__ if family == "BBar" and "f_bar" in known else quadratic
-    if "enhanced" in known and (law is None or takes_enhanced(law)):
+    if "enhanced" in known and (law is None or _takes_enhanced(law)):
         return known["enhanced"].__name__
     linear = len(element.nodes) == element.shape.corners
     return f"{family}{QUADRATIC[element.shape.cell]}" if linear else known["b_bar"].__name__

@@ -65,6 +65,24 @@ def test_one_layer_of_b_bar_bricks_is_within_what_the_forecast_says(cells):
     assert text.endswith("take EnhancedStrain3D8N")
 
 
+@pytest.mark.parametrize(
+    ("law", "better"),
+    [
+        (kl.J2Plasticity3D(2e11, 0.3, 2e8), "EnhancedStrain3D8N"),
+        (kl.DruckerPrager3D(2e10, 0.3, 5e7, 20.0, 20.0), "EnhancedStrain3D8N"),
+        (kl.DruckerPrager3D(2e10, 0.3, 5e7, 20.0, 10.0), "KinematicLinear3D20N"),  # flows off the normal
+        (kl.RankineDamage3D(3e10, 0.2, 3e6, 1000.0), "KinematicLinear3D20N"),  # softens
+    ],
+)
+def test_enhanced_bricks_are_advised_where_they_find_equilibrium(law, better):
+    model = kl.Model(kl.box((10, 1, 1), (4, 1, 1)), law)
+    model.fix("x-")
+    model.add(kl.Resultant("x+", (0, 0, 1e3)))
+    (text,) = model.check()
+    assert text.startswith("BBar3D8N")
+    assert text.endswith(f"take {better}")
+
+
 def test_near_half_ten_nodes_lock_as_forecast_and_b_bar_does_not():
     """A flat block between rigid plates, over the force on finer meshes of any element."""
     forces = []

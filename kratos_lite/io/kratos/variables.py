@@ -175,14 +175,16 @@ class Variables:
         # Kratos adds the stiffness of such a pressure to K even in a linear analysis; its small-displacement
         # conditions do not.
         self._note_uncarried(notes)
-        kinds, given = {b.name for b in self.mesh.conditions if len(b)}, {*self.nodal, *self.conditional}
-        for name in () if self.follows else sorted(kinds):
+        blocks = {block.name: block for block in self.mesh.conditions if len(block)}
+        given = {*self.nodal, *self.conditional}
+        for name in () if self.follows else sorted(blocks):
             presses = name.startswith("SurfaceLoadCondition") and not given.isdisjoint(PRESSURES)
             if presses:
                 how = f"acts on the undeformed body, as that of SmallDisplacement{name} in Kratos"
                 text = f"{name}: the pressure {how}; {name} adds a pressure stiffness there"
                 notes.append(Omission(text))
-            loads = name.startswith(ConditionLoads.following) and name[:4].upper() in {v[:4] for v in given}
+            follows = name.startswith(ConditionLoads.following)
+            loads = follows and any(v.startswith(LOADS[blocks[name].known_shape.cell]) for v in given)
             if self.moves and (presses or loads):
                 text = f"{name}: Kratos puts the load of a step on the mesh as those before moved it"
                 cure = f'SmallDisplacement{name}, or "move_mesh_flag": false, means the same'
