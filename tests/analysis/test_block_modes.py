@@ -1,5 +1,6 @@
 """Modes of larger models, by a block of vectors: none is missed, none comes twice."""
 
+from collections import deque
 from dataclasses import replace
 
 import numpy as np
@@ -282,6 +283,25 @@ def test_iterations_miss_far_less_than_the_steps(monkeypatch):
         *_, end = kl.integrate(transient, period / n, n, every=n)
         ends.append(end.u)
     assert missed(ends) < OF_STEP
+
+
+def test_a_step_of_one_mode_begins_near_its_end(monkeypatch):
+    """What it comes to is a multiple of its Taylor start: of many modes at once it takes more iterations."""
+    iterations, plain = [], LinearSolver.solve
+
+    def counted(self, *arguments):
+        iterations.append(plain(self, *arguments))
+        return iterations[-1]
+
+    monkeypatch.setattr("kratos_lite.solvers.plan.STEPPED_LIMIT", 0)
+    transient, period = struck("KinematicLinear3D20N", (3, 3, 6))
+    monkeypatch.setattr(LinearSolver, "solve", counted)
+    deque(kl.integrate(transient, period / 20, 4), maxlen=0)
+    noise = np.sin(0.1 * np.arange(transient.v.size) ** 2) * ~transient.equations.constrained
+    transient.v = transient.v + 0.1 * np.abs(transient.v).max() * noise
+    deque(kl.integrate(transient, period / 20, 4), maxlen=0)
+    one, many = (sum(solution.iterations for solution in half) for half in (iterations[:4], iterations[4:]))
+    assert one < 0.3 * many
 
 
 def test_the_linear_level_of_a_step_has_mass():
