@@ -319,7 +319,7 @@ class EquationsOfMotion:
         if isinstance(self.K, BlockMatrix) or heavy or self.terms:
             made.K = self.matrix(time, *factors)
         else:
-            made.K = self.K.with_mass(mass, self.mass.times, partial(self._elastic, *factors))
+            made.K = self.K.with_mass(mass, self.mass.scalar, partial(self._elastic, *factors))
         if not made.symmetric and plan.iterates:  # what it has beside skew parts
             made.near = replace(made, K=self._elastic(*factors), symmetric=True)
         return partial(_solved, made, size, self.system.progress)

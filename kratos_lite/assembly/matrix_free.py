@@ -21,16 +21,16 @@ from kratos_lite.elements.tables import tabulate
 from kratos_lite.quadrature import Rule
 from kratos_lite.registry import remembered
 from kratos_lite.shapes import Shape
-from kratos_lite.typing import Array, Bsr, Ints
+from kratos_lite.typing import Array, Bsr, Csr, Ints
 
 
 class MatrixFree:
     """The stiffness K (3n, 3n) in N/m of elements that the kernels know, which is only multiplied.
 
-    With m and a product with M, it is K + m M, of which the kernels know K alone.
+    With m and M, one number for each pair of nodes, it is K + m M; multigrid smooths K alone.
     """
 
-    mass: tuple[float, Callable[[Array], Array]] | None = None
+    added: tuple[float, Any, Any, Array] | None = None  # m, and M as indptr, indices and data
 
     def __init__(
         self,
@@ -59,12 +59,11 @@ class MatrixFree:
         self.product.tie(*dependent_rows(T))
         return tied
 
-    def with_mass(
-        self, m: float, times: Callable[[Array], Array], assembled: Callable[[], BlockMatrix]
-    ) -> MatrixFree:
-        """Return K + m M, M given by its product with vectors (3n,); `assembled` makes it."""
+    def with_mass(self, m: float, M: Csr, assembled: Callable[[], BlockMatrix]) -> MatrixFree:
+        """Return K + m M of M (n, n) in kg, the same for x, y and z; `assembled` makes it."""
         both = copy(self)
-        both.product, both.mass, both.assembled = self.product, (m, times), assembled
+        both.product, both.assembled = self.product, assembled
+        both.added = m, M.indptr.astype(np.int32, copy=False), M.indices.astype(np.int32, copy=False), M.data
         return both
 
     @staticmethod
@@ -83,8 +82,8 @@ class MatrixFree:
 
     def __matmul__(self, x: Array) -> Array:
         """Return K x of a vector (3n,)."""
-        product: Array = self.product.times(np.ascontiguousarray(x, dtype=float), self.tied)
-        return product if self.mass is None else product + self.mass[0] * self.mass[1](x)
+        product: Array = self.product.times(np.ascontiguousarray(x, dtype=float), self.tied, self.added)
+        return product
 
     def norm(self) -> float:
         """Return the largest row sum of |K| over the nodes of an element at the stiffest node."""

@@ -77,6 +77,12 @@ struct Ties {
     }
 };
 
+// A multiple of a matrix with one number for all three components, such as a mass.
+struct Multiple {
+    double factor;
+    BlockMatrix of;
+};
+
 class MatrixFree {
 public:
     // With nodes at X (n, 3).
@@ -107,9 +113,10 @@ public:
         for (ProductGroup& s : groups) find_places(s);
     }
 
-    // done(i, y) with y = (K x)_i for each node i, by all threads; tied or not.
+    // done(i, y) with y = (K x)_i for each node i, by all threads; tied or not; in double precision K with a
+    // multiple of a matrix added to it.
     template <class T, class F>
-    void multiply(const T* x, const F& done, bool tied = true) const {
+    void multiply(const T* x, const F& done, bool tied = true, const Multiple* added = nullptr) const {
         const auto turn = turns.take();
         std::vector<T>& room = std::get<std::vector<T>>(rooms);
         room.resize(4 * pairs);
@@ -121,10 +128,17 @@ public:
             ties.fill(filled.data());
             x = filled.data();
         }
+        if constexpr (std::is_same_v<T, double>) {
+            if (added) {
+                of_added.resize(3 * n);
+                kl::multiply(added->of, x, of_added.data(), 1, true);
+            }
+        }
         for (const ProductGroup& s : groups)
             over(s, [&](int64_t first, int64_t last) { run(s, x, room.data() + 4 * (s.first + first * s.w.k), first, last); });
         const auto force = [&](int64_t i, vec<T, 4>& sum) KL_INLINE_LAMBDA {
             sum = vec<T, 4>{};
+            for (int c = 0; added && c < 3; ++c) sum[c] = static_cast<T>(added->factor * of_added[3 * i + c]);
             for (int32_t p = start[i]; p < start[i + 1]; ++p)
                 sum += *reinterpret_cast<const vec<T, 4>*>(room.data() + 4 * static_cast<int64_t>(met[p]));
         };
@@ -153,8 +167,8 @@ public:
 
     // x has a number behind its last; y may be x.
     template <class T>
-    void multiply(const T* x, T* y, bool tied = true) const {
-        multiply(x, [&](int64_t i, const T* sum) { std::copy(sum, sum + 3, y + 3 * i); }, tied);
+    void multiply(const T* x, T* y, bool tied = true, const Multiple* added = nullptr) const {
+        multiply(x, [&](int64_t i, const T* sum) { std::copy(sum, sum + 3, y + 3 * i); }, tied, added);
     }
 
     // The diagonal blocks, row-major; they are kept from `norm` on until they are taken.  Those of ties are
@@ -303,6 +317,7 @@ private:
 
     mutable Turns turns;  // the element vectors serve one product at a time
     mutable std::tuple<std::vector<float>, std::vector<double>> rooms, filled_rooms;  // element vectors; x
+    mutable std::vector<double> of_added;
     int64_t pairs = 0;
     mutable std::vector<double> kept;
     std::vector<double> X;

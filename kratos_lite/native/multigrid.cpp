@@ -129,7 +129,11 @@ public:
         return z;
     }
 
-    auto solve(Array<double> b, double tolerance, double norm, int most, const Object& progress) {
+    // Of A with a multiple of a matrix added to its product, if that takes the place of A.
+    auto solve(Array<double> b, double tolerance, double norm, int most, const Object& progress,
+               const MultipleTables& tables) {
+        require(!tables || elements, "a multiple is added to products of elements alone");
+        const std::optional<Multiple> added = tables ? elements->multiple(tables) : std::nullopt;
         require(b.size() == static_cast<int64_t>(fixed.size()), "b must have one number for each unknown");
         Array<double> x(b.size());
         const double* from = b.data();
@@ -141,7 +145,7 @@ public:
             GilReleased release;
             const auto turn = at_work();
             const auto times_A = [&](const double* p, double* Ap) {
-                elements ? elements->multiply(p, Ap) : multiply(A.blocks(), p, Ap);
+                elements ? elements->multiply(p, Ap, true, added ? &*added : nullptr) : multiply(A.blocks(), p, Ap);
             };
             outcome = conjugate_gradients(times_A, fixed, hierarchy, from, to, tolerance, norm, most, each);
         }
@@ -275,7 +279,7 @@ std::shared_ptr<Multigrid> multigrid(const Object& A, Array<uint8_t> fixed, Numb
 KL_MODULE(_multigrid, m) {
     add_class<Matrix>("kratos_lite.native.Matrix", {method<&Matrix::tie>("tie")});
     add_class<Product>("kratos_lite.native.Product",
-                       {method<&Product::times>("times", nullptr, {"x", {"tied", Py_False}}), method<&Product::tie>("tie"),
+                       {method<&Product::times>("times", nullptr, {"x", {"tied", Py_False}, {"added", Py_None}}), method<&Product::tie>("tie"),
                         method<&Product::largest_row_sum>("norm")});
     add_class<Pressures>("kratos_lite.native.Pressures", {method<&Pressures::solve>("solve")});
     add_class<Multigrid>("kratos_lite.native.Multigrid",
@@ -284,7 +288,7 @@ KL_MODULE(_multigrid, m) {
                           method<&Multigrid::aggregate_linear>("aggregate_linear"),
                           method<&Multigrid::labels>("labels"),
                           method<&Multigrid::cycle>("cycle", nullptr, {"r", {"level", PyLong_FromLong(0)}}),
-                          method<&Multigrid::solve>("solve"),
+                          method<&Multigrid::solve>("solve", nullptr, {"b", "tolerance", "norm", "most", "progress", {"added", Py_None}}),
                           method<&Multigrid::sizes>("sizes"),
                           method<&Multigrid::clusters>("clusters"),
                           method<&Multigrid::has_planes>("has_planes"),

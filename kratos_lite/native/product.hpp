@@ -49,6 +49,9 @@ inline Ties ties_of(const Array<int32_t>& dependents, const Array<int32_t>& indp
 // Elements of a kind (nodes, dN, weights, C, factors), whose arrays are kept.
 using ElementTables = std::tuple<Array<int32_t>, Array<double>, Array<double>, Array<double>, Factors>;
 
+// A factor, and indptr, indices and numbers of a matrix.
+using MultipleTables = std::optional<std::tuple<double, Array<int32_t>, Array<int32_t>, Array<double>>>;
+
 class Product : public MatrixFree {
 public:
     Product(Numbers points, std::vector<ElementTables> groups)
@@ -67,15 +70,24 @@ public:
         ties = ties_of(dependents, indptr, independents, weights, n);
     }
 
-    Array<double> times(Array<double> x, bool tied) const {
+    Array<double> times(Array<double> x, bool tied, const MultipleTables& tables) const {
         require(x.size() == 3 * n, "x must have three numbers for each point");
+        const std::optional<Multiple> added = multiple(tables);
         Array<double> y(3 * n);
         std::vector<double> from = x.copy();
         from.push_back(0);
         double* to = y.mutable_data();
         GilReleased release;
-        multiply(from.data(), to, tied);
+        multiply(from.data(), to, tied, added ? &*added : nullptr);
         return y;
+    }
+
+    // What the products of `times` have beside the elements; the tables keep its memory.
+    std::optional<Multiple> multiple(const MultipleTables& tables) const {
+        if (!tables) return {};
+        const auto& [factor, indptr, indices, data] = *tables;
+        require(indptr.size() == n + 1 && data.size() == indices.size(), "a matrix must have a row for each point");
+        return Multiple{factor, {pattern(indptr, indices, n), data.data(), static_cast<uint32_t>(n)}};
     }
 
     double largest_row_sum() const {

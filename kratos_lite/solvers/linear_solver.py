@@ -73,8 +73,9 @@ class LinearSolver:
 
         `prescribed` displacements (3n,) take the place of c of the constraint map.  An iteration begins at
         `start` (3n,), of which the free components count, if that is nearer than 0.  With a `reduction` it
-        ends where the residual is this fraction of that of 0 or the start, whichever is less, does no work
-        on the solution if K is symmetric, and the backward error is not computed: NaN.
+        ends where the residual is this fraction of that of 0 or the start, whichever is less; if K is
+        symmetric, it begins at the multiple of the start that is nearest, and the residual does no work on
+        the solution.  The backward error is not computed then: NaN.
         """
         reduce, expand = self.constraint_map.reduce, self.constraint_map.expand
         c = self.constraint_map.c if prescribed is None else prescribed
@@ -83,12 +84,15 @@ class LinearSolver:
         norm = size
         aim = tolerance * self._fraction(f, c, size) * size
         if start is not None and self.plan.iterates:
-            near = expand((start - c)[self.constraint_map.free], c)
-            residual = reduce(f - self.K @ near)
+            near = (start - c)[self.constraint_map.free]
+            image = reduce(self.K @ self.constraint_map.transform(near))
+            if reduction:
+                aim = reduction * min(size, float(np.linalg.norm(b - image)))
+            energy = float(near @ image)
+            scale = float(near @ b) / energy if reduction and self.symmetric and energy > 0 else 1.0
+            near, residual = expand(scale * near, c), b - scale * image
             if float(np.linalg.norm(residual)) <= size:
                 u, b, norm = near, residual, float(np.linalg.norm(residual))
-            if reduction:
-                aim = reduction * norm
             if u is near or reduction:
                 rounding = 2 * float(np.finfo(float).eps)
                 aim = max(aim, rounding * (self.norm * float(np.linalg.norm(near)) + size))
@@ -236,13 +240,10 @@ class LinearSolver:
         free, rhs = self.constraint_map.free, np.zeros(len(self.constraint_map.c))
         rhs[free] = b
         aim = tolerance if continued else tolerance_of(tolerance, len(b))
-        kernel_lacks = self if getattr(self.K, "mass", None) else None
-        if (near := self.near or self._without_means or kernel_lacks) is not None:
+        if (near := self.near or self._without_means) is not None:
             q, iterations, good = self._by_near(b, aim if self.near is None else tolerance, near, progress)
             if good:
                 return q, iterations, self.plan
-            if near is self:
-                return q, iterations, after(iterations, tolerance, len(b), False)
             self.near = None  # not near enough
         multigrid = self._prepared("_multigrid", "set up", progress)
         norm = self.norm if self._blocks is self.K else self._blocks.norm()

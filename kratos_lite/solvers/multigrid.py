@@ -79,6 +79,7 @@ class Compiled:
         thin = 0 if axes is None else 2 if is_very_thin(points, axes) else 1
         places = np.ascontiguousarray(points if axes is None else _closer(points, axes[:, 0]), dtype=float)
         self._module: Any = kernels("multigrid")
+        self._added = A.added if isinstance(A, MatrixFree) else None
         fixed = (~free).astype(np.uint8)
         settings = fixed, places, degree, RATIO, STRENGTH
         if isinstance(A, MatrixFree):
@@ -152,7 +153,7 @@ class Compiled:
         self, b: Array, tolerance: float, norm: float, each: GoOn | None = None
     ) -> tuple[Array, int, bool]:
         """Return x, iterations and success."""
-        return self._kernel.solve(b, tolerance, norm, MAX_ITERATIONS, each)
+        return self._kernel.solve(b, tolerance, norm, MAX_ITERATIONS, each, self._added)
 
 
 def _closer(points: Array, normal: Array) -> Array:

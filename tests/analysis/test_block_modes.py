@@ -1,5 +1,6 @@
 """Modes of larger models, by a block of vectors: none is missed, none comes twice."""
 
+from collections import deque
 from dataclasses import replace
 
 import numpy as np
@@ -244,12 +245,12 @@ def test_a_free_ring_of_quadratic_elements_has_the_modes_of_lapack():
 # ---- steps in time of larger models ----
 
 
-def struck(element, cells, **options):
-    """Return a block on a clamped side in its first mode of motion, and its period."""
+def struck(element, cells, count=1, **options):
+    """Return a block on a clamped side in so many of its first modes, and the period of the first."""
     model = kl.Model(kl.box((1, 1, 2), cells, element), kl.Isotropic3D(nu=0.3, **STEEL))
     model.fix("x-")
-    omega, shapes = model.modes(1)
-    return model.transient(velocity=shapes[0], **options), 2 * np.pi / omega[0]
+    omega, shapes = model.modes(count)
+    return model.transient(velocity=shapes.sum(axis=0), **options), 2 * np.pi / omega[0]
 
 
 @pytest.mark.parametrize(
@@ -258,7 +259,7 @@ def struck(element, cells, **options):
 )
 def test_energy_is_kept_by_iterations(element, cells, monkeypatch):
     monkeypatch.setattr("kratos_lite.solvers.plan.STEPPED_LIMIT", 0)
-    transient, period = struck(f"KinematicLinear3D{element}", cells)
+    transient, period = struck(f"KinematicLinear3D{element}", cells, 8)
     energy = transient.energy()
     *_, end = kl.integrate(transient, period / 20, 30, every=30)
     assert abs(transient.energy(end) / energy - 1) < 1e-11
@@ -278,10 +279,29 @@ def test_iterations_miss_far_less_than_the_steps(monkeypatch):
     ends = []
     for limit, n in ((0, 20), (40_000, 20), (40_000, 40)):
         monkeypatch.setattr("kratos_lite.solvers.plan.STEPPED_LIMIT", limit)
-        transient, period = struck("KinematicLinear3D20N", (2, 2, 4), rayleigh=(3.0, 1e-6))
+        transient, period = struck("KinematicLinear3D20N", (2, 2, 4), 8, rayleigh=(3.0, 1e-6))
         *_, end = kl.integrate(transient, period / n, n, every=n)
         ends.append(end.u)
     assert missed(ends) < OF_STEP
+
+
+def test_a_step_of_one_mode_begins_near_its_end(monkeypatch):
+    """What it comes to is a multiple of its Taylor start: of many modes at once it takes more iterations."""
+    iterations, plain = [], LinearSolver.solve
+
+    def counted(self, *arguments):
+        iterations.append(plain(self, *arguments))
+        return iterations[-1]
+
+    monkeypatch.setattr("kratos_lite.solvers.plan.STEPPED_LIMIT", 0)
+    transient, period = struck("KinematicLinear3D20N", (3, 3, 6))
+    monkeypatch.setattr(LinearSolver, "solve", counted)
+    deque(kl.integrate(transient, period / 20, 4), maxlen=0)
+    noise = np.sin(0.1 * np.arange(transient.v.size) ** 2) * ~transient.equations.constrained
+    transient.v = transient.v + 0.1 * np.abs(transient.v).max() * noise
+    deque(kl.integrate(transient, period / 20, 4), maxlen=0)
+    one, many = (sum(solution.iterations for solution in half) for half in (iterations[:4], iterations[4:]))
+    assert one < 0.3 * many
 
 
 def test_the_linear_level_of_a_step_has_mass():

@@ -86,6 +86,19 @@ def test_groups_of_several_kinds_and_a_last_group_that_is_not_full():
     close(product @ x, K @ x, 2e-14)
 
 
+def test_iterations_with_a_mass_added_come_to_what_the_matrix_gives():
+    """Also where it is far heavier than the stiffness that multigrid knows."""
+    model = model_of("27N", curved=True)
+    product, K, b = both(model)
+    M, free = model.matrices().M, system_of(model).constraint_map.is_free
+    for m in (1e6, 1e12):
+        A = product.with_mass(m, M[::3, ::3].tocsr(), product.assembled)
+        close(A @ b, K @ b + m * (M @ b), 1e-13)
+        x, _, converged = multigrid(A, free, model.mesh.points).solve(np.where(free, b, 0.0), 1e-12, A.norm())
+        assert converged
+        close((A @ x)[free], b[free], 1e-10)
+
+
 # ---- factors of gradients --------------------------------------------------------------------------
 
 
@@ -196,3 +209,12 @@ def test_wrong_tables_are_refused():
             module.Product(X, [(nodes, dN, weights, C, factors_)])
     with pytest.raises(ValueError, match="three numbers for each point"):
         module.Product(points, [(nodes, dN, weights, C, None)]).times(np.zeros(5))
+    product, x = module.Product(points, [(nodes, dN, weights, C, None)]), np.zeros(points.size)
+    start, columns = np.arange(len(points) + 1, dtype=np.int32), np.arange(len(points), dtype=np.int32)
+    for added, message in (
+        ((1.0, start[:-1], columns, np.ones(len(points))), "a row for each point"),
+        ((1.0, start, columns, np.ones(3)), "a row for each point"),
+        ((1.0, start, columns + 1, np.ones(len(points))), "no column of the matrix"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            product.times(x, False, added)
