@@ -81,10 +81,12 @@ class MatrixFree:
         """The number of rows and columns."""
         return 3 * len(self.points), 3 * len(self.points)
 
-    def __matmul__(self, x: Array) -> Array:
-        """Return K x of a vector (3n,)."""
+    def times(self, x: Array) -> Array:
+        """Return K x of a vector (3n,), or of several (k, 3n)."""
         product: Array = self.product.times(np.ascontiguousarray(x, dtype=float), self.tied)
         return product if self.mass is None else product + self.mass[0] * self.mass[1](x)
+
+    __matmul__ = times
 
     def norm(self) -> float:
         """Return the largest row sum of |K| over the nodes of an element at the stiffest node."""

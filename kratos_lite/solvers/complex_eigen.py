@@ -27,7 +27,6 @@ from kratos_lite.solvers.eigen import (
     TOLERANCE,
     Operator,
     Problem,
-    at_random,
     check_residuals,
     combine,
     lengths_of,
@@ -58,7 +57,7 @@ class Pencil:
 
     def modes(self, count: int) -> tuple[Complexes, Complexes]:
         """Return λ (count,) in 1/s, nearest to 0 first, and shapes (n, count) of length 1."""
-        n, rigid = self.rest.n, self._rigid[0]
+        n, rigid = len(self.rest.free), self._rigid[0]
         if count > 2 * n:
             raise InputError(f"this model has 1 … {2 * n} complex modes; got {count}")
         values = np.zeros(2 * len(rigid), dtype=complex)
@@ -88,7 +87,7 @@ class Pencil:
             return (np.zeros((0, self.rest.n)),) * 2
         R, (norm_K, norm_M) = self.rest.known[0], self.rest.norms
         rate = 1e-2 * (norm_K / norm_M) ** 0.5  # low among those of a mesh
-        products, Z = ((1.0, self.K), (rate, self.C)), at_random(SECOND, self.rest.n)
+        products, Z = ((1.0, self.K), (rate, self.C)), self.rest.at_random(SECOND)
         # of transposes, products with vectors at random tell
         pushed = np.hstack([rate * part for rate, A in products for part in (A(R), R @ A(Z).T)])
         ways, sizes, _ = np.linalg.svd(pushed, full_matrices=False)
@@ -97,13 +96,12 @@ class Pencil:
 
     def _all(self) -> tuple[Complexes, Complexes]:
         """Return all eigenvalues but those of the rigid modes, from dense matrices."""
-        n, rigid = self.rest.n, self._rigid[0]
-        Q = (
-            np.linalg.qr(self.rest.M(rigid).T, mode="complete")[0][:, len(rigid) :]
-            if len(rigid)
-            else np.eye(n)
-        )
-        Q = np.ascontiguousarray(Q.T)
+        free, rigid = self.rest.free, self._rigid[0]
+        others = np.eye(len(free))
+        if len(rigid):
+            others = np.linalg.qr(self.rest.M(rigid)[:, free].T, mode="complete")[0][:, len(rigid) :]
+        Q = np.zeros((others.shape[1], self.rest.n))
+        Q[:, free] = others.T
         values, vectors = _all_values(*(Q @ A(Q).T for A in (self.rest.M, self.C, self.K)))
         return values, vectors.T @ Q
 
@@ -131,7 +129,7 @@ class Pencil:
         Those `beside` them are followed until they are known roughly, or as farther from 0.
         """
         number, smallest, before = count + beside, 1.0, np.zeros((0, 0))
-        room = min(3 * number + 12, rest.n)
+        room = min(3 * number + 12, len(rest.free))
         space = _Space(np.empty((4, room, rest.n)), np.zeros((3, 0, 0)))
         W, MW = rest.independent(X[lengths_of(X) > 0])
         for _ in range(STEPS):

@@ -13,7 +13,7 @@ Sources: Knyazev, SIAM J. Sci. Comput. 23 (2001) 517-541 (LOBPCG); Hetmaniuk & L
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, TypeAlias
 
@@ -51,7 +51,7 @@ RESIDUAL = 1e-6
 """Fraction of its terms that an equation may miss."""
 EPS, ROUNDING = 1e-15, 1e-12
 """Fraction of the norms of its matrices that it may miss, and where an iteration comes no nearer."""
-COLUMNS = 1 << 14
+COLUMNS = 1 << 11
 """Components of vectors that are combined at once: they stay in the cache."""
 
 
@@ -152,7 +152,7 @@ def dense_modes(K: Array, M: Array, count: int) -> tuple[Array, Array]:
 class Problem:
     """K x = λ M x of n components, K positive beside the span of known vectors, where λ is 0.
 
-    Vectors are rows of arrays (k, n).
+    Vectors are rows of arrays (k, n), 0 at components that are held: so products need no copies of them.
     """
 
     n: int
@@ -166,6 +166,7 @@ class Problem:
     coarse: tuple[Problem, Operator] | None = None  # equations of fewer components, and from these to all
     wanted: int = 1  # vectors of a block that are found to `tolerance`, the others to ROUGH
     tolerance: float = TOLERANCE  # relative error of λ
+    held: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))  # components that are 0
 
     def lowest(self, count: int) -> tuple[Array, Array]:
         """Return the lowest λ (count,) beside the known ones, ascending, and x (count, n), x M x^T = 1."""
@@ -199,11 +200,22 @@ class Problem:
 
     def start(self, count: int) -> Array:
         """Return vectors (count, n) in which low modes are large, the same each time."""
-        return self.precondition(self.M(at_random(count, self.n)))
+        return self.precondition(self.M(self.at_random(count)))
+
+    def at_random(self, count: int) -> Array:
+        """Return vectors (count, n), the same each time."""
+        X = np.zeros((count, self.n))
+        X[:, self.free] = at_random(count, len(self.free))
+        return X
+
+    @property
+    def free(self) -> Ints:
+        """The components (q,) that are not held."""
+        return np.delete(np.arange(self.n), self.held)
 
     def roughly(self, count: int) -> Array:
         """Return vectors (count, n) near the lowest modes, those of the coarse level if there is one."""
-        if self.coarse is None or self.coarse[0].n < 4 * count:
+        if self.coarse is None or len(self.coarse[0].free) < 4 * count:
             return self.start(count)
         problem, onto_all = self.coarse
         problem = replace(problem, wanted=0)
@@ -217,7 +229,7 @@ class Problem:
         """Return λ, x and M x of as many vectors as X has, from these, when `done`."""
         m, (W, MW) = len(X), self.independent(X)
         while len(W) < m:  # thin bodies: one cycle leaves little but their softest motions
-            W, MW = self.independent(np.vstack([W, at_random(m - len(W), self.n)]))
+            W, MW = self.independent(np.vstack([W, self.at_random(m - len(W))]))
         S, KS, MS = (np.empty((3 * m, self.n)) for _ in range(3))
         squares, errors, A = np.full(m, np.inf), np.full(m, np.inf), np.zeros((0, 0))
         limits = np.where(np.arange(m) < self.wanted, self.tolerance, ROUGH)
@@ -227,7 +239,9 @@ class Problem:
             S[new], MS[new], KS[new] = W, MW, self.K(W)
             used, before = new.stop, squares
             A = _bordered(A, KS[new] @ S[:used].T)
-            G = MS[:used] @ S[:used].T  # whole: where M is stiff, what rounding leaves of it counts
+            old = slice(0, new.start)
+            # whole: where M is stiff, what rounding leaves of it counts
+            G = _bordered(MS[old] @ S[old].T, MS[new] @ S[:used].T)
             squares, C = _ritz(A, G, m)
             active = np.flatnonzero((errors > limits) | (squares < before - limits * np.abs(squares)))
             last = C[:, active]
