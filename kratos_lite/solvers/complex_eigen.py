@@ -131,9 +131,10 @@ class Pencil:
         number, smallest, before = count + beside, 1.0, np.zeros((0, 0))
         room = min(3 * number + 12, len(rest.free))
         space = _Space(np.empty((4, room, rest.n)), np.zeros((3, 0, 0)))
-        W, MW = rest.independent(X[lengths_of(X) > 0])
+        W = X[lengths_of(X) > 0]
+        k, MW = rest.independent(W)
         for _ in range(STEPS):
-            space.add(W, MW, self.C(W), self.K(W))
+            space.add(W[:k], MW[:k], self.C(W[:k]), self.K(W[:k]))
             values, Y = _all_values(*space.A)
             order = np.argsort(np.abs(values), kind="stable")[: number + GUARDS]
             is_upper = values[order].imag >= 0  # conjugates span the same
@@ -142,7 +143,7 @@ class Pencil:
             values, y = values[order[is_upper]][:p], Y[:p]
             residual, X = space.residual(values, y), _parts(y) @ space.V
             W, squares = rest.precondition(residual), (np.abs(values) + SMALL * np.abs(values).max()) ** 2
-            of_parts = rest.errors(residual, W, X, np.tile(squares, 2), 10 * EPS)
+            of_parts = rest.errors(residual, W, lengths_of(X), np.tile(squares, 2), 10 * EPS)
             errors, limits = of_parts[:p] + of_parts[p:], np.where(np.arange(p) < wanted, LIMIT, NEAR)
             is_far = np.abs(values) * (1 - np.sqrt(errors)) > np.abs(values[wanted - 1])
             wrong = (errors > limits) & ~is_far
@@ -151,11 +152,15 @@ class Pencil:
                 rest.progress("modes", 0.99 * float(np.log(smallest) / np.log(LIMIT)))
             if not wrong.any():
                 return values[:wanted], X.reshape(2, p, -1)[:, :wanted].reshape(2 * wanted, -1)
-            W, k = W[np.tile(wrong, 2) & (of_parts > np.tile(limits, 2) / 2)], Y.shape[1]
-            if k + len(W) > room and space.lowest > -SMALL * squares.max():  # else these are not the lowest
-                y = y @ space.keep(np.vstack([_parts(Y), np.pad(before, ((0, 0), (0, k - before.shape[1])))]))
+            W, size = W[np.tile(wrong, 2) & (of_parts > np.tile(limits, 2) / 2)], Y.shape[1]
+            if (
+                size + len(W) > room and space.lowest > -SMALL * squares.max()
+            ):  # else these are not the lowest
+                y = y @ space.keep(
+                    np.vstack([_parts(Y), np.pad(before, ((0, 0), (0, size - before.shape[1])))])
+                )
             before = _parts(y)
-            W, MW = rest.independent(W, space.V, space.S[1, : len(space.V)])
+            k, MW = rest.independent(W, space.V, space.S[1, : len(space.V)])
         raise not_converged(count)
 
 
