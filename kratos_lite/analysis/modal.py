@@ -18,7 +18,7 @@ from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.complex_eigen import Pencil
 from kratos_lite.solvers.constraints import ConstraintMap
 from kratos_lite.solvers.eigen import TOLERANCE, Operator, Problem, dense_modes, is_small, modes, modes_near
-from kratos_lite.solvers.linear_solver import LinearSolver
+from kratos_lite.solvers.linear_solver import LinearSolver, on_all
 from kratos_lite.solvers.plan import DENSE_MODES, FALLBACK_LIMIT, REPEATED_LIMIT, Plan
 from kratos_lite.typing import Array, Complexes, Progress
 from kratos_lite.validation import instance, number, whole_number
@@ -88,12 +88,13 @@ def _by_iteration(
     e: EquationsOfMotion, solver: LinearSolver, count: int, progress: Progress | None, K_g: Any = None
 ) -> tuple[Array, Array]:
     """Return ω (count,) and shapes (q, count): the rigid motions that are free, then the lowest others."""
-    problem = _at_rest(e, solver, progress, K_g)
+    problem, free = _at_rest(e, solver, progress, K_g), e.system.constraint_map.free
     R = problem.known[0] if problem.known else np.zeros((0, problem.n))
     if count <= len(R):
-        return np.zeros(count), R[:count].T
+        return np.zeros(count), R[:count, free].T
     squares, shapes = problem.lowest(count - len(R))
-    return np.sqrt(np.append(np.zeros(len(R)), np.maximum(squares, 0.0))), np.vstack([R, shapes]).T
+    omega = np.sqrt(np.append(np.zeros(len(R)), np.maximum(squares, 0.0)))
+    return omega, np.vstack([R[:, free], shapes[:, free]]).T
 
 
 def _at_rest(
@@ -116,13 +117,15 @@ def _problem(
     norms: tuple[float, float],
 ) -> Problem:
     """Return K x = λ M x, given by products of (k, N), beside rigid motions (a, 3, k), which `firm` holds."""
-    times_K, times_M = (_reduced_product(constraints, times) for times in (K, M))
+    times_K, times_M = (_product(constraints, times) for times in (K, M))
     known = None
     if rigid.shape[2]:
         R = np.ascontiguousarray(rigid.reshape(3 * len(rigid), -1).T)
-        R = np.linalg.solve(np.linalg.cholesky(R @ M(R).T), R[:, constraints.free])
+        R = np.linalg.solve(np.linalg.cholesky(R @ M(R).T), R)
+        R[:, constraints.held] = 0.0
         known = R, times_M(R)
-    return Problem(len(constraints.free), times_K, times_M, _preconditioner(constraints, firm), norms, known)
+    operators = times_K, times_M, _preconditioner(constraints, firm)
+    return Problem(len(constraints.c), *operators, norms, known, held=constraints.held)
 
 
 def _coarse(e: EquationsOfMotion, firm: LinearSolver, rigid: Array) -> tuple[Problem, Operator] | None:
@@ -138,9 +141,10 @@ def _coarse(e: EquationsOfMotion, firm: LinearSolver, rigid: Array) -> tuple[Pro
     norms = below.norm, float(masses.max())
     problem = _problem(constraints, below, below.times, lambda u: masses * u, rigid[linear.nodes], norms)
 
-    def onto_all(q: Array) -> Array:
-        nodal = (constraints.transform(x).reshape(-1, 3) for x in q)
-        return np.stack([(P @ u).ravel()[fine.free] for u in nodal])
+    def onto_all(X: Array) -> Array:
+        out = np.stack([(P @ x.reshape(-1, 3)).ravel() for x in X])
+        out[:, fine.held] = 0.0
+        return out
 
     return problem, onto_all
 
@@ -152,22 +156,30 @@ def _firm(e: EquationsOfMotion, solver: LinearSolver) -> LinearSolver:
 
 
 def _preconditioner(constraints: ConstraintMap, firm: LinearSolver) -> Operator:
-    """Return about K⁻¹ of free degrees of freedom (k, q), rigid motions that are free being held."""
+    """Return about K⁻¹ of vectors (k, N), rigid motions that are free being held."""
     if firm.constraint_map is constraints:
         return firm.precondition
-    kept = np.searchsorted(constraints.free, firm.constraint_map.free)
 
     def precondition(r: Array) -> Array:
-        out = np.zeros_like(r)
-        out[:, kept] = firm.precondition(r[:, kept])
-        return out
+        r = r.copy()
+        r[:, firm.constraint_map.held] = 0.0
+        return firm.precondition(r)
 
     return precondition
 
 
-def _reduced_product(constraints: ConstraintMap, times: Operator) -> Operator:
-    """Return the product on free degrees of freedom (k, q) of a matrix that multiplies all of them (k, N)."""
-    return lambda q: constraints.reduce(times(np.stack([constraints.transform(x) for x in q])).T).T
+def _product(constraints: ConstraintMap, times: Operator) -> Operator:
+    """Return T^T A T by the product of A with vectors (k, N), T having its columns at the free components."""
+    if constraints.T is None:
+
+        def product(X: Array) -> Array:
+            Y = times(X)
+            Y[:, constraints.held] = 0.0
+            return Y
+
+        return product
+    T = on_all(constraints.T, constraints.free)
+    return lambda X: np.stack([T.T @ y for y in times(np.stack([T @ x for x in X]))])
 
 
 def _free_motions(e: EquationsOfMotion) -> Array:
@@ -191,11 +203,11 @@ def complex_modes(
         try:
             values, shapes = pencil.modes(count)
         except SolveError:
-            if not solver.plan.iterates or pencil.rest.n > FALLBACK_LIMIT:
+            if not solver.plan.iterates or len(pencil.rest.free) > FALLBACK_LIMIT:
                 raise
             by_factors = replace(solver, K=e.system.assembled(), plan=Plan("direct"))
             values, shapes = _pencil(e, by_factors, progress).modes(count)
-    return values, expanded(e, shapes)
+    return values, expanded(e, shapes[e.system.constraint_map.free])
 
 
 def _pencil(e: EquationsOfMotion, solver: LinearSolver, progress: Progress | None) -> Pencil:
@@ -206,7 +218,7 @@ def _pencil(e: EquationsOfMotion, solver: LinearSolver, progress: Progress | Non
         return solver.times(u) if of_K is None else solver.times(u) + times_numbers(of_K, u)
 
     both = (lambda v: e.times_damping(v, 0.0)), stiffness
-    return Pencil(rest, *(_reduced_product(e.system.constraint_map, times) for times in both))
+    return Pencil(rest, *(_product(e.system.constraint_map, times) for times in both))
 
 
 def critical_rate(model: Structure, count: int = 1) -> Array:
@@ -304,13 +316,13 @@ def _largest(
         K = K if isinstance(K, np.ndarray) else K.toarray()
         values, vectors = eigh(reduced(e, H).toarray(), K, subset_by_index=[n - count, n - 1])
         return values[::-1], vectors[:, ::-1]
-    times_H, times_K = (_reduced_product(constraints, A.times) for A in (H, solver))
+    times_H, times_K = (_product(constraints, A.times) for A in (H, solver))
     norms = H.norm(), solver.norm
-    problem = Problem(
-        n, lambda X: -times_H(X), times_K, solver.precondition, norms, power=2, tolerance=tolerance
-    )
+    operators = lambda X: -times_H(X), times_K, solver.precondition
+    held, size = constraints.held, len(constraints.c)
+    problem = Problem(size, *operators, norms, power=2, tolerance=tolerance, held=held)
     values, vectors = problem.lowest(count)
-    return -values, vectors.T
+    return -values, vectors[:, constraints.free].T
 
 
 def _critical_terms(e: EquationsOfMotion) -> BlockMatrix:

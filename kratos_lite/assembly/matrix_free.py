@@ -80,10 +80,12 @@ class MatrixFree:
         """The number of rows and columns."""
         return 3 * len(self.points), 3 * len(self.points)
 
-    def __matmul__(self, x: Array) -> Array:
-        """Return K x of a vector (3n,)."""
+    def times(self, x: Array) -> Array:
+        """Return K x of a vector (3n,), or of several (k, 3n)."""
         product: Array = self.product.times(np.ascontiguousarray(x, dtype=float), self.tied, self.added)
         return product
+
+    __matmul__ = times
 
     def norm(self) -> float:
         """Return the largest row sum of |K| over the nodes of an element at the stiffest node."""

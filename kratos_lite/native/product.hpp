@@ -70,15 +70,20 @@ public:
         ties = ties_of(dependents, indptr, independents, weights, n);
     }
 
+    // K x of one vector (3n), or of several (k, 3n).
     Array<double> times(Array<double> x, bool tied, const MultipleTables& tables) const {
-        require(x.size() == 3 * n, "x must have three numbers for each point");
+        const int64_t size = 3 * n, count = x.ndim() == 2 ? x.shape(0) : 1;
+        require(x.size() == count * size && x.shape(x.ndim() - 1) == size, "x must have three numbers for each point");
         const std::optional<Multiple> added = multiple(tables);
-        Array<double> y(3 * n);
-        std::vector<double> from = x.copy();
-        from.push_back(0);
+        Array<double> y = x.ndim() == 2 ? Array<double>({count, size}) : Array<double>(size);
+        if (count == 0) return y;
+        const double* from = x.data();
         double* to = y.mutable_data();
         GilReleased release;
-        multiply(from.data(), to, tied, added ? &*added : nullptr);
+        std::vector<double> last(from + (count - 1) * size, from + count * size);
+        last.push_back(0);  // behind the others stands a number, which is read
+        for (int64_t v = 0; v < count; ++v)
+            multiply(v + 1 < count ? from + v * size : last.data(), to + v * size, tied, added ? &*added : nullptr);
         return y;
     }
 

@@ -60,9 +60,10 @@ KL_INLINE bool multiply_scalar_rows(const BlockMatrix& A, const double* from, do
         for (int32_t k = A.indptr[i]; k < A.indptr[i + 1]; ++k) {
             const uint32_t j = static_cast<uint32_t>(A.indices[k]);
             if (j >= A.columns) return false;
+            const bool inside = j + 1 < A.columns;  // there, the fourth lane does not lie beyond the vector
             for (int v = 0; v < count; ++v) {
                 const double* x = from + v * in + 3 * static_cast<int64_t>(j);
-                s[v] += A.data[k] * Vec{x[0], x[1], x[2], 0};
+                s[v] += A.data[k] * (inside ? *reinterpret_cast<const Vec*>(x) : Vec{x[0], x[1], x[2], 0});
             }
         }
         for (int v = 0; v < count; ++v)

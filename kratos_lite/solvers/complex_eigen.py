@@ -27,7 +27,6 @@ from kratos_lite.solvers.eigen import (
     TOLERANCE,
     Operator,
     Problem,
-    at_random,
     check_residuals,
     combine,
     lengths_of,
@@ -58,7 +57,7 @@ class Pencil:
 
     def modes(self, count: int) -> tuple[Complexes, Complexes]:
         """Return λ (count,) in 1/s, nearest to 0 first, and shapes (n, count) of length 1."""
-        n, rigid = self.rest.n, self._rigid[0]
+        n, rigid = len(self.rest.free), self._rigid[0]
         if count > 2 * n:
             raise InputError(f"this model has 1 … {2 * n} complex modes; got {count}")
         values = np.zeros(2 * len(rigid), dtype=complex)
@@ -88,7 +87,7 @@ class Pencil:
             return (np.zeros((0, self.rest.n)),) * 2
         R, (norm_K, norm_M) = self.rest.known[0], self.rest.norms
         rate = 1e-2 * (norm_K / norm_M) ** 0.5  # low among those of a mesh
-        products, Z = ((1.0, self.K), (rate, self.C)), at_random(SECOND, self.rest.n)
+        products, Z = ((1.0, self.K), (rate, self.C)), self.rest.at_random(SECOND)
         # of transposes, products with vectors at random tell
         pushed = np.hstack([rate * part for rate, A in products for part in (A(R), R @ A(Z).T)])
         ways, sizes, _ = np.linalg.svd(pushed, full_matrices=False)
@@ -97,13 +96,12 @@ class Pencil:
 
     def _all(self) -> tuple[Complexes, Complexes]:
         """Return all eigenvalues but those of the rigid modes, from dense matrices."""
-        n, rigid = self.rest.n, self._rigid[0]
-        Q = (
-            np.linalg.qr(self.rest.M(rigid).T, mode="complete")[0][:, len(rigid) :]
-            if len(rigid)
-            else np.eye(n)
-        )
-        Q = np.ascontiguousarray(Q.T)
+        free, rigid = self.rest.free, self._rigid[0]
+        others = np.eye(len(free))
+        if len(rigid):
+            others = np.linalg.qr(self.rest.M(rigid)[:, free].T, mode="complete")[0][:, len(rigid) :]
+        Q = np.zeros((others.shape[1], self.rest.n))
+        Q[:, free] = others.T
         values, vectors = _all_values(*(Q @ A(Q).T for A in (self.rest.M, self.C, self.K)))
         return values, vectors.T @ Q
 
@@ -131,11 +129,12 @@ class Pencil:
         Those `beside` them are followed until they are known roughly, or as farther from 0.
         """
         number, smallest, before = count + beside, 1.0, np.zeros((0, 0))
-        room = min(3 * number + 12, rest.n)
+        room = min(3 * number + 12, len(rest.free))
         space = _Space(np.empty((4, room, rest.n)), np.zeros((3, 0, 0)))
-        W, MW = rest.independent(X[lengths_of(X) > 0])
+        W = X[lengths_of(X) > 0]
+        k, MW = rest.independent(W)
         for _ in range(STEPS):
-            space.add(W, MW, self.C(W), self.K(W))
+            space.add(W[:k], MW[:k], self.C(W[:k]), self.K(W[:k]))
             values, Y = _all_values(*space.A)
             order = np.argsort(np.abs(values), kind="stable")[: number + GUARDS]
             is_upper = values[order].imag >= 0  # conjugates span the same
@@ -144,7 +143,7 @@ class Pencil:
             values, y = values[order[is_upper]][:p], Y[:p]
             residual, X = space.residual(values, y), _parts(y) @ space.V
             W, squares = rest.precondition(residual), (np.abs(values) + SMALL * np.abs(values).max()) ** 2
-            of_parts = rest.errors(residual, W, X, np.tile(squares, 2), 10 * EPS)
+            of_parts = rest.errors(residual, W, lengths_of(X), np.tile(squares, 2), 10 * EPS)
             errors, limits = of_parts[:p] + of_parts[p:], np.where(np.arange(p) < wanted, LIMIT, NEAR)
             is_far = np.abs(values) * (1 - np.sqrt(errors)) > np.abs(values[wanted - 1])
             wrong = (errors > limits) & ~is_far
@@ -153,11 +152,15 @@ class Pencil:
                 rest.progress("modes", 0.99 * float(np.log(smallest) / np.log(LIMIT)))
             if not wrong.any():
                 return values[:wanted], X.reshape(2, p, -1)[:, :wanted].reshape(2 * wanted, -1)
-            W, k = W[np.tile(wrong, 2) & (of_parts > np.tile(limits, 2) / 2)], Y.shape[1]
-            if k + len(W) > room and space.lowest > -SMALL * squares.max():  # else these are not the lowest
-                y = y @ space.keep(np.vstack([_parts(Y), np.pad(before, ((0, 0), (0, k - before.shape[1])))]))
+            W, size = W[np.tile(wrong, 2) & (of_parts > np.tile(limits, 2) / 2)], Y.shape[1]
+            if (
+                size + len(W) > room and space.lowest > -SMALL * squares.max()
+            ):  # else these are not the lowest
+                y = y @ space.keep(
+                    np.vstack([_parts(Y), np.pad(before, ((0, 0), (0, size - before.shape[1])))])
+                )
             before = _parts(y)
-            W, MW = rest.independent(W, space.V, space.S[1, : len(space.V)])
+            k, MW = rest.independent(W, space.V, space.S[1, : len(space.V)])
         raise not_converged(count)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -111,6 +112,11 @@ class ConstraintMap:
         is_free = np.zeros(len(self.c), dtype=bool)
         is_free[self.free] = True
         return is_free
+
+    @cached_property
+    def held(self) -> Ints:
+        """The degrees of freedom that are not free, ascending."""
+        return np.flatnonzero(~self.is_free)
 
     @property
     def norm(self) -> float:

@@ -12,8 +12,8 @@ Sources: Knyazev, SIAM J. Sci. Comput. 23 (2001) 517-541 (LOBPCG); Hetmaniuk & L
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, TypeAlias
 
@@ -51,7 +51,7 @@ RESIDUAL = 1e-6
 """Fraction of its terms that an equation may miss."""
 EPS, ROUNDING = 1e-15, 1e-12
 """Fraction of the norms of its matrices that it may miss, and where an iteration comes no nearer."""
-COLUMNS = 1 << 14
+COLUMNS = 1 << 11
 """Components of vectors that are combined at once: they stay in the cache."""
 
 
@@ -152,7 +152,7 @@ def dense_modes(K: Array, M: Array, count: int) -> tuple[Array, Array]:
 class Problem:
     """K x = λ M x of n components, K positive beside the span of known vectors, where λ is 0.
 
-    Vectors are rows of arrays (k, n).
+    Vectors are rows of arrays (k, n), 0 at components that are held: so products need no copies of them.
     """
 
     n: int
@@ -166,6 +166,7 @@ class Problem:
     coarse: tuple[Problem, Operator] | None = None  # equations of fewer components, and from these to all
     wanted: int = 1  # vectors of a block that are found to `tolerance`, the others to ROUGH
     tolerance: float = TOLERANCE  # relative error of λ
+    held: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))  # components that are 0
 
     def lowest(self, count: int) -> tuple[Array, Array]:
         """Return the lowest λ (count,) beside the known ones, ascending, and x (count, n), x M x^T = 1."""
@@ -199,11 +200,22 @@ class Problem:
 
     def start(self, count: int) -> Array:
         """Return vectors (count, n) in which low modes are large, the same each time."""
-        return self.precondition(self.M(at_random(count, self.n)))
+        return self.precondition(self.M(self.at_random(count)))
+
+    def at_random(self, count: int) -> Array:
+        """Return vectors (count, n), the same each time."""
+        X = np.zeros((count, self.n))
+        X[:, self.free] = at_random(count, len(self.free))
+        return X
+
+    @property
+    def free(self) -> Ints:
+        """The components (q,) that are not held."""
+        return np.delete(np.arange(self.n), self.held)
 
     def roughly(self, count: int) -> Array:
         """Return vectors (count, n) near the lowest modes, those of the coarse level if there is one."""
-        if self.coarse is None or self.coarse[0].n < 4 * count:
+        if self.coarse is None or len(self.coarse[0].free) < 4 * count:
             return self.start(count)
         problem, onto_all = self.coarse
         problem = replace(problem, wanted=0)
@@ -215,19 +227,24 @@ class Problem:
 
     def _descend(self, X: Array, done: Done) -> tuple[Array, Array, Array]:
         """Return λ, x and M x of as many vectors as X has, from these, when `done`."""
-        m, (W, MW) = len(X), self.independent(X)
-        while len(W) < m:  # thin bodies: one cycle leaves little but their softest motions
-            W, MW = self.independent(np.vstack([W, at_random(m - len(W), self.n)]))
+        m = len(X)
         S, KS, MS = (np.empty((3 * m, self.n)) for _ in range(3))
+        S[:m] = X
+        k, MS[:m] = self.independent(S[:m])
+        while k < m:  # thin bodies: one cycle leaves little but their softest motions
+            S[k:m] = self.at_random(m - k)
+            k, MS[:m] = self.independent(S[:m])
         squares, errors, A = np.full(m, np.inf), np.full(m, np.inf), np.zeros((0, 0))
         limits = np.where(np.arange(m) < self.wanted, self.tolerance, ROUGH)
         used, allowed, best, best_at = 0, EPS, np.inf, 0
         for step in range(STEPS):
-            new = slice(used, used + len(W))
-            S[new], MS[new], KS[new] = W, MW, self.K(W)
+            new = slice(used, used + k)
+            KS[new] = self.K(S[new])
             used, before = new.stop, squares
             A = _bordered(A, KS[new] @ S[:used].T)
-            G = MS[:used] @ S[:used].T  # whole: where M is stiff, what rounding leaves of it counts
+            old = slice(0, new.start)
+            # whole: where M is stiff, what rounding leaves of it counts
+            G = _bordered(MS[old] @ S[old].T, MS[new] @ S[:used].T)
             squares, C = _ritz(A, G, m)
             active = np.flatnonzero((errors > limits) | (squares < before - limits * np.abs(squares)))
             last = C[:, active]
@@ -237,10 +254,13 @@ class Problem:
             for V in (S, KS, MS):
                 combine(V, both)
             A = both.T @ A @ both
-            residual = KS[active] - squares[active, None] * MS[active]
+            residual = np.empty((len(active), self.n))
+            for r, i in enumerate(active):
+                np.multiply(MS[i], -squares[i], out=residual[r])
+                residual[r] += KS[i]
             W = self.precondition(residual)
             gaps = (squares[-1] - squares[active]) / np.abs(squares[-1])  # beyond which others mix in
-            errors[active] = self.errors(residual, W, S[active], squares[active], allowed)
+            errors[active] = self.errors(residual, W, lengths_of(S[:m])[active], squares[active], allowed)
             errors[active] /= np.where(active < self.wanted, np.clip(gaps, NEAR, 1.0), 1.0)
             if done(squares, errors):
                 return squares, S[:m], MS[:m]
@@ -250,22 +270,32 @@ class Problem:
                 if allowed == ROUNDING:
                     break
                 allowed, best_at = ROUNDING, step
-            used = both.shape[1]
-            W, MW = self.independent(W[errors[active] > limits[active]], S[:used], MS[:used])
+            used, W = both.shape[1], W[errors[active] > limits[active]]
+            new = slice(used, used + len(W))
+            S[new] = W
+            del W, residual  # room for others
+            k, MS[new] = self.independent(S[new], S[:used], MS[:used])
         raise not_converged(m)
 
-    def independent(self, W: Array, *basis: Array) -> tuple[Array, Array]:
-        """Return vectors W without what is known or a basis S, given with S M, orthonormal in M, and W M."""
+    def independent(self, W: Array, *basis: Array) -> tuple[int, Array]:
+        """Make vectors W independent of what is known and of a basis S, given with S M.
+
+        Return the number of those left, which stand first in W, orthonormal in M, and M W.
+        """
         spans = [span for span in (self.known, basis) if span]
         cancelled = True
         while cancelled:  # again where much has gone: what is left is rounded, then
-            W = W / np.maximum(lengths_of(W), np.finfo(float).tiny)[:, None]
+            W /= np.maximum(lengths_of(W), np.finfo(float).tiny)[:, None]
             for S, MS in spans:
-                W -= (W @ MS.T) @ S
+                C = W @ MS.T
+                for some in parts(self.n):
+                    W[:, some] -= C @ S[:, some]
             cancelled = bool((lengths_of(W) < CANCELLED).any())
         MW = self.M(W)
-        Q = orthonormal(W @ MW.T).T
-        return Q @ W, Q @ MW
+        Q = orthonormal(W @ MW.T)
+        combine(W, Q)
+        combine(MW, Q)
+        return Q.shape[1], MW
 
     def _check(self, squares: Array, X: Array) -> None:
         """Raise SolveError unless the energies of vectors are as they should be: x K x^T = λ, x M x^T = 1."""
@@ -273,10 +303,13 @@ class Problem:
         off = np.maximum(np.abs(energies - squares) / np.abs(squares), np.abs(sizes - 1))
         check(off, RESIDUAL + ROUNDING * self.norms[0] * lengths_of(X) ** 2 / np.abs(squares))
 
-    def errors(self, residual: Array, W: Array, X: Array, squares: Array, allowed: float) -> Array:
-        """Return the relative errors of λ, r K⁻¹ r^T / λ or r M⁻¹ r^T / λ²; 0 where r is rounding."""
+    def errors(self, residual: Array, W: Array, lengths: Array, squares: Array, allowed: float) -> Array:
+        """Return the relative errors of λ, r K⁻¹ r^T / λ or r M⁻¹ r^T / λ²; 0 where r is rounding.
+
+        The `lengths` are those of x.
+        """
         norm_K, norm_M = self.norms
-        rounding = allowed * (norm_K + squares * norm_M) * lengths_of(X)
+        rounding = allowed * (norm_K + squares * norm_M) * lengths
         energies = np.abs(np.einsum("ij,ij->i", residual, W)) / np.abs(squares) ** self.power
         return np.where(lengths_of(residual) <= rounding, 0.0, energies)
 
@@ -314,9 +347,13 @@ def _bordered(A: Array, rows: Array) -> Array:
 def combine(V: Array, C: Array) -> None:
     """Put combinations C (k, m) of the first k vectors of V in the places of the first m."""
     k, m = C.shape
-    for start in range(0, V.shape[1], COLUMNS):
-        some = slice(start, start + COLUMNS)
+    for some in parts(V.shape[1]):
         V[:m, some] = C.T @ V[:k, some]
+
+
+def parts(n: int) -> Iterator[slice]:
+    """Yield n components in parts that are worked on at once."""
+    yield from (slice(start, start + COLUMNS) for start in range(0, n, COLUMNS))
 
 
 def first_shift(K: Any, M: Any) -> float:

@@ -111,19 +111,25 @@ class LinearSolver:
 
     def times(self, u: Array) -> Array:
         """Return K u of several vectors (k, N)."""
-        return self.K.times(u) if isinstance(self.K, BlockMatrix) else np.stack([self.K @ each for each in u])
+        if isinstance(self.K, BlockMatrix | MatrixFree):
+            return self.K.times(u)
+        return np.stack([self.K @ each for each in u])
 
     def precondition(self, r: Array) -> Array:
-        """Return about K⁻¹ r of free degrees of freedom (q,), or (k, q): a multigrid cycle, or a solution."""
+        """Return about K⁻¹ r of all components (k, N), 0 where they are not free: a cycle, or a solution.
+
+        The residuals r are 0 there, too.
+        """
+        free = self.constraint_map.free
         if not self.plan.iterates:
-            return self.factors.rows(r)
+            out = np.zeros_like(r)
+            out[:, free] = self.factors.rows(r[:, free])
+            return out
         if self._without_means is not None:
             return self._without_means.precondition(r)
-        free = self.constraint_map.free
-        forces = np.zeros((*r.shape[:-1], len(self.constraint_map.c)))
-        for full, part in zip(np.atleast_2d(forces), np.atleast_2d(r), strict=True):  # faster than at once
-            full[free] = part
-        return np.take(self._multigrid.precondition(forces), free, axis=-1)
+        out = self._multigrid.precondition(r)
+        out[:, self.constraint_map.held] = 0.0
+        return out
 
     def linear_level(self) -> tuple[LinearSolver, PCoarseLevel] | None:
         """Return the equations of the linear elements inside quadratic ones, where multigrid has them."""
@@ -265,12 +271,17 @@ class LinearSolver:
             iterations += 1
             return constraints.reduce(self.K @ constraints.transform(q))
 
+        def precondition(r: Array) -> Array:
+            whole = np.zeros((1, len(constraints.c)))
+            whole[0, constraints.free] = r
+            return near.precondition(whole)[0, constraints.free]
+
         if self.symmetric:
             monitor = Monitor(tolerance, progress, is_quick_to_factorize(len(b)))
-            return conjugate_gradients(times, b, near.precondition, tolerance, self.norm, monitor)
+            return conjugate_gradients(times, b, precondition, tolerance, self.norm, monitor)
         from scipy.sparse.linalg import LinearOperator, gmres
 
-        A, M = (LinearOperator((len(b), len(b)), matvec=f, dtype=float) for f in (times, near.precondition))
+        A, M = (LinearOperator((len(b), len(b)), matvec=f, dtype=float) for f in (times, precondition))
         q, failed = gmres(A, b, rtol=tolerance, atol=0.0, restart=RESTART, maxiter=MAX_RESTARTS, M=M)
         if failed:
             raise SolveError(

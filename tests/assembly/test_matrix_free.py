@@ -50,6 +50,7 @@ def test_products_are_those_of_the_matrix(kind, material, curved):
     product, K, x = both(model_of(kind, material, curved))
     expected = K @ x
     close(product @ x, expected, 2e-14)
+    close(product.times(np.stack([x, -2 * x, x])), np.stack([expected, -2 * expected, expected]), 2e-14)
     assert abs(product.norm() / K.norm() - 1) < (0.3 if curved else 1e-12)
     assert (product.scipy() != K.scipy()).nnz == 0
 

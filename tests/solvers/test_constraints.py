@@ -134,6 +134,8 @@ def test_products_of_ties_are_those_of_the_matrix(kind):
     tied = K.tie(on_all(T, free))
     scale = 1e-12 * np.abs(expected).max()
     np.testing.assert_allclose((tied @ x)[free], expected, rtol=0, atol=scale)
+    several = tied.times(np.stack([x, 3 * x]))[:, free]
+    np.testing.assert_allclose(several, np.stack([expected, 3 * expected]), rtol=0, atol=3 * scale)
     u = T @ q
     np.testing.assert_allclose(K @ u, K.scipy() @ u, rtol=0, atol=scale)
 
