@@ -155,7 +155,7 @@ def _summed(
 ) -> tuple[Ints, Ints, Array]:
     """Return one entry of each equation and block, from terms (k,) of degrees of freedom of blocks."""
     order = np.argsort(row * np.int64(blocks.count) + block, kind="stable")
-    row, dof, weight, block = (x[order] for x in (row, dof, weight, block))
+    row, dof, block, weight = row[order], dof[order], block[order], weight[order]
     (center, size), (node, axis) = blocks.frames, np.divmod(dof, 3)
     begins = np.diff(row, prepend=-1) != 0
     starts = begins | (np.diff(block, prepend=-1) != 0)
