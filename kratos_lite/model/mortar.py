@@ -28,7 +28,7 @@ FACING = 0.5
 """Least cosine of the angle between two cells that meet."""
 SMALL = 1e-9
 """Fraction of its radius by which a cell is not straight, or covered by others."""
-PAIRS = 1000
+PAIRS = 400
 """Pairs of cells that are clipped at a time."""
 OUTLINES: dict[int, list[tuple[int, ...]]] = {
     6: [(0, 3, 5, 5), (3, 1, 4, 4), (5, 4, 2, 2), (3, 4, 5, 5)],
@@ -90,11 +90,12 @@ class Mortar:
 
 def mortar(points: Array, a: Sequence[Block], b: Sequence[Block], tolerance: float | None) -> Mortar:
     """Return what ties surface a to surface b, up to `tolerance` in m away, or `NEAR` if that is None."""
-    from scipy.sparse import coo_array, csr_array
+    from scipy.sparse import coo_array, csr_array, diags_array
 
     every, others = ([Cells(block, points) for block in blocks] for blocks in (a, b))
     nodes = distinct(np.concatenate([cells.nodes.ravel() for cells in every]))
-    D, covered, gap, entries = np.zeros(len(nodes)), 1.0, np.inf, [np.zeros((3, 0))]
+    D, covered, gap, shape = np.zeros(len(nodes)), 1.0, np.inf, (len(nodes), len(points))
+    W: Csr = csr_array(shape)
     for cells in every:
         local = np.searchsorted(nodes, cells.nodes)
         sums, fraction, integrals, closest = _integrals(cells, others, tolerance)
@@ -102,10 +103,8 @@ def mortar(points: Array, a: Sequence[Block], b: Sequence[Block], tolerance: flo
         np.add.at(D, local, sums)
         for i, further, M in integrals:
             rows, columns = np.broadcast_arrays(local[i][:, :, None], further[:, None])
-            entries.append(np.stack([rows.ravel(), columns.ravel(), M.ravel()]))
-    rows, columns, M = np.concatenate(entries, axis=1)
-    at, shape = (rows.astype(int), columns.astype(int)), (len(nodes), len(points))
-    W = csr_array(coo_array((M / np.where(D > 0, D, 1.0)[at[0]], at), shape=shape))
+            W = W + csr_array(coo_array((M.ravel(), (rows.ravel(), columns.ravel())), shape=shape))
+    W = csr_array(diags_array(1 / np.where(D > 0, D, 1.0)) @ W)
     W.data[np.abs(W.data) < 1e-14] = 0.0
     W.eliminate_zeros()
     return Mortar(nodes, D, W, *_transformations(every, nodes), _neighbors(every, nodes), covered, gap)
@@ -113,7 +112,7 @@ def mortar(points: Array, a: Sequence[Block], b: Sequence[Block], tolerance: flo
 
 def _integrals(
     a: Cells, others: Sequence[Cells], tolerance: float | None
-) -> tuple[Array, Array, list[tuple[Ints, Rows, Array]], float]:
+) -> tuple[Array, Array, Iterator[tuple[Ints, Rows, Array]], float]:
     """Return ∫ Ñ dA (m, k), what is covered (m,), and cells, nodes and ∫ Φ N dA of pairs; the least gap."""
     T, (m, k, _), gap = a.transformation(), a.X.shape, np.inf
     mass, area, integrals = np.zeros((m, k, k)), np.zeros(m), []
@@ -129,7 +128,7 @@ def _integrals(
     sums = np.where(fraction[:, None] > SMALL, mass.sum(axis=2), 0.0)  # the functions add up to 1
     mass[fraction <= SMALL] = np.eye(k)
     dual = sums[..., None] * np.linalg.inv(mass)  # Φ = dual Ñ
-    return sums, fraction, [(i, nodes, dual[i] @ M) for i, nodes, M in integrals], gap
+    return sums, fraction, ((i, nodes, dual[i] @ M) for i, nodes, M in integrals), gap
 
 
 def _segments(

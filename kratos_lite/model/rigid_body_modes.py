@@ -16,7 +16,6 @@ from kratos_lite.assembly.sparsity_pattern import dofs_of
 from kratos_lite.mesh import Mesh, components, distinct, with_rows
 from kratos_lite.model.supports import Supports
 from kratos_lite.solvers import direct
-from kratos_lite.solvers.constraints import rigid_modes
 from kratos_lite.typing import Array, Ints
 
 FEW = 40
@@ -148,15 +147,30 @@ def _equations(blocks: RigidBlocks, supports: Supports) -> tuple[Ints, Ints, Arr
     dof = np.concatenate([dof[kept], joint, joint])
     weight = np.concatenate([weight[kept], np.ones(len(joint)), -np.ones(len(joint))])
     block = np.concatenate([block[kept], *(np.repeat(end, 3) for end in ends)])
+    return _summed(blocks, row, block, dof, weight)
+
+
+def _summed(
+    blocks: RigidBlocks, row: Ints, block: Ints, dof: Ints, weight: Array
+) -> tuple[Ints, Ints, Array]:
+    """Return one entry of each equation and block, from terms (k,) of degrees of freedom of blocks."""
+    order = np.argsort(row * np.int64(blocks.count) + block, kind="stable")
+    row, dof, block, weight = row[order], dof[order], block[order], weight[order]
     (center, size), (node, axis) = blocks.frames, np.divmod(dof, 3)
-    R = rigid_modes(blocks.mesh.points[node], center[block]).reshape(-1, 3, 6)[np.arange(len(row)), axis]
-    R[:, 3:] /= size[block, None]
-    R *= weight[:, None]
-    largest = np.full(int(row.max(initial=-1)) + 1, np.finfo(float).tiny)
-    np.maximum.at(
-        largest, row, np.abs(R).max(axis=1)
-    )  # before they are summed up, which leaves less rounding
-    return row, block, R / largest[row, None]
+    begins = np.diff(row, prepend=-1) != 0
+    starts = begins | (np.diff(block, prepend=-1) != 0)
+    at, largest = 6 * (np.cumsum(starts) - 1), np.abs(weight)
+    value = np.bincount(at + axis, weight, 6 * int(starts.sum()))
+    for further, sign in ((1, 1.0), (2, -1.0)):
+        arm, turn = (axis + 3 - further) % 3, (axis + further) % 3  # e_turn × e_arm = sign · e_axis
+        r = (blocks.mesh.points[node, arm] - center[block, arm]) / size[block]
+        moved = weight * r
+        value += np.bincount(at + 3 + turn, sign * moved, len(value))
+        largest = np.maximum(largest, np.abs(moved))
+    # before they are summed up, which leaves less rounding
+    most = np.maximum.reduceat(largest, np.flatnonzero(begins)) if len(row) else largest
+    most = np.maximum(most, np.finfo(float).tiny)[np.cumsum(begins)[starts] - 1]
+    return row[starts], block[starts], value.reshape(-1, 6) / most[:, None]
 
 
 def _free_modes(members: Ints, row: Ints, block: Ints, value: Array) -> Array:
