@@ -3,35 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
 
 import numpy as np
 
 from kratos_lite.analysis.model import Model
 from kratos_lite.analysis.result import Result
 from kratos_lite.verification import fields, scenes
-from kratos_lite.verification.errors import FINE, FINE_OF_SMOOTH, norms
+from kratos_lite.verification.errors import FINE, FINE_OF_SMOOTH, energy_norm, l2_norm
 from kratos_lite.verification.meshes import is_quadratic, kind_of
 from kratos_lite.verification.problem import Models, Of, Problem
 
-DISPLACEMENT, ENERGY = 0, 1
+Norm = Callable[..., float]
+"""`l2_norm` or `energy_norm`."""
 CELLS = {"tetrahedron": (12, 6), "pyramid": (8, 4), "wedge": (8, 4), "hexahedron": (8, 6)}
 """Bricks along an edge of the finer mesh, for linear and for quadratic elements; 8 for the 20-node brick."""
 
 
-def error_of(field: fields.Field, norm: int = DISPLACEMENT) -> Callable[[Result], float]:
+def error_of(field: fields.Field, norm: Norm = l2_norm) -> Callable[[Result], float]:
     """Return a function: the relative error of a result in a norm."""
-    return lambda result: _norms(field, result)[norm]
-
-
-@lru_cache(maxsize=2)
-def _norms(field: fields.Field, result: Result) -> tuple[float, float]:
-    """Return both norms: rows of the two share them."""
     fine = FINE_OF_SMOOTH if field is fields.manufactured else FINE
-    return norms(field, result.mesh.points, result.groups, result.u, fine)
+    return lambda result: norm(field, result.mesh.points, result.groups, result.u, fine)
 
 
-def order_of(field: fields.Field, norm: int) -> Callable[[Result, Result], float]:
+def order_of(field: fields.Field, norm: Norm) -> Callable[[Result, Result], float]:
     """Return a function: the order of the error between two results, the second with half the cells' size."""
     error = error_of(field, norm)
     return lambda coarse, fine: float(np.log2(error(coarse) / error(fine)))
@@ -56,19 +50,19 @@ def _is_plain_quadratic(kind: str) -> bool:
     return is_quadratic(kind) and kind_of(kind).formulation == "standard"
 
 
-def _problem(word: str, norm: int, degree: int) -> Problem:
+def _problem(word: str, norm: Norm, degree: int) -> Problem:
     linear = degree == 1
     takes: Of = (lambda kind: kind_of(kind).shape.degree < 2) if linear else _is_plain_quadratic
-    what, order = ("displacement", degree + 1) if norm == DISPLACEMENT else ("energy", degree)
+    what, order = ("displacement", degree + 1) if norm is l2_norm else ("energy", degree)
     return Problem(
         f"order/{word}_{what}_{'linear' if linear else 'quadratic'}",
-        f"order of the error of {'u (L2 norm)' if norm == DISPLACEMENT else 'σ (energy norm)'}, "
+        f"order of the error of {'u (L2 norm)' if norm is l2_norm else 'σ (energy norm)'}, "
         f"manufactured solution, {word} cells",
         "Roache", float(order), MESHES[word], order_of(fields.manufactured, norm), 0.15 / order, takes=takes,
     )  # fmt: skip
 
 
 PROBLEMS: list[Problem] = [
-    _problem(word, norm, degree) for degree in (1, 2) for word in MESHES for norm in (DISPLACEMENT, ENERGY)
+    _problem(word, norm, degree) for degree in (1, 2) for word in MESHES for norm in (l2_norm, energy_norm)
 ]
 """The rows of this family."""

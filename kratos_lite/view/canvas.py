@@ -64,6 +64,8 @@ def without_frame(axes: Any) -> Any:
     """Return axes, now without ticks, in which a metre to the right is one upwards."""
     axes.set_aspect("equal")
     axes.axis("off")
+    for axis in (axes.xaxis, axes.yaxis):  # else the place of a title takes the sizes of ticks that are off
+        axis.set_visible(False)
     return axes
 
 
@@ -293,8 +295,10 @@ def polygons(axes: Any, corners: Array, colors: Array, widths: Any = 0.45, zorde
     from matplotlib.collections import PolyCollection
 
     flat: Any = corners
-    style: Any = {"facecolors": colors, "edgecolors": colors, "linewidths": widths, "zorder": zorder}
-    return axes.add_collection(PolyCollection(flat, **style), autolim=False)
+    style: Any = {"facecolors": colors, "edgecolors": colors, "zorder": zorder}
+    drawn = axes.add_collection(PolyCollection(flat, **style), autolim=False)
+    drawn.set_linewidth(widths)  # once: where it is made, matplotlib takes widths and dashes one by one twice
+    return drawn
 
 
 def lines(axes: Any, ends: Array) -> Any:

@@ -78,7 +78,7 @@ def _laid_out(
     """Return figure and axes; `inch` is that many m in the picture."""
     low, high = scene.window
     size = (high - low) / inch
-    figure = canvas.empty((20, 20), layout=None)
+    figure = canvas.empty((1, 1), layout=None)  # until all is there
     panels: list[Any] = []
     for _ in scene.subjects:
         axes = canvas.without_frame(canvas.axes_in_inches(figure, (0, 0), size))

@@ -61,7 +61,7 @@ def _laid_out(
     path: Path, rows: Array, window: tuple[Array, Array], inch: float, title: str
 ) -> tuple[Any, list[Any]]:
     """Return the figure with all but the body; `inch` is that many m in the picture."""
-    figure = canvas.empty((20, 20), layout=None)
+    figure = canvas.empty((1, 1), layout=None)  # until all is there
     size = (window[1] - window[0]) / inch
     axes = canvas.without_frame(canvas.axes_in_inches(figure, (0, 0), size))
     axes.set(xlim=(window[0][0], window[1][0]), ylim=(window[0][1], window[1][1]))

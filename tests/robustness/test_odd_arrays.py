@@ -15,7 +15,7 @@ import kratos_lite as kl
 ROCK = kl.Isotropic3D(E=1e9, nu=0.3, density=2000.0, alpha=1e-5)
 BRICK = kl.KinematicLinear3D8N
 BALL = kl.MassProperties(2.0, np.eye(3))
-CUBE, WHEEL = kl.box(), kl.annulus(0.5, 1.0, 0.2, (1, 12, 1), BRICK.__name__)
+CUBE, WHEEL = kl.box(element=BRICK.__name__), kl.annulus(0.5, 1.0, 0.2, (1, 12, 1), BRICK.__name__)
 VECTOR, POINT = (0.1, -0.2, 0.3), (0.5, 0.5, 0.75)
 INPUT = re.compile(r"ArrayLike|Where|Points|Sequence\[(int|float)\]|OfPlace|Factor|At\b")
 """Annotations of what users give; others are of arrays that the library makes."""
