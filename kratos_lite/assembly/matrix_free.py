@@ -86,9 +86,13 @@ class MatrixFree:
         product: Array = self.product.times(np.ascontiguousarray(x, dtype=float), self.tied)
         return product if self.mass is None else product + self.mass[0] * self.mass[1](x)
 
+    @cached_property
+    def _norm(self) -> float:
+        return float(self.product.norm())
+
     def norm(self) -> float:
         """Return the largest row sum of |K| over the nodes of an element at the stiffest node."""
-        return float(self.product.norm())
+        return self._norm
 
     def scipy(self) -> Bsr:
         """Return the matrix itself, made now."""
