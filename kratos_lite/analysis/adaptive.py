@@ -48,7 +48,7 @@ BULK, BULK_FAR, FAR = 0.75, 0.85, 3.0
 GROWTH = 1.2  # how many times more elements the next mesh has at least
 FLAT = 0.05
 """Fraction of the requested error that the stress may vary along a direction in which nothing is cut."""
-ROUGH, ROUGH_FRACTION = 1e-4, 1e-2
+ROUGH, ROUGH_FRACTION = 1e-3, 3e-2
 """Relative residual of the meshes on the way at most, and as a fraction of the requested error."""
 FAIR = 1e-3  # fraction of the forces that such a mesh may miss to equilibrium; beyond it is solved in full
 STEPS = 25  # meshes after which the accuracy counts as out of reach

@@ -87,9 +87,13 @@ class MatrixFree:
 
     __matmul__ = times
 
+    @cached_property
+    def _norm(self) -> float:
+        return float(self.product.norm())
+
     def norm(self) -> float:
         """Return the largest row sum of |K| over the nodes of an element at the stiffest node."""
-        return float(self.product.norm())
+        return self._norm
 
     def scipy(self) -> Bsr:
         """Return the matrix itself, made now."""

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from kratos_lite.mesh.hanging import HangingNodes
 
 FAR, SLAB = 5.0, 3.0
-"""Mean way from a node to the next above which nodes get an order, and the slabs of that, in spacings."""
+"""From the first to the last node of an element in layers of nodes, above which on average nodes get an
+order; the slabs of that in spacings."""
 NO_MATRIX = "the stiffness matrix, as its products are computed element by element"
 """What is skipped with linear elements inside the quadratic ones."""
 
@@ -201,20 +202,23 @@ def renumber(
     for group in groups:
         used[group.nodes] = True
     nodes = np.flatnonzero(used)
-    if ordered and (order := in_slabs(points[nodes])) is not None:
-        nodes = nodes[order]
+    if ordered and _mean_span(groups) > FAR * len(nodes) ** (2 / 3):
+        nodes = nodes[in_slabs(points[nodes])]
     elif len(nodes) == len(points):
         return nodes, list(groups)
     number[nodes] = np.arange(len(nodes))
     return nodes, [replace(group, nodes=number[group.nodes]) for group in groups]
 
 
-def in_slabs(points: Array) -> Ints | None:
-    """Return an order of points (n, 3) by slabs across the longest axis and rows in these, if needed."""
+def _mean_span(groups: Sequence[ElementGroup]) -> float:
+    """Return how far the nodes of an element are apart in their order, on average."""
+    return sum(float(np.ptp(group.nodes, axis=1).sum()) for group in groups) / sum(map(len, groups))
+
+
+def in_slabs(points: Array) -> Ints:
+    """Return an order of points (n, 3) by slabs across the longest axis and rows in these."""
     low, size = points.min(axis=0), np.ptp(points, axis=0)
     spacing = (np.prod(size) / len(points)) ** (1 / 3)
-    if np.linalg.norm(np.diff(points, axis=0), axis=1).mean() <= FAR * spacing:
-        return None
     short, *others = np.argsort(size)
     slabs = (points[:, others] - low[others]) // (SLAB * spacing)
     return np.lexsort((points[:, short], *slabs.T))

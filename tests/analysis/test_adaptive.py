@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
+from kratos_lite.analysis.adaptive import ROUGH, ROUGH_FRACTION
 from kratos_lite.analysis.adaptive_levels import Level
+from kratos_lite.assembly.gauss_point_fields import totals
 from kratos_lite.io.writers.results import summary
 from kratos_lite.verification import scenes
 from kratos_lite.verification.concentrations import hole
@@ -239,6 +241,30 @@ def test_edges_and_a_corner_take_few_unknowns_and_more_for_less_error():
         needed.append(report.unknowns)
     assert needed == sorted(needed)
     assert needed[-1] <= 1.3 * 23_070
+
+
+def test_nodes_of_a_refined_mesh_are_solved_for_near_those_of_the_same_elements():
+    """New nodes stand behind all others, far from those that share an element: products wait for memory."""
+    result = fichera().solve(error=0.1)
+    analysis = kl.Model.static(result._analysis.model)
+    analysis.solve()
+    (group,), (block,) = analysis.system.groups, result.mesh.blocks
+    assert np.ptp(group.nodes, axis=1).mean() < np.ptp(block.nodes, axis=1).mean() / 2
+    again = analysis.solve()
+    assert np.abs(again.u - result.u).max() < 1e-8 * np.abs(result.u).max()
+
+
+def test_meshes_on_the_way_are_solved_far_better_than_they_can_be_right():
+    """What a rough solution lacks is a small part of the error of its mesh, and of its estimate."""
+    model, aim = fichera(), 0.1
+    steps = model.solve(error=aim)
+    rough = kl.Model.static(steps._analysis.model)
+    full = rough.solve()
+    near = rough.solve(start=0.9 * full.u, tolerance=min(ROUGH, ROUGH_FRACTION * aim))
+    assert 0 < near.report.iterations < full.report.iterations / 2
+    lacking = 2 * totals(near.mesh.points, near.groups, near.u - full.u)[0]
+    assert lacking < (0.05 * full.error().absolute) ** 2
+    assert np.isclose(near.error().absolute, full.error().absolute, rtol=0.01)
 
 
 def test_where_there_is_no_room_the_best_mesh_is_returned_with_what_it_would_take():
