@@ -122,10 +122,10 @@ def _problem(
     if rigid.shape[2]:
         R = np.ascontiguousarray(rigid.reshape(3 * len(rigid), -1).T)
         R = np.linalg.solve(np.linalg.cholesky(R @ M(R).T), R)
-        R[:, constraints.held] = 0.0
+        R[:, constraints.constrained] = 0.0
         known = R, times_M(R)
     operators = times_K, times_M, _preconditioner(constraints, firm)
-    return Problem(len(constraints.c), *operators, norms, known, held=constraints.held)
+    return Problem(len(constraints.c), *operators, norms, known, constrained=constraints.constrained)
 
 
 def _coarse(e: EquationsOfMotion, firm: LinearSolver, rigid: Array) -> tuple[Problem, Operator] | None:
@@ -143,7 +143,7 @@ def _coarse(e: EquationsOfMotion, firm: LinearSolver, rigid: Array) -> tuple[Pro
 
     def onto_all(X: Array) -> Array:
         out = np.stack([(P @ x.reshape(-1, 3)).ravel() for x in X])
-        out[:, fine.held] = 0.0
+        out[:, fine.constrained] = 0.0
         return out
 
     return problem, onto_all
@@ -162,7 +162,7 @@ def _preconditioner(constraints: ConstraintMap, firm: LinearSolver) -> Operator:
 
     def precondition(r: Array) -> Array:
         r = r.copy()
-        r[:, firm.constraint_map.held] = 0.0
+        r[:, firm.constraint_map.constrained] = 0.0
         return firm.precondition(r)
 
     return precondition
@@ -174,7 +174,7 @@ def _product(constraints: ConstraintMap, times: Operator) -> Operator:
 
         def product(X: Array) -> Array:
             Y = times(X)
-            Y[:, constraints.held] = 0.0
+            Y[:, constraints.constrained] = 0.0
             return Y
 
         return product
@@ -319,8 +319,8 @@ def _largest(
     times_H, times_K = (_product(constraints, A.times) for A in (H, solver))
     norms = H.norm(), solver.norm
     operators = lambda X: -times_H(X), times_K, solver.precondition
-    held, size = constraints.held, len(constraints.c)
-    problem = Problem(size, *operators, norms, power=2, tolerance=tolerance, held=held)
+    size, constrained = len(constraints.c), constraints.constrained
+    problem = Problem(size, *operators, norms, power=2, tolerance=tolerance, constrained=constrained)
     values, vectors = problem.lowest(count)
     return -values, vectors[:, constraints.free].T
 

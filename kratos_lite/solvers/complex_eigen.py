@@ -153,12 +153,10 @@ class Pencil:
             if not wrong.any():
                 return values[:wanted], X.reshape(2, p, -1)[:, :wanted].reshape(2 * wanted, -1)
             W, size = W[np.tile(wrong, 2) & (of_parts > np.tile(limits, 2) / 2)], Y.shape[1]
-            if (
-                size + len(W) > room and space.lowest > -SMALL * squares.max()
-            ):  # else these are not the lowest
-                y = y @ space.keep(
-                    np.vstack([_parts(Y), np.pad(before, ((0, 0), (0, size - before.shape[1])))])
-                )
+            # without room only the lowest stay, which these are not before all squares are positive
+            if size + len(W) > room and space.lowest > -SMALL * squares.max():
+                kept = [_parts(Y), np.pad(before, ((0, 0), (0, size - before.shape[1])))]
+                y = y @ space.keep(np.vstack(kept))
             before = _parts(y)
             k, MW = rest.independent(W, space.V, space.S[1, : len(space.V)])
         raise not_converged(count)

@@ -114,7 +114,7 @@ class ConstraintMap:
         return is_free
 
     @cached_property
-    def held(self) -> Ints:
+    def constrained(self) -> Ints:
         """The degrees of freedom that are not free, ascending."""
         return np.flatnonzero(~self.is_free)
 

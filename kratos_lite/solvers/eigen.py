@@ -152,7 +152,7 @@ def dense_modes(K: Array, M: Array, count: int) -> tuple[Array, Array]:
 class Problem:
     """K x = λ M x of n components, K positive beside the span of known vectors, where λ is 0.
 
-    Vectors are rows of arrays (k, n), 0 at components that are held: so products need no copies of them.
+    Vectors are rows of arrays (k, n), 0 at constrained components, so that products need no copies.
     """
 
     n: int
@@ -166,7 +166,7 @@ class Problem:
     coarse: tuple[Problem, Operator] | None = None  # equations of fewer components, and from these to all
     wanted: int = 1  # vectors of a block that are found to `tolerance`, the others to ROUGH
     tolerance: float = TOLERANCE  # relative error of λ
-    held: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))  # components that are 0
+    constrained: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))  # components that are 0
 
     def lowest(self, count: int) -> tuple[Array, Array]:
         """Return the lowest λ (count,) beside the known ones, ascending, and x (count, n), x M x^T = 1."""
@@ -210,8 +210,8 @@ class Problem:
 
     @property
     def free(self) -> Ints:
-        """The components (q,) that are not held."""
-        return np.delete(np.arange(self.n), self.held)
+        """The components (q,) that are not constrained."""
+        return np.delete(np.arange(self.n), self.constrained)
 
     def roughly(self, count: int) -> Array:
         """Return vectors (count, n) near the lowest modes, those of the coarse level if there is one."""

@@ -128,7 +128,7 @@ class LinearSolver:
         if self._without_means is not None:
             return self._without_means.precondition(r)
         out = self._multigrid.precondition(r)
-        out[:, self.constraint_map.held] = 0.0
+        out[:, self.constraint_map.constrained] = 0.0
         return out
 
     def linear_level(self) -> tuple[LinearSolver, PCoarseLevel] | None:

@@ -397,7 +397,7 @@ def test_an_approximate_inverse_is_one(method):
     r = np.zeros((1, len(system.constraint_map.c)))
     r[0, free] = solver.times(system.constraint_map.transform(q)[None])[0, free]
     z = solver.precondition(r)
-    assert not z[0, system.constraint_map.held].any()
+    assert not z[0, system.constraint_map.constrained].any()
     r, z = r[0, free], z[0, free]
     assert 0.3 < (r @ z) / (r @ q) < (1 + 1e-9 if method != "amg" else 1.5)
     if method != "amg":
