@@ -1,17 +1,18 @@
 """Centers: the nodes in the middle of edges, faces and cells, known by the corners around them.
 
-Whatever makes an element quadratic or cuts it into smaller ones puts nodes there, so that two elements
-agree on a node if they agree on the corners of what they share.
+Whatever makes an element quadratic or cuts it into smaller ones puts nodes there.  Two elements agree on a
+node if they agree on the corners of what they share, also where they cut that in different ways: nodes have
+numbers, and that of a middle is the mean of those around it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from kratos_lite.mesh.blocks import NO_ROWS, Block
+from kratos_lite.mesh.blocks import NO_ROWS
 from kratos_lite.registry import remembered
 from kratos_lite.shapes import LINEAR, Shape
 from kratos_lite.typing import Array, Ints, Mask, Rows
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 Keys: TypeAlias = "NDArray[np.uint64]"
+PRIME, BITS = np.uint64(2**61 - 1), np.uint64(61)
+"""Means are exact in integers modulo this prime: eight fit into 64 bits, and halving turns the bits."""
+HALVINGS = 60  # levels of edges inside edges at most: halving a number of 53 bits more often changes nothing
 
 
 def mixed(x: Keys) -> Keys:
@@ -77,16 +81,33 @@ def raise_order(points: Array, corners: Ints, shape: type[Shape]) -> tuple[Array
 class Centers:
     """Which node lies in the middle of which corners."""
 
-    def __init__(self, blocks: Iterable[Block] = ()) -> None:
+    def __init__(self, n_nodes: int = 0, known: Sequence[tuple[Ints | Rows, Ints | Rows]] = ()) -> None:
+        """Take up middles: corners (k, c) around nodes (k,), which may be corners of others."""
         self._keys: Keys = np.zeros(0, dtype=np.uint64)
         self._nodes: Ints = NO_ROWS
-        for block in blocks:
-            shape = block.shape
-            if shape is None or not len(block):
-                continue
-            for node, around in enumerate(surroundings(shape), start=shape.corners):
-                self.add(keys_of(block.nodes[:, list(around)]), block.nodes[:, node])
+        self._numbers: Keys = mixed(np.arange(n_nodes, dtype=np.uint64)) % PRIME
+        for _ in range(HALVINGS):
+            keys, before = [self.middle(corners) for corners, _ in known], self._numbers.copy()
+            for (_, nodes), numbers in zip(known, keys, strict=True):
+                self._numbers[nodes] = numbers
+            if (self._numbers == before).all():
+                break
+        for (_, nodes), numbers in zip(known, keys, strict=True):
+            self.add(numbers, nodes)
         self.sort()
+
+    @property
+    def n_nodes(self) -> int:
+        """How many nodes there are, with those that were made."""
+        return len(self._numbers)
+
+    def middle(self, corners: Ints | Rows) -> Keys:
+        """Return the number of the node in the middle of 2, 4 or 8 corners (..., c)."""
+        total = self._numbers[corners].sum(axis=-1, dtype=np.uint64)
+        halvings = np.uint64(corners.shape[-1].bit_length() - 1)
+        total = (total & PRIME) + (total >> BITS)
+        total -= np.where(total >= PRIME, PRIME, np.uint64(0))
+        return (total >> halvings) | ((total << (BITS - halvings)) & PRIME)
 
     def add(self, keys: Keys, nodes: Ints | Rows) -> None:
         """Take up nodes (k,) by the keys (k,) of their corners; `find` needs `sort` first."""
@@ -105,11 +126,12 @@ class Centers:
         at = np.minimum(np.searchsorted(self._keys, keys), len(self._keys) - 1)
         return np.where(self._keys[at] == keys, self._nodes[at], -1)
 
-    def make(self, keys: Keys, first: int) -> Ints:
-        """Give new nodes, from number `first` on, to keys (k,) that have none; return which they are."""
+    def make(self, keys: Keys) -> Ints:
+        """Give new nodes to keys (k,) that have none; return which they are."""
         missing = np.flatnonzero(self.find(keys) < 0)
         _, at = np.unique(keys[missing], return_index=True)
         new: Ints = missing[np.sort(at)]
-        self.add(keys[new], first + np.arange(len(new)))
+        self.add(keys[new], self.n_nodes + np.arange(len(new)))
+        self._numbers = np.concatenate([self._numbers, keys[new]])
         self.sort()
         return new

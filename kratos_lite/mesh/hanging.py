@@ -14,10 +14,10 @@ import numpy as np
 
 from kratos_lite.errors import MeshError
 from kratos_lite.mesh.blocks import Block, ranges, with_rows
-from kratos_lite.mesh.centers import Centers, Keys, are_among, keys_of, sorted_keys
+from kratos_lite.mesh.centers import Centers, Keys, are_among, keys_of, sorted_keys, surroundings
 from kratos_lite.shapes import Shape
 from kratos_lite.shapes.faces import FACE_SHAPES, Line2, Line3
-from kratos_lite.typing import Array, Ints, Mask
+from kratos_lite.typing import Array, Ints, Mask, Rows
 
 Hanging: TypeAlias = "tuple[Ints, Ints, Array, int]"
 """Hanging nodes (h,), their independents (h, k) and weights (k,), and `HangingNodes.around`."""
@@ -152,7 +152,7 @@ class Split:
             candidates.append((self.middles[:, -1], corners.mean(axis=0), shape.corners))
         if len(shape.nodes) > shape.corners:
             for child, columns in zip(self.children(), self._columns, strict=True):
-                candidates.append((centers.find(keys_of(child)), places[columns].mean(axis=0), 0))
+                candidates.append((centers.find(centers.middle(child)), places[columns].mean(axis=0), 0))
         for nodes, xi, around in candidates:
             there = nodes >= 0
             if there.any() and np.abs(shape.nodes - xi).max(axis=1).min() > 1e-9:
@@ -167,7 +167,7 @@ def split_edges(blocks: Sequence[Block], centers: Centers, corner: Mask) -> Iter
             continue
         beside = _beside_smaller(block, corner)
         pairs = block.nodes[beside][:, np.array(shape.edges)].astype(np.int64)
-        middle = centers.find(keys_of(pairs))
+        middle = centers.find(centers.middle(pairs))
         cell, edge = np.nonzero((middle >= 0) & corner[middle])
         ends, m, cells = pairs[cell, edge], middle[cell, edge][:, None], at.start + beside[cell]
         if len(shape.nodes) > shape.corners:
@@ -188,11 +188,11 @@ def split_faces(blocks: Sequence[Block], centers: Centers, corner: Mask, existin
             shape_of_face = FACE_SHAPES[len(face)]
             nodes = cells_of_block[:, list(face)]
             around = nodes[:, np.array(shape_of_face.edges)]
-            middles = centers.find(keys_of(around))
+            middles = centers.find(centers.middle(around))
             ends = (middles >= 0) & corner[middles]
             whole = ends.all(axis=1)
             if shape_of_face.corners == 4:
-                own = centers.find(keys_of(nodes[:, :4]))
+                own = centers.find(centers.middle(nodes[:, :4]))
                 whole &= (own >= 0) & corner[own]
                 middles = np.column_stack([middles, own])
             cells = np.flatnonzero(whole)
@@ -260,16 +260,20 @@ def _joined(hanging: Sequence[Hanging], large: list[Keys], small: list[Keys]) ->
     )
 
 
-def known_centers(blocks: Sequence[Block], hanging: HangingNodes | None) -> Centers:
+def known_centers(blocks: Sequence[Block], hanging: HangingNodes | None, n_nodes: int) -> Centers:
     """Return the nodes in the middle of edges, faces and cells of a mesh, those that hang there too."""
-    centers = Centers(blocks)
+    known: list[tuple[Ints | Rows, Ints | Rows]] = [
+        (block.nodes[:, list(around)], block.nodes[:, node])
+        for block in blocks
+        if block.shape is not None and len(block)
+        for node, around in enumerate(surroundings(block.shape), start=block.shape.corners)
+    ]
     if hanging is not None:
-        for around in (2, 4):
-            chosen = np.flatnonzero(hanging.around == around)
-            corners = hanging.independents[hanging.start[chosen][:, None] + np.arange(around)]
-            centers.add(keys_of(corners), hanging.nodes[chosen])
-        centers.sort()
-    return centers
+        for size in (2, 4):
+            chosen = np.flatnonzero(hanging.around == size)
+            corners = hanging.independents[hanging.start[chosen][:, None] + np.arange(size)]
+            known.append((corners, hanging.nodes[chosen]))
+    return Centers(n_nodes, known)
 
 
 def is_corner(blocks: Iterable[Block], n_nodes: int) -> Mask:

@@ -15,7 +15,7 @@ from kratos_lite.mesh.hanging import hanging_nodes
 from kratos_lite.mesh.mesh import Mesh
 from kratos_lite.mesh.refined_mesh import RefinedMesh
 from kratos_lite.mesh.subdivision import Child
-from kratos_lite.shapes import LINEAR, Shape
+from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array, Ints
 
 Target: TypeAlias = "Callable[[Block, str], tuple[str, type[Shape]]]"
@@ -68,7 +68,6 @@ class CellRefiner:
 
     def __init__(self, mesh: Mesh, centers: Centers, target: Target) -> None:
         self.mesh, self.centers, self.target = mesh, centers, target
-        self._n_nodes = mesh.n_nodes
         self._elements, self._conditions = _Cells(mesh.blocks), _Cells(mesh.conditions)
         self._sources: list[tuple[Ints, Array]] = []
         self._inside: list[Keys] = [np.zeros(0, dtype=np.uint64)]
@@ -93,7 +92,7 @@ class CellRefiner:
             nodes = np.stack([corners[i] for i in chosen], axis=1)
             if around := surroundings(shape):
                 places = np.stack([children[i].places(shape)[shape.corners :] for i in chosen])
-                keys = np.stack([keys_of(nodes[:, :, list(among)]) for among in around], axis=2)
+                keys = np.stack([self.centers.middle(nodes[:, :, list(among)]) for among in around], axis=2)
                 middles = self._nodes(block, cells, keys, places.reshape(-1, places.shape[2]))
                 nodes = np.concatenate([nodes, middles], axis=2)
             parents = np.repeat(cells, len(chosen))
@@ -110,7 +109,7 @@ class CellRefiner:
         at = dict(zip(of_places, places, strict=True))
         nodes: dict[tuple[int, ...], Ints] = {around: old[:, around[0]] for around in at if len(around) == 1}
         if inner := [around for around in at if len(around) > 1]:
-            keys = np.stack([keys_of(old[:, list(around)]) for around in inner], axis=1)
+            keys = np.stack([self.centers.middle(old[:, list(around)]) for around in inner], axis=1)
             middles = self._nodes(block, cells, keys, np.array([at[around] for around in inner]))
             nodes.update((around, middles[:, i]) for i, around in enumerate(inner))
         each = iter(of_places)
@@ -119,9 +118,7 @@ class CellRefiner:
     def _nodes(self, block: Block, cells: Ints, keys: Keys, places: Array) -> Ints:
         """Return the nodes of keys (m, ...) at places (p, d) in each cell; new ones are made."""
         shape = block.known_shape
-        self._recognize(block, cells, keys, places)
-        new = self.centers.make(keys.ravel(), self._n_nodes)
-        self._n_nodes += len(new)
+        new = self.centers.make(keys.ravel())
         cell, place = np.divmod(new, len(places))
         nodes, weights = block.nodes[cells[cell]].astype(np.int64), shape.N(places)
         self._sources.append((nodes, np.where(np.abs(weights) < 1e-14, 0.0, weights)[place]))
@@ -132,23 +129,11 @@ class CellRefiner:
         self._inside.append(inside)
         return self.centers.find(keys)
 
-    def _recognize(self, block: Block, cells: Ints, keys: Keys, places: Array) -> None:
-        """Let nodes in the middle of edges, faces or cells be those that the cells have there already."""
-        keys, weights = keys.reshape(len(cells), len(places)), LINEAR[block.known_shape.cell].N(places)
-        for column, around in enumerate(corners_around(block.known_shape.cell, places)):
-            if len(around) < 4 or np.abs(weights[column].max() * len(around) - 1) > 1e-9:
-                continue
-            own = self.centers.find(keys_of(block.nodes[cells][:, list(around)]))
-            known = (own >= 0) & (self.centers.find(keys[:, column]) < 0)
-            if known.any():
-                self.centers.add(keys[known, column], own[known])
-                self.centers.sort()
-
     def refined_mesh(self, elements: Cuts, conditions: Cuts) -> RefinedMesh:
         """Return the refined mesh by the cuts of elements and of conditions."""
         self._refine(self.mesh.blocks, self._elements, elements)
         self._refine(self.mesh.conditions, self._conditions, conditions)
-        blocks, n = self._elements.blocks(), self._n_nodes
+        blocks, n = self._elements.blocks(), self.centers.n_nodes
         start, nodes, weights = _compressed(self._sources)
         old = self.mesh
         first = int(old.node_ids.max(initial=0)) + 1

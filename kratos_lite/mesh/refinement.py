@@ -6,7 +6,7 @@ points and nodal values follow the isoparametric map of the cell that they are m
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from kratos_lite.shapes.hexahedra import Hexahedron20
 from kratos_lite.shapes.pyramids import Pyramid13
 from kratos_lite.shapes.tetrahedra import Tetrahedron4, Tetrahedron10
 from kratos_lite.shapes.wedges import Wedge15
-from kratos_lite.typing import Array, ArrayLike, Ints, Mask
+from kratos_lite.typing import Array, ArrayLike, Ints, Mask, Rows
 from kratos_lite.validation import finite
 
 QUADRATIC: dict[str, type[Shape]] = {
@@ -39,18 +39,18 @@ def refine(mesh: Mesh, elements: ArrayLike | None = None, keep: ArrayLike | None
     """Return a mesh in which elements are cut into smaller ones of the same type.
 
     A hexahedron, tetrahedron or wedge gives 8, a pyramid 6 and 4 tetrahedra.  Where a neighbor stays as it
-    is, nodes hang: they take what its edge or face interpolates.
+    is, nodes hang: they take what its edge or face interpolates.  Edges along the direction `keep` (3,) stay
+    whole, but those of elements beside which such an edge is cut already.
     """
     marked = mask_of(mesh.elements(elements), mesh.n_elements)
-    centers = hanging.known_centers(mesh.blocks, mesh.hanging)
-    if mesh.hanging is not None:
-        marked = _closed(mesh, centers, marked)
+    centers = hanging.known_centers(mesh.blocks, mesh.hanging, mesh.n_nodes)
     refiner = CellRefiner(mesh, centers, _target)
     direction = None if keep is None else finite(keep, "keep", (3,), error=MeshError)
-    cut = _cut_entities(mesh, marked)
+    marked, axes = _closed(mesh, centers, marked, direction)
+    cut, whole = _cut_entities(mesh, marked), _cut_entities(mesh, marked & (axes < 0))
     return refiner.refined_mesh(
-        lambda block, at: _cuts(mesh, block, np.flatnonzero(marked[at]), direction),
-        lambda block, at: _condition_cuts(mesh, block, cut, direction),
+        lambda block, at: _cuts(mesh, block, np.flatnonzero(marked[at]), axes[at][marked[at]]),
+        lambda block, at: _condition_cuts(mesh, block, cut, whole, direction),
     )
 
 
@@ -73,16 +73,35 @@ def axes_along(mesh: Mesh, block: Block, direction: Array) -> Ints:
     steps = np.ptp(shape.nodes[pairs], axis=1) > 0
     for axis in (2,) if shape.cell == "wedge" else range(shape.nodes.shape[1]):
         ends = pairs[steps[:, axis] & (steps.sum(axis=1) == 1)]
-        edges = mesh.points[block.nodes[:, ends[:, 1]]] - mesh.points[block.nodes[:, ends[:, 0]]]
-        across = np.linalg.norm(np.cross(edges, direction), axis=-1)
-        length = np.linalg.norm(edges, axis=-1) * np.linalg.norm(direction)
-        axes[(across <= 1e-6 * length).all(axis=1)] = axis
+        axes[_are_along(mesh, block.nodes[:, ends], direction).all(axis=1)] = axis
     return axes
 
 
-def _cuts_across(mesh: Mesh, block: Block, cells: Ints, direction: Array) -> list[Cut]:
-    """Return cells of a block with the children that they are cut into, edges along a direction kept."""
-    axes = axes_along(mesh, block.take(cells), direction)
+def _are_along(mesh: Mesh, ends: Ints | Rows, direction: Array) -> Mask:
+    """Return which edges, from one of two nodes (..., 2) to the other, are along a direction (3,)."""
+    edges = mesh.points[ends[..., 1]] - mesh.points[ends[..., 0]]
+    off = np.linalg.norm(np.cross(edges, direction), axis=-1)
+    return np.asarray(off <= 1e-6 * np.linalg.norm(edges, axis=-1) * np.linalg.norm(direction))
+
+
+def _kept_axes(mesh: Mesh, marked: Mask, direction: Array | None) -> Ints:
+    """Return the axis (m,) of each marked element along a direction, or -1 without one."""
+    axes = np.full(mesh.n_elements, -1)
+    for block, at in with_rows(mesh.blocks):
+        cells = np.flatnonzero(marked[at])
+        if not len(cells):
+            continue
+        if block.shape is None or block.shape.nodes.shape[1] != 3:
+            raise MeshError(f"{mesh.place(block, int(cells[0]))}: cells of this type cannot be refined")
+        if direction is not None:
+            axes[at.start + cells] = along = axes_along(mesh, block.take(cells), direction)
+            if (along < 0).any():
+                raise MeshError(f"block {block.name}: not every element has edges along {direction.tolist()}")
+    return axes
+
+
+def _cuts_across(block: Block, cells: Ints, axes: Ints) -> list[Cut]:
+    """Return those cells of a block that keep an axis with the children that they are cut into."""
     return [
         (cells[axes == axis], across(block.known_shape.cell, axis))
         for axis in range(3)
@@ -90,60 +109,77 @@ def _cuts_across(mesh: Mesh, block: Block, cells: Ints, direction: Array) -> lis
     ]
 
 
-def _cuts(mesh: Mesh, block: Block, cells: Ints, direction: Array | None) -> list[Cut]:
-    """Return cells of a block with the children that they are cut into."""
+def _cuts(mesh: Mesh, block: Block, cells: Ints, axes: Ints) -> list[Cut]:
+    """Return cells of a block, which keep an axis or none, with the children that they are cut into."""
+    cuts, cells = _cuts_across(block, cells, axes), cells[axes < 0]
     if not len(cells):
-        return []
-    if block.shape is None or block.shape.nodes.shape[1] != 3:
-        raise MeshError(f"{mesh.place(block, int(cells[0]))}: cells of this type cannot be refined")
-    if direction is not None:
-        if (axes_along(mesh, block.take(cells), direction) < 0).any():
-            raise MeshError(f"block {block.name}: not every element has edges along {direction.tolist()}")
-        return _cuts_across(mesh, block, cells, direction)
-    if block.shape.cell != "tetrahedron":
-        return [(cells, child_cells(block.shape.cell))]
+        return cuts
+    if block.known_shape.cell != "tetrahedron":
+        return [*cuts, (cells, child_cells(block.known_shape.cell))]
     shortest = shortest_diagonal(mesh.points[block.nodes[cells, :4]])
     along = [(cells[shortest == diagonal], child_cells("tetrahedron", diagonal)) for diagonal in range(3)]
     return [cut for cut in along if len(cut[0])]
 
 
-def _condition_cuts(mesh: Mesh, block: Block, cut: Keys, direction: Array | None) -> list[Cut]:
-    """Return likewise the conditions on edges and faces that are cut."""
+def _condition_cuts(mesh: Mesh, block: Block, cut: Keys, whole: Keys, direction: Array | None) -> list[Cut]:
+    """Return likewise the conditions on edges and faces that are cut, or cut as a whole."""
     shape = block.shape
     if shape is None or shape.cell == "point" or not len(block):
         return []
-    cells = np.flatnonzero(are_among(keys_of(block.nodes[:, : shape.corners]), cut))
-    cuts = []
-    if direction is not None and len(cells) and shape.cell in ("quadrilateral", "line"):
-        along = axes_along(mesh, block.take(cells), direction)
-        cuts = [] if shape.cell == "line" else _cuts_across(mesh, block, cells, direction)
-        cells = cells[along < 0]
+    keys = keys_of(block.nodes[:, : shape.corners])
+    cells = np.flatnonzero(are_among(keys, cut))
+    axes = np.full(len(cells), -1)
+    if direction is not None:
+        axes = axes_along(mesh, block.take(cells), direction)
+        axes[are_among(keys[cells], whole)] = -1
+    cuts, cells = _cuts_across(block, cells, axes), cells[axes < 0]
     return [*cuts, (cells, child_cells(shape.cell))] if len(cells) else cuts
 
 
 # ---- one level between neighbors ---------------------------------------------------------------------
 
 
-def _closed(mesh: Mesh, centers: Centers, marked: Mask) -> Mask:
-    """Return the marked elements and those that must be cut with them."""
-    parts, owners = _parts_of_split(mesh, centers)
-    keys, element = _keys_by_element(mesh)
-    marked = marked.copy()
+def _closed(mesh: Mesh, centers: Centers, marked: Mask, direction: Array | None) -> tuple[Mask, Ints]:
+    """Return the marked elements with those that must be cut with them, and the axis (m,) that each keeps.
+
+    An element keeps none if a neighbor has cut one of its edges along it, or if a larger neighbor keeps none:
+    the parts of their face, halved in two directions, would not match.
+    """
+    if mesh.hanging is None:
+        return marked, _kept_axes(mesh, marked, direction)
+    splits = _splits(mesh, centers)
+    parts, keys = _parts_of(splits), _keys_by_element(mesh)
+    marked = _spread(marked, keys, parts)
+    axes = _kept_axes(mesh, marked, direction)
+    if direction is not None:
+        for split in splits:
+            if split.shape.cell == "line":
+                axes[split.elements[_are_along(mesh, split.corners, direction)]] = -1
+        axes[_spread(marked & (axes < 0), parts, keys)] = -1
+    return marked, axes
+
+
+def _spread(chosen: Mask, hot: tuple[Keys, Ints], reached: tuple[Keys, Ints]) -> Mask:
+    """Return the chosen elements and those that they reach: whose keys `reached` are `hot` ones of chosen."""
+    chosen = chosen.copy()
     while True:
-        hot = sorted_keys(keys[marked[element]])
-        need = owners[are_among(parts, hot) & ~marked[owners]]
+        need = reached[1][are_among(reached[0], sorted_keys(hot[0][chosen[hot[1]]])) & ~chosen[reached[1]]]
         if not len(need):
-            return marked
-        marked[need] = True
+            return chosen
+        chosen[need] = True
 
 
-def _parts_of_split(mesh: Mesh, centers: Centers) -> tuple[Keys, Ints]:
-    """Return the keys of the halves and quarters of split edges and faces, and whose these are."""
-    corner = hanging.is_corner(mesh.blocks, mesh.n_nodes)
-    parts, owners = [np.zeros(0, dtype=np.uint64)], [np.zeros(0, dtype=np.int64)]
+def _splits(mesh: Mesh, centers: Centers) -> list[hanging.Split]:
+    """Return the edges and faces that are split."""
+    corner, existing = hanging.is_corner(mesh.blocks, mesh.n_nodes), hanging.existing_keys(mesh.blocks)
     edges = hanging.split_edges(mesh.blocks, centers, corner)
-    faces = hanging.split_faces(mesh.blocks, centers, corner, hanging.existing_keys(mesh.blocks))
-    for split in (*edges, *faces):
+    return [*edges, *hanging.split_faces(mesh.blocks, centers, corner, existing)]
+
+
+def _parts_of(splits: Sequence[hanging.Split]) -> tuple[Keys, Ints]:
+    """Return the keys of the halves and quarters of split edges and faces, and whose these are."""
+    parts, owners = [np.zeros(0, dtype=np.uint64)], [np.zeros(0, dtype=np.int64)]
+    for split in splits:
         inside = split.children()
         parts += [keys_of(child) for child in inside]
         owners += [split.elements] * len(inside)
@@ -195,7 +231,8 @@ def raised(mesh: Mesh, element_of: Callable[[str], str] | None = None) -> Refine
             raise MeshError(f"{names[block.name]} cannot take the place of {block.name}")
         return [(np.arange(len(block)), [unchanged(shape.cell)])]
 
-    return CellRefiner(mesh, hanging.known_centers(mesh.blocks, None), target).refined_mesh(whole, whole)
+    centers = hanging.known_centers(mesh.blocks, None, mesh.n_nodes)
+    return CellRefiner(mesh, centers, target).refined_mesh(whole, whole)
 
 
 def quadratic(name: str) -> str:

@@ -5,10 +5,9 @@ import pickle
 
 import numpy as np
 import pytest
-from meshes import KINDS
+from meshes import KINDS, area
 
 import kratos_lite as kl
-from kratos_lite.elements.surface import area_vectors, face_rule
 from kratos_lite.mesh.refinement import raised, refine
 
 QUADRATIC = ("10N", "13N", "15N", "20N", "27N")
@@ -29,13 +28,6 @@ def thrice(mesh):
 
 def volume(mesh):
     return sum(group.at(mesh.points).dV.sum() for group in kl.Model(mesh, UNIT).element_groups())
-
-
-def area(blocks, mesh):
-    return sum(
-        np.linalg.norm(area_vectors(b.shape, mesh.points[b.nodes], face_rule(b.shape)), axis=-1).sum()
-        for b in blocks
-    )
 
 
 def assert_whole(mesh):
