@@ -6,6 +6,7 @@ from meshes import joined
 
 import kratos_lite as kl
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
+from kratos_lite.mesh.hanging import is_corner
 from kratos_lite.model.loads.body import BodyForce
 from kratos_lite.solvers.constraints import rigid_modes
 
@@ -250,3 +251,19 @@ def test_hanging_nodes_hold_no_rotation():
     assert finer.mesh.hanging is not None
     assert "translation x, y, z; rotation about x, y, z;" in finer.report.notes[0]
     assert np.abs(shared(kl.Model(finer.mesh, STEEL), finer.u)).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    "mesh",
+    [
+        kl.annulus(0.3, 1.0, 0.2, (2, 16, 1), "KinematicLinear3D20N"),
+        kl.box((1, 1, 1), (2, 2, 2), "KinematicLinear3D10N"),
+    ],
+    ids=["20N", "10N"],
+)
+def test_free_motions_are_held_at_corners_of_elements(mesh):
+    """The linear level of quadratic elements has no other nodes."""
+    model = kl.Model(mesh, STEEL)
+    constrained = model.free_motions(model.element_groups()).constrained
+    assert constrained.sum() == 6
+    assert is_corner(mesh.blocks, mesh.n_nodes)[constrained.any(axis=1)].all()

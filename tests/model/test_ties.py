@@ -206,20 +206,38 @@ def test_a_prescribed_rigid_motion_passes_the_gap_of_a_turned_mesh(mode):
     assert np.abs(model.solve().u - motion).max() < 1e-12
 
 
-def test_a_thick_cylinder_of_two_unlike_rings():
-    """Lamé: u_r of a cylinder under inner pressure with plane strain, through the tie."""
+def two_rings():
+    """Return a cylinder of two unlike rings that are tied, between walls across its axis."""
     a = kl.annulus(0.5, 1.0, 0.1, cells=(2, 16, 1), element="20N")
     b = kl.annulus(1.0, 2.0, 0.1, cells=(3, 20, 1), element="20N")
     model = kl.Model(kl.join({"a": a, "b": b}), STEEL)
     model.tie("a.outer", "b.inner")
     model.fix("z-", "z")
     model.fix("z+", "z")
+    return model
+
+
+def test_a_thick_cylinder_of_two_unlike_rings():
+    """Lamé: u_r of a cylinder under inner pressure with plane strain, through the tie."""
+    model = two_rings()
     model.add(kl.Pressure("a.inner", 1e8))
     u = model.solve().displacement("b.outer")
     p, r, R, nu = 1e8, 0.5, 2.0, STEEL.nu
     exact = (1 + nu) / STEEL.E * p * r**2 / (R**2 - r**2) * ((1 - 2 * nu) * R + R)
     radial = np.linalg.norm(u[:, :2], axis=1)
     assert np.abs(radial / exact - 1).max() < 2e-3
+
+
+def test_nodes_that_walls_hold_in_part_keep_their_ties():
+    """A weight along the axis moves all nodes alike that are halfway between the walls."""
+    model = two_rings()
+    model.fix("a.inner", "xy")
+    model.add(kl.BodyForce((0, 0, 1e6)))
+    result = model.solve()
+    for part in ("a.outer", "b.inner"):
+        nodes = model.mesh.nodes(part)
+        moved = result.u[nodes[np.abs(model.mesh.points[nodes, 2] - 0.05) < 1e-9], 2]
+        assert np.ptp(moved) < 1e-4 * moved.mean()
 
 
 def test_three_blocks_that_meet_in_an_edge():
