@@ -121,10 +121,12 @@ def _plain(word: str) -> str:
 
 
 def nearest(name: str, known: Iterable[str], count: int = 3) -> str:
-    """Return a hint that names the known words closest to `name`, or an empty string."""
+    """Return a hint that names the known words closest to `name`, or an empty string, as for one of them."""
     from difflib import get_close_matches
 
     known = list(dict.fromkeys(known))
+    if name in known:
+        return ""
     if RENAMED.get(name) in known:
         return f" It is called {RENAMED[name]} here."
     plain = {_plain(word): word for word in known}

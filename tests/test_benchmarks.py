@@ -5,6 +5,7 @@ Nothing here asserts a time.
 
 import doctest
 import json
+import os
 import platform
 import sys
 from importlib.metadata import distributions
@@ -12,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from over_ranks import needs_mpi
+from over_ranks import OPEN_MPI, needs_mpi
 from run_files import CLAMP, box_mdpa, materials, process, run_file, write
 from scenes import OURS
 from scipy import sparse
@@ -429,7 +430,18 @@ def test_page_of_scaling_has_efficiencies_goals_and_a_plan():
     assert "- 8N 10x10x10 plain, 2 ranks: killed\n" in text
 
 
+@pytest.fixture
+def on_one_processor(monkeypatch):
+    """Keep what the test starts on one processor, where ranks leave it to those for which they wait."""
+    monkeypatch.setenv("OMPI_MCA_mpi_yield_when_idle", OPEN_MPI["OMPI_MCA_mpi_yield_when_idle"])
+    processors = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(processors)})
+    yield
+    os.sched_setaffinity(0, processors)
+
+
 @needs_mpi
+@pytest.mark.usefixtures("on_one_processor")
 def test_backends_over_ranks_solve_the_same_block(tmp_path, monkeypatch, capsys):
     out = tmp_path / "distributed.json"
     monkeypatch.setattr(scaling, "PAGE", tmp_path / "scaling.md")

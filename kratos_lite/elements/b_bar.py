@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from kratos_lite import voigt
 from kratos_lite.elements import arguments
 from kratos_lite.elements.kinematic_linear import KinematicLinear
 from kratos_lite.elements.tables import StrainTables
@@ -51,23 +52,34 @@ class BBar(KinematicLinear):
     def B(self, xi: ArrayLike, C: ArrayLike | None = None) -> Array:
         """Return B̄ at points; see `KinematicLinear.B`."""
         B, points = super().B(xi), arguments.points(xi)
-        projected = self._projected(points.reshape(-1, 3)).reshape(*B.shape[:-2], -1)
+        gradients = np.swapaxes(self._gauss[1], -1, -2)  # (..., g, n, 3), the rows mᵀB
+        rows = gradients.reshape(*gradients.shape[:-2], -1)
+        projected = self._projected(points.reshape(-1, 3), rows).reshape(*B.shape[:-2], -1)
         fraction = 1 - self.kept(C)
         fraction = fraction.reshape(fraction.shape + (1,) * points.ndim)
         B[..., :3, :] += (fraction * (projected - _trace(B)) / 3)[..., None, :]
         return B
 
+    def _strain_at(self, xi: Array, u: Array, C: ArrayLike | None) -> Array:
+        """Return the strain (..., g, 6) at points (g, 3), from div u and its projection."""
+        if type(self).B is not BBar.B:
+            return super()._strain_at(xi, u, C)
+        rows = np.swapaxes(u, -1, -2)[..., None, :, :]
+        strain = voigt.symmetric_gradient(rows @ self.dNdX(xi))
+        dilatation = (rows * self._gauss[1]).sum(axis=(-2, -1))[..., None]
+        change = self._projected(xi, dilatation) - strain[..., :3].sum(axis=-1, keepdims=True)
+        strain[..., :3] += (1 - self.kept(C))[..., None, None] * change / 3
+        return strain
+
     def kept(self, C: ArrayLike | None) -> Array:
         """Return the fraction (...) of the dilatation beyond its projection that stays in the strain."""
         return np.zeros(())
 
-    def _projected(self, xi: Array) -> Array:
-        """Return Π(mᵀB) (..., g, 3n) at points (g, 3)."""
+    def _projected(self, xi: Array, values: Array) -> Array:
+        """Return Π of values (..., g', k) at Gauss points as (..., g, k) at points (g, 3)."""
         P = self._polynomials(self.rule.points)
         weighted = np.swapaxes(P * self.dV[..., None], -1, -2)
-        gradients = np.swapaxes(self._gauss[1], -1, -2)  # (..., g, n, 3), the rows mᵀB
-        dilatation = gradients.reshape(*gradients.shape[:-2], -1)
-        return self._polynomials(xi) @ np.linalg.solve(weighted @ P, weighted @ dilatation)
+        return self._polynomials(xi) @ np.linalg.solve(weighted @ P, weighted @ values)
 
     @classmethod
     def _center(cls) -> Array:

@@ -170,8 +170,14 @@ class KinematicLinear(CellMass):
             Axes of the elements, axes of the points, 6.
         """
         xi, u = arguments.points(xi), arguments.nodal(u, self.X)
-        strain = (self._operator(C, xi.reshape(-1, 3)) @ u.reshape(*u.shape[:-2], 1, -1, 1))[..., 0]
+        strain = self._strain_at(xi.reshape(-1, 3), u, C)
         return strain.reshape(*strain.shape[:-2], *xi.shape[:-1], 6)
+
+    def _strain_at(self, xi: Array, u: Array, C: ArrayLike | None) -> Array:
+        """Return the strain (..., g, 6) at points (g, 3)."""
+        if self.has_standard_strain():
+            return voigt.symmetric_gradient(np.swapaxes(u, -1, -2)[..., None, :, :] @ self.dNdX(xi))
+        return (self._operator(C, xi) @ u.reshape(*u.shape[:-2], 1, -1, 1))[..., 0]
 
     # ---- stress, internal forces, stiffness --------------------------------------------------------
 

@@ -248,10 +248,11 @@ def test_stresses_of_points_and_places_are_functions_of_the_same_tensor():
         assert result.principal_directions(at).shape == (*shape, 3, 3)
 
 
-def test_own_b_operator_gives_the_strain_at_points():
+@pytest.mark.parametrize("parent", ["KinematicLinear3D8N", "BBar3D8N"])
+def test_own_b_operator_gives_the_strain_at_points(parent):
     with kl.ELEMENTS.temporary():
 
-        class TwiceTheStrain(kl.KinematicLinear3D8N):
+        class TwiceTheStrain(kl.ELEMENTS[parent]):
             def B(self, xi):
                 return 2 * super().B(xi)
 

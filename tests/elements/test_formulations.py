@@ -86,3 +86,15 @@ def test_a_formulation_of_a_user_is_a_word_like_others():
 
         groups = kl.Model(kl.box(element="KinematicLinear3D4N"), STEEL, formulation="mine").element_groups()
         assert groups[0].element is Mine3D4N
+
+
+@pytest.mark.parametrize("name", list(ELEMENTS))
+def test_strain_at_points_is_that_of_b(name):
+    """Of several elements with several rows of points, and of an element with one."""
+    kind, rng = ELEMENTS[name], np.random.default_rng(7)
+    X = kind.nodes + 0.05 * rng.random((3, *kind.nodes.shape))
+    u, xi, C = rng.random(X.shape), 0.3 * rng.random((2, 5, 3)), kl.Isotropic3D(E=1.0, nu=0.4999).C
+    many, one = kind(X), kind(X[0])
+    wanted = np.einsum("epqij,ej->epqi", many.B(xi, C), u.reshape(3, -1))
+    np.testing.assert_allclose(many.strain_at(xi, u, C), wanted, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(one.strain_at(xi[1, 2], u[0], C), wanted[0, 1, 2], rtol=0, atol=1e-14)

@@ -266,9 +266,10 @@ JUNK = [None, True, -1, 0.5, 1e308, -(10**18), "", "x", "..", [], [[]], {}, {"a"
 )
 def test_a_value_of_a_wrong_kind_ends_in_a_project_or_a_clear_error(folder, name, content):
     """Every fourth pair of a place and a value: each place and each value comes several times."""
+    (folder / "box.mdpa").write_text(box_mdpa(2))
     write(folder, REFERENCE, "reference.json")
     write(folder, CHECKED)
-    result, refused = by_hand().solve(), 0
+    result, refused = by_hand(n=2).solve(), 0
     pairs = list(product(spots(content), JUNK))[::4]
     for path, junk in pairs:
         write(folder, replaced(content, path, junk), name)
@@ -283,6 +284,7 @@ def test_a_value_of_a_wrong_kind_ends_in_a_project_or_a_clear_error(folder, name
 
 
 def test_damaged_run_files_end_in_a_project_or_a_clear_error(folder):
+    (folder / "box.mdpa").write_text(box_mdpa(2))
     text, refused = json.dumps(ONE_STEP), []
     for at in range(0, len(text), 14):
         path = write(folder, text[:at] + text[at + 1 :])
