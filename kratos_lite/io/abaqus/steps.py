@@ -243,8 +243,10 @@ def _sweep(low: float, high: float, count: int, bias: float, modes: int) -> Call
 
     def frequencies(model: Model) -> Array:
         natural = model.modes(modes)[0] / (2 * pi)
+        natural = natural[np.diff(natural, prepend=-1.0) > 1e-8 * natural]  # of several modes one
         ends = np.array([low, *natural[(natural > low) & (natural < high)], high])
         middle, half = (ends[1:] + ends[:-1]) / 2, np.diff(ends) / 2
-        return np.asarray(2 * pi * np.unique(middle[:, None] + half[:, None] * x))
+        between = middle[:, None] + half[:, None] * x[1:-1]
+        return np.asarray(2 * pi * np.unique(np.append(ends, between)))
 
     return frequencies
